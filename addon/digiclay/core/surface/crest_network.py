@@ -1,11 +1,12 @@
 """Network of a skeleton: branches between ends and junctions, and the crests they form.
 
-A branch that does not reach out of the flank it stands on is none. At a junction the branches go on into each
-other where they do so straightest: a cross is two lines, and the third branch of a T ends at the other two.
-Where two lines run together for a short way, as in an eight of two circles, both take that way.
+A branch that ends within the flank of the line it starts from is removed. At a junction, the two branches
+that continue each other most nearly straight become one line: a cross is two lines, and the third branch of
+a T ends at the other two. A short stretch that two lines share, as in an eight of two circles, belongs to
+both.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from itertools import combinations, permutations
 
@@ -14,7 +15,7 @@ import numpy as np
 from ..base.arrays import Flags, Floats, Indices, settle
 from .regions import label_components
 
-#: From so many half widths to so many from a junction a branch shows where it goes.
+#: Distances from a junction, in half widths, between which the direction of a branch is measured.
 SHOWS = (1.0, 3.0)
 
 
@@ -33,7 +34,7 @@ class Branch:
 
 #: A branch's end: its number, and 0 for the first point or 1 for the last.
 End = tuple[int, int]
-#: Which end of a branch continues in which, and the points in between.
+#: The end of another branch in which an end continues, and the points between them.
 Joints = dict[End, tuple[End, Floats]]
 
 
@@ -47,7 +48,16 @@ class Network:
 
     def ends(self, node: int) -> list[End]:
         """Return the ends of branches at a node."""
-        return [(k, e) for k, one in self.branches.items() for e in (0, 1) if one.nodes[e] == node]
+        return [
+            (number, end)
+            for number, branch in self.branches.items()
+            for end in (0, 1)
+            if branch.nodes[end] == node
+        ]
+
+    def widest(self, branch: Branch) -> float:
+        """Return the larger half width at the ends of a branch, m."""
+        return max(self.half[node] for node in branch.nodes)
 
     def away(self, end: End) -> Floats:
         """Return the points of a branch from one of its ends on."""
@@ -60,7 +70,7 @@ class Network:
         run = measure_run(points)
         near, far = min(SHOWS[0] * half, run[-1] / 2.0), min(SHOWS[1] * half, run[-1])
         start, stop = place_along(np.array([near, far]), run, points)
-        return np.asarray((stop - start) / max(float(np.hypot(*(stop - start))), 1e-12))
+        return normalize(stop - start)
 
 
 def read_network(beside: Indices, pins: Indices, position: Floats, half: Floats) -> Network:
@@ -108,7 +118,7 @@ def read_network(beside: Indices, pins: Indices, position: Floats, half: Floats)
 
 
 def _neighbors(beside: Indices, pins: Indices) -> dict[int, list[int]]:
-    """Return for each pin of a skeleton those it is joined to: corners only where no side leads there."""
+    """Return the neighbors of each pin of a skeleton; diagonal ones only if no common neighbor joins them."""
     there = np.isin(beside[pins], pins)
     if there.shape[1] == 8:
         there[:, 1::2] &= ~(there[:, ::2] | np.roll(there[:, ::2], -1, axis=1))
@@ -116,11 +126,16 @@ def _neighbors(beside: Indices, pins: Indices) -> dict[int, list[int]]:
     return {pin: row[joined].tolist() for pin, row, joined in rows}
 
 
-def _add_node(network: Network, places: Floats, half: list[float]) -> int:
-    """Add a node in the middle of some places."""
-    network.position.append(places.mean(axis=0))
+def _add_node(network: Network, points: Floats, half: list[float]) -> int:
+    """Add a node at the mean of points (k, 2), as wide as the widest, and return its number."""
+    network.position.append(points.mean(axis=0))
     network.half.append(max(half))
     return len(network.position) - 1
+
+
+def normalize(vector: Floats) -> Floats:
+    """Return the unit vector along a vector (2,)."""
+    return np.asarray(vector / max(float(np.hypot(*vector)), 1e-12))
 
 
 def measure_length(points: Floats) -> float:
@@ -129,34 +144,34 @@ def measure_length(points: Floats) -> float:
 
 
 def measure_run(points: Floats) -> Floats:
-    """Return how far along a line (m, 2) in plan its points are, (m,), m."""
+    """Return the distance of each point of a line (m, 2) from its start, along it in plan, (m,), m."""
     return np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
 
 
 def place_along(at: Floats, run: Floats, points: Floats) -> Floats:
-    """Return the places at some distances (k,), m, along a line whose points are at `run`, (k, 2)."""
+    """Return the points (k, 2) at distances (k,), m, along a line whose own points are at `run`, m."""
     return np.column_stack([np.interp(at, run, axis) for axis in points.T])
 
 
-#: A free branch is shorter than this many half widths when it is only the flank.
+#: A free branch shorter than this many half widths is only the flank.
 FLANK = 1.5
-#: Lines are parted where they are lower than this share of the lower one.
+#: A saddle divides a line where it is lower than this share of the lower of the two tops beside it.
 SADDLE = 0.5
-#: Branches continue in each other when the cosine between their ways is above this: 66 degrees.
+#: Branches continue each other when the cosine of the angle between them is above this: 66 degrees.
 STRAIGHT = 0.4
-#: Two lines run together for this many widths at most, and turn into the common way by so much at most in the
-#: mean, rad: those of an X by 43 degrees, the uprights of an H by 70. Loops on both sides, as in an eight of
-#: two circles, may turn by 75.
+#: Longest stretch that two lines may share, in widths, and largest mean turn into it, rad: the lines of an
+#: X turn by 43 degrees, the uprights of an H by 70. Loops on both sides, as in an eight of two circles, may
+#: turn by 75.
 TOGETHER, TURN, TURN_OF_LOOPS = 4.0, np.radians(60.0), np.radians(75.0)
-#: Branches that turn by more than this sine continue in each other by an arc.
+#: Branches whose directions differ by more than this sine are joined by an arc.
 BENT = 0.35
-#: A line runs straight through a junction, from so many half widths before it to as many after it.
+#: A line runs straight through a junction, from this many half widths before it to as many after it.
 THROUGH = 1.5
 
 
 @dataclass(frozen=True, eq=False)
 class Chain:
-    """Line from pin to pin."""
+    """Line from pin to pin along a skeleton."""
 
     points: Floats
     """(m, 2): m; the first again at the end of a closed one."""
@@ -175,7 +190,7 @@ def find_chains(
     pitch: float,
     off: Callable[[Floats], Floats],
 ) -> list[Chain]:
-    """Return the lines of a skeleton's pins (s,); `half` (s,), m, is half the feature's width there."""
+    """Return the lines of a skeleton's pins (s,); `half` (s,): half the feature's width there, m."""
     network = read_network(beside, pins, position, half)
     _open_low_loops(network, off)
     _merge(network)
@@ -191,38 +206,40 @@ def reaches_out(points: Floats, half: float, pitch: float) -> bool:
 
 
 def _merge(network: Network) -> None:
-    """Make one junction of two that are no further apart than half the feature's width."""
+    """Merge two junctions that are no further apart than half the feature's width."""
 
     def is_short(branch: Branch) -> bool:
-        one, two = branch.nodes
-        junctions = one != two and min(len(network.ends(one)), len(network.ends(two))) > 2
-        return junctions and branch.length <= max(network.half[one], network.half[two])
+        first, second = branch.nodes
+        junctions = first != second and min(len(network.ends(node)) for node in branch.nodes) > 2
+        return junctions and branch.length <= network.widest(branch)
 
-    while short := [number for number, branch in network.branches.items() if is_short(branch)]:
-        one, two = network.branches.pop(short[0]).nodes
-        network.position[one] = 0.5 * (network.position[one] + network.position[two])
-        network.half[one] = max(network.half[one], network.half[two])
+    while short := [branch for branch in network.branches.items() if is_short(branch[1])]:
+        number, branch = short[0]
+        del network.branches[number]
+        node, removed = branch.nodes
+        network.position[node] = 0.5 * (network.position[node] + network.position[removed])
+        network.half[node] = network.widest(branch)
         for branch in network.branches.values():
             for end in (0, 1):
-                if branch.nodes[end] in (one, two):
-                    branch.nodes[end] = one
+                if branch.nodes[end] in (node, removed):
+                    branch.nodes[end] = node
                     branch.points = branch.points.copy()
-                    branch.points[-end] = network.position[one]
+                    branch.points[-end] = network.position[node]
 
 
 def _open_low_loops(network: Network, off: Callable[[Floats], Floats]) -> None:
-    """Cut a loop where its line is lower than half of what is on both sides: it is not closed there."""
+    """Open each loop whose line falls below half the height on both sides."""
     for number, branch in list(network.branches.items()):
         height = off(branch.points)
-        before, after = np.maximum.accumulate(height), np.maximum.accumulate(height[::-1])[::-1]
-        low = int(np.argmin(height / np.maximum(np.minimum(before, after), 1e-12)))
-        bank = float(min(before[low], after[low]))
-        if height[low] >= SADDLE * bank or len(network.ends(branch.nodes[0])) < 3:
+        banks = find_banks(height)
+        low = int(np.argmin(height / np.maximum(banks, 1e-12)))
+        limit = SADDLE * banks[low]
+        if height[low] >= limit or len(network.ends(branch.nodes[0])) < 3:
             continue
         others = [b.nodes for k, b in network.branches.items() if k != number]
         joined = label_components(len(network.position), np.array(others, np.int32).reshape(-1, 2))
         if joined[branch.nodes[0]] == joined[branch.nodes[1]]:
-            first, last = find_stretch(height < SADDLE * bank, low)
+            first, last = find_stretch(height < limit, low)
             del network.branches[number]
             parts = (branch.points[:first], branch.points[:last:-1])
             for node, part in zip(branch.nodes, parts, strict=True):
@@ -231,33 +248,39 @@ def _open_low_loops(network: Network, off: Callable[[Floats], Floats]) -> None:
                     network.branches[max(network.branches, default=0) + 1] = Branch([node, free], part)
 
 
-def find_stretch(there: Flags, at: int) -> tuple[int, int]:
-    """Return the first and the last of the places about one that all are `there`."""
-    out = np.flatnonzero(~there)
-    before, after = out[out < at], out[out > at]
-    return int(before[-1]) + 1 if len(before) else 0, int(after[0]) - 1 if len(after) else len(there) - 1
+def find_banks(height: Floats) -> Floats:
+    """Return at each point of a line (m,) the lower of the highest points before and after it."""
+    before, after = np.maximum.accumulate(height), np.maximum.accumulate(height[::-1])[::-1]
+    return np.minimum(before, after)
+
+
+def find_stretch(inside: Flags, at: int) -> tuple[int, int]:
+    """Return the first and the last index of the stretch around index `at` in which all are `inside`."""
+    outside = np.flatnonzero(~inside)
+    before, after = outside[outside < at], outside[outside > at]
+    return int(before.max(initial=-1)) + 1, int(after.min(initial=len(inside))) - 1
 
 
 def _open_small_loops(network: Network) -> None:
     """Remove branches that close a loop smaller than its line is wide."""
     for number, branch in list(network.branches.items()):
-        one, two = branch.nodes
-        others = [b.length for k, b in network.branches.items() if k != number and set(b.nodes) == {one, two}]
-        about = 2.0 * np.pi * max(network.half[one], network.half[two])
-        if any(length + branch.length < about for length in ([0.0] if one == two else others)):
+        nodes = set(branch.nodes)
+        others = [b.length for k, b in network.branches.items() if k != number and set(b.nodes) == nodes]
+        around = 2.0 * np.pi * network.widest(branch)
+        if any(length + branch.length < around for length in ([0.0] if len(nodes) == 1 else others)):
             del network.branches[number]
 
 
 def _prune(network: Network, pitch: float) -> None:
-    """Take off free branches that are only the flank, the shortest first."""
+    """Remove free branches that are only the flank, the shortest first."""
     while True:
         _join_through(network)
         short = []
         for number, branch in network.branches.items():
             for free, node in (branch.nodes, branch.nodes[::-1]):
                 if len(network.ends(free)) == 1 and len(network.ends(node)) > 2:
-                    beyond = np.stack([_foot(network, number, node), network.position[free]])
-                    lines = (branch.points, beyond)
+                    straight = np.stack([_foot(network, number, node), network.position[free]])
+                    lines = (branch.points, straight)
                     if not all(reaches_out(line, network.half[node], pitch) for line in lines):
                         short.append((branch.length, number))
         if not short:
@@ -268,24 +291,24 @@ def _prune(network: Network, pitch: float) -> None:
 def _foot(network: Network, number: int, node: int) -> Floats:
     """Return where a free branch begins, (2,): its junction, or the corner of the two others there."""
     others = [end for end in network.ends(node) if end[0] != number]
-    met = _meeting(network, others[0], others[1]) if len(others) == 2 else None
+    met = _meeting(network, *others) if len(others) == 2 else None
     return network.position[node] if met is None else met
 
 
 def _join_through(network: Network) -> None:
-    """Make one branch of two that meet where no other does."""
+    """Join two branches that meet where no other does."""
     for node in range(len(network.position)):
         ends = network.ends(node)
         if len(ends) == 2 and ends[0][0] != ends[1][0]:
-            one, two = ends
-            points = np.concatenate([network.away(one)[::-1], network.away(two)[1:]])
+            first, second = ends
+            points = np.concatenate([network.away(first)[::-1], network.away(second)[1:]])
             nodes = [network.branches[k].nodes[1 - e] for k, e in ends]
-            del network.branches[two[0]]
-            network.branches[one[0]] = Branch(nodes, points)
+            del network.branches[second[0]]
+            network.branches[first[0]] = Branch(nodes, points)
 
 
 def _joints(network: Network) -> Joints:
-    """Return which end of a branch continues in which, and the points in between."""
+    """Return which end of a branch continues in which, and the points between them."""
     joints: Joints = {}
     nothing = np.empty((0, 2))
     for number in list(network.branches):
@@ -295,8 +318,8 @@ def _joints(network: Network) -> Joints:
         if len(ends) == 2 and len(network.ends(node)) == 2:
             joints[ends[0]], joints[ends[1]] = (ends[1], nothing), (ends[0], nothing)
             continue
-        ways = {end: network.path(end) for end in ends}
-        pairs = sorted((float(settle(ways[a] @ ways[b])), a, b) for a, b in combinations(ends, 2))
+        paths = {end: network.path(end) for end in ends}
+        pairs = sorted((float(settle(paths[a] @ paths[b])), a, b) for a, b in combinations(ends, 2))
         for cosine, a, b in pairs:
             if cosine < -STRAIGHT and a not in joints and b not in joints:
                 between = _round(network, a, b)
@@ -304,13 +327,13 @@ def _joints(network: Network) -> Joints:
     return joints
 
 
-def _round(network: Network, one: End, two: End) -> Floats:
-    """Return the point of the arc by which two branches go on into each other, (1, 2); none if straight."""
-    met = _meeting(network, one, two)
+def _round(network: Network, first: End, second: End) -> Floats:
+    """Return the point of the arc that joins two branches, (1, 2); none if they are straight."""
+    met = _meeting(network, first, second)
     if met is None:
         return np.empty((0, 2))
     # Half as far out as the tangents meet: exact for a flat arc.
-    return (0.25 * (_begin(network, one) + _begin(network, two)) + 0.5 * met)[None]
+    return (0.25 * (_begin(network, first) + _begin(network, second)) + 0.5 * met)[None]
 
 
 def _begin(network: Network, end: End) -> Floats:
@@ -318,43 +341,48 @@ def _begin(network: Network, end: End) -> Floats:
     return np.asarray(_without_nodes(network, end, {end: (end, np.empty((0, 2)))})[0])
 
 
-def _meeting(network: Network, one: End, two: End) -> Floats | None:
+def _meeting(network: Network, end: End, other: End) -> Floats | None:
     """Return where two branches would meet if they went straight on to their junction and beyond, (2,)."""
-    sides = np.column_stack([network.path(one), -network.path(two)])
-    if abs(np.linalg.det(sides)) < BENT:
+    paths, starts = zip(*((network.path(e), _begin(network, e)) for e in (end, other)), strict=True)
+    away = intersect(paths, starts, BENT)
+    return starts[0] + away[0] * paths[0] if away is not None and away.max() < 0.0 else None
+
+
+def intersect(paths: Sequence[Floats], starts: Sequence[Floats], least: float) -> Floats | None:
+    """Return how far along two lines they meet, (2,), m; none if the sine between them is below `least`."""
+    sides = np.column_stack([paths[0], -paths[1]])
+    if abs(np.linalg.det(sides)) < least:
         return None
-    first = _begin(network, one)
-    away = np.linalg.solve(sides, _begin(network, two) - first)
-    return first + away[0] * sides[:, 0] if away.max() < 0.0 else None
+    return np.linalg.solve(sides, starts[1] - starts[0])
 
 
 def _share(network: Network, number: int, joints: Joints) -> None:
-    """Let two lines run together along a branch when two at each of its ends go on into it."""
+    """Let two lines share a branch if two branches at each of its ends continue in it."""
     branch = network.branches[number]
-    one, two = branch.nodes
-    if one == two or branch.length > TOGETHER * 2.0 * max(network.half[one], network.half[two]):
+    first, second = branch.nodes
+    width = 2.0 * network.widest(branch)
+    if first == second or branch.length > TOGETHER * width:
         return
-    sides = [[end for end in network.ends(node) if end[0] != number] for node in (one, two)]
+    sides = [[end for end in network.ends(node) if end[0] != number] for node in branch.nodes]
     if [len(side) for side in sides] != [2, 2] or any(end in joints for side in sides for end in side):
         return
-    ways = np.array([[network.path(end) for end in side] for side in sides])
-    along = network.position[two] - network.position[one]
-    cosines_along = np.array([ways[0] @ -along, ways[1] @ along]) / max(float(np.hypot(*along)), 1e-12)
+    paths = np.array([[network.path(end) for end in side] for side in sides])
+    along = network.position[second] - network.position[first]
+    cosines_along = np.array([paths[0] @ -along, paths[1] @ along]) / max(float(np.hypot(*along)), 1e-12)
     most = TURN_OF_LOOPS if len({end[0] for side in sides for end in side}) == 2 else TURN
     if np.arccos(np.clip(cosines_along, -1.0, 1.0)).mean() > most:
         return
-    order = min(permutations((0, 1)), key=lambda pair: float(np.sum(ways[0] * ways[1][list(pair)])))
-    # A way that is shorter than wide is a crossing, which each line passes straight.
-    crossing = branch.length <= 2.0 * max(network.half[one], network.half[two])
-    way = branch.points[:0] if crossing else branch.points
+    order = min(permutations((0, 1)), key=lambda pair: float(np.sum(paths[0] * paths[1][list(pair)])))
+    # A stretch that is shorter than wide is a crossing, which each line passes straight.
+    shared = branch.points[:0] if branch.length <= width else branch.points
     for k in (0, 1):
         a, b = sides[0][k], sides[1][order[k]]
-        joints[a], joints[b] = (b, way), (a, way[::-1])
+        joints[a], joints[b] = (b, shared), (a, shared[::-1])
     del network.branches[number]
 
 
 def _assembled(network: Network, joints: Joints, junctions: frozenset[int]) -> Iterable[Chain]:
-    """Give the lines that the branches make."""
+    """Yield the lines that the branches form."""
     free = [(k, e) for k in network.branches for e in (0, 1) if (k, e) not in joints]
     used: set[int] = set()
     for start in [*free, *((k, 0) for k in network.branches)]:
@@ -380,11 +408,11 @@ def _assembled(network: Network, joints: Joints, junctions: frozenset[int]) -> I
 def _without_nodes(network: Network, end: End, joints: Joints) -> Floats:
     """Return the points of a branch from one end on, without those in the junctions it runs through."""
     points, branch = network.away(end), network.branches[end[0]]
-    kept = np.ones(len(points), bool)
+    outside = np.ones(len(points), bool)
     for k in (0, 1):
         node = branch.nodes[k]
         if (end[0], k) in joints and len(network.ends(node)) > 2:
-            kept &= np.hypot(*(points - network.position[node]).T) > THROUGH * network.half[node]
+            outside &= np.hypot(*(points - network.position[node]).T) > THROUGH * network.half[node]
     middle = len(points) // 2
-    kept[middle] |= not kept.any()
-    return np.asarray(points[kept])
+    outside[middle] |= not outside.any()
+    return np.asarray(points[outside])

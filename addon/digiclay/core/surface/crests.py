@@ -11,32 +11,45 @@ from typing import NamedTuple
 import numpy as np
 
 from ..base.arrays import TIE, Floats, Indices, settle
-from .crest_network import SADDLE, Chain, find_chains, find_stretch, measure_run, place_along, reaches_out
+from .crest_network import (
+    SADDLE,
+    Chain,
+    find_banks,
+    find_chains,
+    find_stretch,
+    intersect,
+    measure_run,
+    normalize,
+    place_along,
+    reaches_out,
+)
 from .formed import Formed
 from .skeleton import find_skeleton, measure_half_width
 
-#: Steps a pitch with which a distance is looked for.
+#: Steps per pitch in a search for a distance.
 STEPS = 2
-#: Pairs of a place and a step that are looked at at once.
+#: Pairs of a point and a step that are computed at once.
 CHUNK = 1 << 20
-#: As high as, to this share of the way up.
+#: Heights that differ by less than this share of the rise count as level.
 LEVEL = 0.1
-#: Directions in which a half width is looked for.
+#: Directions in which a half width is measured.
 AROUND = 16
-#: Times a line is drawn through the middle of its sections.
+#: Rounds in which a line is moved into the middle of its sections.
 ROUNDS = 3
-#: Times the end of a line is looked for from its last place.
+#: Rounds in which the end of a line is found.
 ROUNDS_AT_END = 8
-#: A section this many times as wide as most is one through a junction, and says nothing of its middle.
+#: The end of a line is at most this many half widths before the feature's end.
 WIDE = 1.5
+#: A section wider than the median by this factor crosses a junction, and does not show its middle.
 EVEN = 1.25
 #: A line that has fallen below this share of its height at its end, and rises again, has ended in between.
 FALLEN = 0.75
-#: A line runs through the middle of its sections at this share of its height.
+#: Sections are taken at this share of the height.
 MIDDLE = 0.7
-#: A line may have a corner where it turns by more than 28 degrees within `LEG` half widths to both sides.
-#: From `CORNER` half widths on, its legs show where they meet. It is a corner if the feature is so high there
-#: at least, and has lost less than half of what an arc between the legs would have.
+#: A line may have a corner where it turns by more than `TURN` within `LEG` half widths to both sides. Its
+#: legs are straight from `CORNER` half widths on. It is a corner if the feature has at least the share
+#: `HIGH` of its height there, and less than half the loss of height that an arc between the legs would
+#: have.
 CORNER, LEG, TURN, HIGH = 1.5, 2.5, np.radians(28.0), 0.7
 #: Shares of a smoothing step and of the step back.
 TO_AND_FRO = (0.5, -0.53)
@@ -51,11 +64,11 @@ class Field:
     most: float
 
     def at(self, position: Floats) -> Floats:
-        """Return how far the feature is off at places, m; 0 beyond the bed."""
+        """Return the height of the feature at positions, m; 0 beyond the bed."""
         return np.nan_to_num(self.bed.at(self.off, position))
 
     def falls(self, position: Floats, direction: Floats, level: Floats) -> Floats:
-        """Return distances (k,), m, along unit vectors to where the feature falls to levels; inf: nowhere."""
+        """Return the distances (k,), m, along unit vectors at which the feature falls to levels; else inf."""
         step = self.bed.spacing / STEPS
         steps = np.arange(1, int(np.ceil(self.most / step)) + 1) * step
         distance, rows = np.full(len(position), np.inf), max(1, CHUNK // len(steps))
@@ -74,15 +87,15 @@ class Field:
         return distance
 
     def half_widths(self, position: Floats) -> Floats:
-        """Return how far it is at least to where the feature falls to half its height at places, m."""
+        """Return the least distances (k,), m, at which the feature falls to half its height."""
         angles = 2.0 * np.pi * np.arange(AROUND) / AROUND
-        ways = np.column_stack([np.cos(angles), np.sin(angles)])
-        places, level = np.repeat(position, AROUND, axis=0), np.repeat(0.5 * self.at(position), AROUND)
-        distance = self.falls(places, np.tile(ways, (len(position), 1)), level).reshape(-1, AROUND)
+        directions = np.tile(np.column_stack([np.cos(angles), np.sin(angles)]), (len(position), 1))
+        level = np.repeat(0.5 * self.at(position), AROUND)
+        distance = self.falls(np.repeat(position, AROUND, axis=0), directions, level).reshape(-1, AROUND)
         return np.asarray(np.minimum(distance.min(axis=1), self.most))
 
     def line(self, chain: Chain) -> Floats | None:
-        """Return the line along the top that a chain of pins stands for, or none where it has no length."""
+        """Return the line along the top that follows a chain of pins, or none if it has no length."""
         pitch = self.bed.spacing
         line = space_evenly(chain.points, pitch)
         if line is None:
@@ -94,15 +107,15 @@ class Field:
                 return None
             line = smooth(spread, 1, chain.closed)
         half = self.half_width(line, chain.closed)
-        for end, way in ((0, -1), (1, 1)):
+        for end, order in ((0, -1), (1, 1)):
             if not (chain.closed or chain.joined[end]):
-                line = self._find_line_ends(line[::way], half)[::way]
+                line = self._find_line_ends(line[::order], half)[::order]
                 if len(line) < 2:
                     return None
         return self._sharpened(line, half, chain.closed)
 
     def _sharpened(self, line: Floats, half: float, closed: bool) -> Floats:
-        """Return a line with its corners where its straight legs meet, if the feature is as high there."""
+        """Return a line with corners where its straight legs meet, if the feature is high enough there."""
         step = self.bed.spacing / 2.0
         fine = space_evenly(line, step)
         width = max(2, round(CORNER * half / step))
@@ -114,72 +127,70 @@ class Field:
             first = int(np.argmin(turn[:-1]))
             fine = np.concatenate([fine[first:-1], fine[: first + 1]])
             turn = np.concatenate([turn[first:-1], turn[: first + 1]])
-        peaks = [
-            i for i in np.flatnonzero(turn > TURN) if turn[i] == turn[max(i - wide, 0) : i + wide + 1].max()
-        ]
+        sharp = np.flatnonzero(turn > TURN)
+        peaks = [i for i in sharp if turn[i] == turn[max(i - wide, 0) : i + wide + 1].max()]
         ends = [0, *peaks, len(fine) - 1]
         pieces, start, reach = [], 0, width + wide
         for before, i, after in zip(ends, peaks, ends[2:], strict=False):
-            legs = [
-                fine[max(i - reach, (before + i + 1) // 2 if before else 0) : i - width + 1],
-                fine[i + width : min(i + reach, (i + after) // 2 if after < len(fine) - 1 else after) + 1],
-            ]
-            corner = self._meeting(legs[0], legs[1][::-1], half)
+            first = (before + i + 1) // 2 if before else 0
+            last = (i + after) // 2 if after < len(fine) - 1 else after
+            leg = fine[max(i - reach, first) : i - width + 1]
+            next_leg = fine[i + width : min(i + reach, last) + 1]
+            corner = self._meeting(leg, next_leg[::-1], half)
             if corner is not None and i - width >= start:
                 pieces.append(np.concatenate([fine[start : i - width + 1], corner]))
                 fine[i + width - 1], start = corner[0], i + width - 1
         if not pieces:
             return line
         # The last point of a piece is the first one of the next.
-        evenly = [space_evenly(piece, 2.0 * step) for piece in (*pieces, fine[start:])]
-        stops = [*[-1] * len(pieces), None]
-        return np.concatenate(
-            [even[:stop] for even, stop in zip(evenly, stops, strict=True) if even is not None]
-        )
+        evenly = [space_evenly(piece, 2.0 * step) for piece in pieces]
+        last_piece = space_evenly(fine[start:], 2.0 * step)
+        parts = [even[:-1] for even in evenly if even is not None]
+        return np.concatenate(parts if last_piece is None else [*parts, last_piece])
 
     def extend(self, line: Floats, half: float, others: list[Floats]) -> Floats:
-        """Return a line led on straight from its last leg to one of others, or from its end to the next."""
+        """Return a line extended straight onto one of others, or else to their nearest point."""
         step = self.bed.spacing / 4.0
-        there = [even for other in others if (even := space_evenly(other, step)) is not None]
+        targets = [even for other in others if (even := space_evenly(other, step)) is not None]
         fine = space_evenly(line, step)
-        if not there or fine is None:
+        if not targets or fine is None:
             return line
         near, far = (round(share * half / step) for share in (CORNER, CORNER + LEG))
         leg = fine[-far - 1 : -near]
-        every = np.concatenate(there)
+        every = np.concatenate(targets)
         corner = every[[int(np.argmin(np.hypot(*(every - line[-1]).T)))]]
         if len(leg) > 4:
-            middle, way = _straight(leg)
-            off = (every - middle) @ np.array([-way[1], way[0]])
-            ahead = (every - middle) @ way
-            met = np.flatnonzero((np.abs(off) <= step) & (ahead > 0.0))
+            middle, direction = _straight(leg)
+            aside = (every - middle) @ np.array([-direction[1], direction[0]])
+            ahead = (every - middle) @ direction
+            met = np.flatnonzero((np.abs(aside) <= step) & (ahead > 0.0))
             if len(met):
-                at = met[[int(np.argmin(np.abs(ahead[met] - float((line[-1] - middle) @ way))))]]
-                path = middle + np.linspace(0.0, 1.0, 9)[:, None] * (every[at] - middle)
+                end = float((line[-1] - middle) @ direction)
+                at = met[[int(np.argmin(np.abs(ahead[met] - end)))]]
+                path = _sample(middle, every[at])
                 if self.at(path).min() >= HIGH * float(np.median(self.at(leg))):
                     fine, corner = fine[:-near], every[at]
         whole = space_evenly(np.concatenate([fine, corner]), self.bed.spacing)
         return line if whole is None else whole
 
-    def _meeting(self, one: Floats, two: Floats, half: float) -> Floats | None:
+    def _meeting(self, leg: Floats, other: Floats, half: float) -> Floats | None:
         """Return where two legs (k, 2) meet that lead to a corner, (1, 2), or none."""
-        if min(len(one), len(two)) < 3:
+        if min(len(leg), len(other)) < 3:
             return None
-        middles, ways = zip(*map(_straight, (one, two)), strict=True)
-        sides = np.column_stack([ways[0], -ways[1]])
-        if abs(np.linalg.det(sides)) < 1e-3:
+        middles, directions = zip(*map(_straight, (leg, other)), strict=True)
+        away = intersect(directions, middles, 1e-3)
+        if away is None:
             return None
-        away = np.linalg.solve(sides, middles[1] - middles[0])
-        corner = (middles[0] + away[0] * ways[0])[None]
-        path = np.concatenate([m + np.linspace(0.0, 1.0, 9)[:, None] * (corner - m) for m in middles])
-        high = float(np.median(self.at(np.concatenate([one, two]))))
-        turn = max(np.arccos(np.clip(-ways[0] @ ways[1], -1.0, 1.0)), 1e-3) / 2.0
+        corner = (middles[0] + away[0] * directions[0])[None]
+        path = np.concatenate([_sample(middle, corner) for middle in middles])
+        high = float(np.median(self.at(np.concatenate([leg, other]))))
+        turn = max(np.arccos(np.clip(-directions[0] @ directions[1], -1.0, 1.0)), 1e-3) / 2.0
         out = np.hypot(*(middles[1] - middles[0])) / 2.0 * (1.0 / np.sin(turn) - 1.0 / np.tan(turn))
         least = max(HIGH, 1.0 - 0.25 * (out / half) ** 2)
         return corner if away.min() > 0.0 and self.at(path).min() >= least * high else None
 
     def _sections(self, line: Floats, closed: bool, share: float) -> tuple[Floats, Floats, Floats]:
-        """Return which way the sections of a line lie, and how far they reach to both sides at a height."""
+        """Return the directions of a line's sections, and their extents to both sides at a level."""
         ahead = np.gradient(line, axis=0) if len(line) > 2 else np.tile(line[-1] - line[0], (2, 1))
         if closed:
             ahead[0] = ahead[-1] = line[1] - line[-2]
@@ -214,18 +225,17 @@ class Field:
         return float(np.median(half[seen])) if seen.any() else self.most
 
     def _find_line_ends(self, line: Floats, half: float) -> Floats:
-        """Return a line that ends, with its last point, where its spine ends; it may be longer or shorter."""
+        """Return a line cut or extended at its last point, so that it ends where its spine ends."""
         pitch = self.bed.spacing
         run = measure_run(line)
         # Its last pins may turn aside, at the edge of the bed more of them: the line goes straight on there.
         around = line[-1] + (half + pitch) * np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])
         at_edge = bool(np.isnan(self.bed.at(self.off, around)).any())
         aside_at_end = half if at_edge else min(half, pitch)
-        kept = run <= run[-1] - (aside_at_end if run[-1] > 4.0 * half else 0.0)
-        line, run = line[kept], run[kept]
+        before = run <= run[-1] - (aside_at_end if run[-1] > 4.0 * half else 0.0)
+        line, run = line[before], run[before]
         back = max(0.0, run[-1] - max(2.0 * half, 2.0 * pitch))
-        leg = line[-1] - place_along(np.array([back]), run, line)[0]
-        direction = leg / max(float(np.hypot(*leg)), 1e-12)
+        direction = normalize(line[-1] - place_along(np.array([back]), run, line)[0])
         longer = np.arange(1, int(np.ceil(self.most / pitch)) + 1)[:, None] * pitch * direction
         path = np.concatenate([line, line[-1] + longer])
         fine = space_evenly(path, pitch / 4.0)
@@ -259,9 +269,9 @@ class Field:
             end = float(fallen) - min(wide, WIDE * half)
         if end <= 0.0:
             return line[:1]
-        kept = along < end - 0.25 * pitch
+        before = along < end - 0.25 * pitch
         tip = place_along(np.array([end]), along, fine)
-        whole = space_evenly(np.concatenate([fine[kept], tip]), pitch)
+        whole = space_evenly(np.concatenate([fine[before], tip]), pitch)
         return line[:1] if whole is None else whole
 
 
@@ -275,8 +285,13 @@ def space_evenly(points: Floats, step: float) -> Floats | None:
 
 def _straight(leg: Floats) -> tuple[Floats, Floats]:
     """Return the middle of a leg (k, 2), and the unit vector along it."""
-    way = leg[len(leg) // 2 :].mean(axis=0) - leg[: (len(leg) + 1) // 2].mean(axis=0)
-    return leg.mean(axis=0), way / max(float(np.hypot(*way)), 1e-12)
+    first, second = leg[: (len(leg) + 1) // 2], leg[len(leg) // 2 :]
+    return leg.mean(axis=0), normalize(second.mean(axis=0) - first.mean(axis=0))
+
+
+def _sample(start: Floats, stop: Floats) -> Floats:
+    """Return nine points (9, 2) of the straight line between two points."""
+    return np.asarray(start + np.linspace(0.0, 1.0, 9)[:, None] * (stop - start))
 
 
 def _turns(line: Floats, width: int, closed: bool) -> Floats:
@@ -285,9 +300,9 @@ def _turns(line: Floats, width: int, closed: bool) -> Floats:
     at = np.arange(count + 1)
     before, after = at - width, at + width
     before, after = (before % count, after % count) if closed else (before.clip(0), after.clip(None, count))
-    one, two = line - line[before], line[after] - line
-    sine = one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0]
-    return np.asarray(settle(np.abs(np.arctan2(sine, np.sum(one * two, axis=1)))))
+    arriving, leaving = line - line[before], line[after] - line
+    sine = arriving[:, 0] * leaving[:, 1] - arriving[:, 1] * leaving[:, 0]
+    return np.asarray(settle(np.abs(np.arctan2(sine, np.sum(arriving * leaving, axis=1)))))
 
 
 def smooth(line: Floats, times: int, closed: bool) -> Floats:
@@ -305,8 +320,13 @@ def smooth(line: Floats, times: int, closed: bool) -> Floats:
     return line
 
 
-#: Where a line is too low for more half widths than so many, there is a ridge between two mounds.
+#: A low stretch longer than this many half widths is no saddle, but a ridge between two mounds.
 NOTCH = 1.5
+
+
+def measure_in_space(points: Floats) -> float:
+    """Return the length of a line (p, 3), m."""
+    return float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
 
 
 @dataclass(frozen=True, eq=False)
@@ -316,7 +336,7 @@ class Crest:
     points: Floats
     """(p, 3): m, a pitch apart at most."""
     off: Floats
-    """(p,): How far the feature is off its former place along it, m, positive."""
+    """(p,): Height or depth of the feature along it, off the former surface, m, positive."""
     closed: bool
     """Then the last point is the first."""
     half: float
@@ -327,11 +347,11 @@ class Crest:
     @property
     def length(self) -> float:
         """In space, m."""
-        return float(np.linalg.norm(np.diff(self.points, axis=0), axis=1).sum())
+        return measure_in_space(self.points)
 
 
 class Ridge(NamedTuple):
-    """Part of a feature: lines that meet, longest first, or a mound; its top (m, 2) and half width, m."""
+    """Part of a feature: lines that meet, longest first, or a mound; its top (m, 2) and its half width, m."""
 
     crests: tuple[Crest, ...]
     core: Floats
@@ -339,15 +359,15 @@ class Ridge(NamedTuple):
 
 
 def find_ridges(bed: Formed, pins: Indices, off: Floats, least: float) -> tuple[Ridge, ...]:
-    """Return the ridges and mounds of a feature that are parted by saddles, with their crests."""
-    own = np.zeros(len(off))
-    own[pins] = off[pins]
+    """Return the ridges and mounds of a feature that saddles divide, with their crests."""
+    of_feature = np.zeros(len(off))
+    of_feature[pins] = off[pins]
     beside = bed.neighbors[pins]
-    place = np.minimum(np.searchsorted(pins, beside), len(pins) - 1)
-    among, on_bed = np.where(pins[place] == beside, place, -1), beside >= 0
+    rank = np.minimum(np.searchsorted(pins, beside), len(pins) - 1)
+    among, on_bed = np.where(pins[rank] == beside, rank, -1), beside >= 0
     line = find_skeleton(among, on_bed, off[pins])
     position = bed.position[pins]
-    field = Field(bed, own, 2.0 * (measure_half_width(among, on_bed) + 2.0) * bed.spacing)
+    field = Field(bed, of_feature, 2.0 * (measure_half_width(among, on_bed) + 2.0) * bed.spacing)
     half = field.half_widths(position[line])
     chains = find_chains(among, line, position, half, bed.spacing, field.at) if len(line) > 1 else []
     if not chains:  # a single pin, or a ring of three
@@ -364,24 +384,26 @@ def find_ridges(bed: Formed, pins: Indices, off: Floats, least: float) -> tuple[
     groups: list[tuple[set[int], list[int]]] = []
     for number, piece in enumerate(pieces):
         group = (set(piece.nodes), [number])
-        for other in [one for one in groups if one[0] & group[0]]:
+        for other in [other for other in groups if other[0] & group[0]]:
             groups.remove(other)
             group = (group[0] | other[0], group[1] + other[1])
         groups.append(group)
-    made = []
+    ridges = []
     for _, numbers in groups:
-        own_crests = [_crest(field, pieces[n], lines[n]) for n in numbers]
-        kept = sorted((one for one in own_crests if one is not None), key=lambda one: -settle(one.length))
-        core = np.concatenate([pieces[n].points for n in numbers])
-        if kept:
-            core = np.concatenate([one.points[:, :2] for one in kept])
-        wide = kept[0].half if kept else float(field.half_widths(core[[int(np.argmax(field.at(core)))]])[0])
-        made.append(Ridge(tuple(kept), core, wide))
-    return tuple(made)
+        every = [_crest(field, pieces[n], lines[n]) for n in numbers]
+        crests = sorted(filter(None, every), key=lambda crest: -settle(crest.length))
+        if crests:
+            core, half_width = np.concatenate([crest.points[:, :2] for crest in crests]), crests[0].half
+        else:
+            core = np.concatenate([pieces[n].points for n in numbers])
+            top = core[[int(np.argmax(field.at(core)))]]
+            half_width = float(field.half_widths(top)[0])
+        ridges.append(Ridge(tuple(crests), core, half_width))
+    return tuple(ridges)
 
 
 def _parted(chain: Chain, field: Field, half: float, least: float) -> list[Chain]:
-    """Return the parts of a line between saddles that are short, and lower than half of what they part."""
+    """Return the parts of a line between its saddles: short stretches below half the height beside them."""
     points = chain.points
     off = field.at(points)
     if chain.closed:
@@ -391,8 +413,7 @@ def _parted(chain: Chain, field: Field, half: float, least: float) -> list[Chain
             return [chain]
         opened = np.concatenate([points[low:-1], points[: low + 1]])
         return _parted(Chain(opened, False, (False, False), chain.nodes), field, half, least)
-    before, after = np.maximum.accumulate(off), np.maximum.accumulate(off[::-1])[::-1]
-    banks = np.minimum(before, after)
+    banks = find_banks(off)
     run = measure_run(points)
     for at in np.argsort(settle(off / np.maximum(banks, 1e-12)), kind="stable").tolist():
         if off[at] >= SADDLE * banks[at]:
@@ -400,27 +421,27 @@ def _parted(chain: Chain, field: Field, half: float, least: float) -> list[Chain
         first, last = find_stretch(off < off[at] + LEVEL * (banks[at] - off[at]), at)
         if banks[at] - off[at] >= least and run[last] - run[first] <= NOTCH * half and 0 < at < len(off) - 1:
             first, last = find_stretch(off < SADDLE * banks[at], at)
-            one = replace(chain, points=points[: max(first, 1)], joined=(chain.joined[0], False))
+            part = replace(chain, points=points[: max(first, 1)], joined=(chain.joined[0], False))
             rest = points[min(last + 1, len(off) - 1) :]
-            two = replace(chain, points=rest, joined=(False, chain.joined[1]))
-            return [*_parted(one, field, half, least), *_parted(two, field, half, least)]
+            other = replace(chain, points=rest, joined=(False, chain.joined[1]))
+            return [*_parted(part, field, half, least), *_parted(other, field, half, least)]
     return [chain]
 
 
 def _meet(pieces: list[Chain], lines: list[Floats | None], field: Field) -> None:
-    """Let lines that end at a junction end on another line there, in place."""
+    """Extend lines that end at a junction to another line there, in place."""
     for number, piece in enumerate(pieces):
-        for end, way in ((0, -1), (-1, 1)):
-            own_line = lines[number]
-            if own_line is None or piece.closed or not piece.joined[end]:
+        for end, order in ((0, -1), (-1, 1)):
+            line = lines[number]
+            if line is None or piece.closed or not piece.joined[end]:
                 continue
             met = [k for k, other in enumerate(pieces) if k != number and other.nodes & piece.nodes]
-            others = [line for k in met if (line := lines[k]) is not None]
-            lines[number] = field.extend(own_line[::way], field.half_width(own_line, False), others)[::way]
+            others = [other for k in met if (other := lines[k]) is not None]
+            lines[number] = field.extend(line[::order], field.half_width(line, False), others)[::order]
 
 
 def _crest(field: Field, chain: Chain, line: Floats | None) -> Crest | None:
-    """Return the crest along a line, or none where it is no more than a top."""
+    """Return the crest along a line, or none if it is shorter than the feature is wide."""
     if line is None:
         return None
     half = field.half_width(line, chain.closed)

@@ -10,25 +10,25 @@ from ..base.arrays import Faces, Floats, Indices, find_first_largest, settle
 from ..base.quantity import Parameters, quantity
 from ..model.layout import list_steps
 from .crest_network import find_stretch, measure_run
-from .crests import Crest, Ridge, find_ridges
-from .regions import Region, cut, divide, label_components
+from .crests import Crest, Ridge, find_ridges, measure_in_space
+from .regions import Region, cut, divide, label_components, list_edges
 from .skins import SurfaceGrid
 
-#: Share of a crest that keeps to the straight line of its ridge, at least, and share that may lie below.
+#: Least share of a crest that is near the straight line of its ridge, and largest share below the line.
 KEEPS, BELOW = 0.4, 0.1
-#: What counts as below, as a share of the line's height.
+#: A point is below the line when it is lower by this share of the line's height.
 SLACK = 0.1
 #: A mound rises above the ridge by this share of the ridge's height at least.
 RISES = 0.3
 #: A mound's foot is where it has risen by this share of its rise.
 FOOT = 0.15
-#: A mound is so many half widths of its ridge long at most, on each side of its top.
+#: A mound extends at most this many half widths of its ridge to each side of its top.
 COMPACT = 4.0
-#: The peak where two ridges cross is so many half widths long, and no mound.
+#: A peak where two ridges cross is no mound if it extends at most this many half widths to each side.
 CROSSING = 1.5
-#: Points of a crest that are looked at for the line of its ridge.
+#: Points of a crest from which the line of its ridge is found.
 POINTS = 40
-#: Pairs of a place and a point of a core that are compared at once.
+#: Pairs of a position and a point of a core that are compared at once.
 CHUNK = 1 << 21
 
 
@@ -37,10 +37,10 @@ def find_parts(ridge: Ridge, least: float) -> tuple[Ridge, ...]:
     crests, cores = [], []
     mounds: list[tuple[Floats, float]] = []
     for crest in ridge.crests:
-        bare, ways = _strip_branches(crest, least)
+        bare, stretches = _strip_mounds(crest, least)
         crests.append(bare)
         on_ridge = np.ones(len(crest.points), bool)
-        for first, last in ways:
+        for first, last in stretches:
             here = slice(first, last + 1)
             on_ridge[here] = False
             top = first + int(np.argmax(crest.off[here]))
@@ -57,25 +57,25 @@ def find_parts(ridge: Ridge, least: float) -> tuple[Ridge, ...]:
     return (Ridge(tuple(crests), np.concatenate(cores), ridge.half), *on_discs)
 
 
-def measure_distances(places: Floats, every: list[Ridge]) -> Floats:
-    """Return how far places (k, 2) are from each part, less half its width, m, shape (parts, k)."""
-    away = np.empty((len(every), len(places)))
+def measure_distances(position: Floats, every: list[Ridge]) -> Floats:
+    """Return the distances (parts, k) of positions (k, 2) from each part, less half its width, m."""
+    away = np.empty((len(every), len(position)))
     for number, part in enumerate(every):
         rows = max(1, CHUNK // len(part.core))
-        for start in range(0, len(places), rows):
-            x, y = np.moveaxis(places[start : start + rows, None] - part.core, -1, 0)
+        for start in range(0, len(position), rows):
+            x, y = np.moveaxis(position[start : start + rows, None] - part.core, -1, 0)
             away[number, start : start + rows] = np.hypot(x, y).min(axis=1) - part.half
     return away
 
 
-def _strip_branches(crest: Crest, least: float) -> tuple[Crest, list[tuple[int, int]]]:
-    """Return a crest without the mounds on it, and the first and last points of each of them."""
+def _strip_mounds(crest: Crest, least: float) -> tuple[Crest, list[tuple[int, int]]]:
+    """Return a crest without the mounds on it, and the first and last point of each mound."""
     run = measure_run(crest.points[:, :2])
     line = _line(run, crest.off, crest.closed)
     if line is None:
         return crest, []
     excess = crest.off - line
-    ways: list[tuple[int, int]] = []
+    mounds: list[tuple[int, int]] = []
     untried = excess > 0.0
     while untried.any():
         top = int(np.argmax(np.where(untried, excess, -np.inf)))
@@ -88,34 +88,35 @@ def _strip_branches(crest: Crest, least: float) -> tuple[Crest, list[tuple[int, 
         inner = first > 0 and last < len(run) - 1
         if crest.crossed and inner and run[last] - run[first] <= 2.0 * CROSSING * crest.half:
             continue
-        ways.append((first, last))
-    left = run[-1] - sum(run[last] - run[first] for first, last in ways)
-    if not ways or left < 2.0 * crest.half:
+        mounds.append((first, last))
+    left = run[-1] - sum(run[last] - run[first] for first, last in mounds)
+    if not mounds or left < 2.0 * crest.half:
         return crest, []
     points, off = crest.points.copy(), crest.off.copy()
-    # Which way the surface has risen: up for a boss, down for a crease.
+    # The surface of a boss has risen, that of a crease sunk.
     sign = 1.0 if np.polyfit(crest.off, crest.points[:, 2], 1)[0] > 0.0 else -1.0
-    kept = np.ones(len(run), bool)
-    for first, last in ways:
-        here = slice(first, last + 1)
-        points[here, 2] -= sign * excess[here]
-        off[here] = line[here]
-        top = first + int(np.argmax(crest.off[here]))
+    on_ridge = np.ones(len(run), bool)
+    for first, last in mounds:
+        mound = slice(first, last + 1)
+        points[mound, 2] -= sign * excess[mound]
+        off[mound] = line[mound]
+        top = first + int(np.argmax(crest.off[mound]))
         if last == len(run) - 1:
-            kept[top + 1 :] = False
+            on_ridge[top + 1 :] = False
         elif first == 0:
-            kept[:top] = False
-    return replace(crest, points=points[kept], off=off[kept]), ways
+            on_ridge[:top] = False
+    return replace(crest, points=points[on_ridge], off=off[on_ridge]), mounds
 
 
 def _line(run: Floats, off: Floats, closed: bool) -> Floats | None:
-    """Return the heights of the ridge along a crest: a straight line most of it keeps to, from below."""
-    some = np.unique(np.linspace(0, len(run) - 1, POINTS).astype(int))
-    at, height = run[some], off[some]
-    pairs = np.array([(i, j) for i, j in combinations(range(len(some)), 2) if at[j] - at[i] >= at[-1] / 4.0])
-    if not len(pairs):
+    """Return the heights of the ridge along a crest: the straight line that most of it follows."""
+    sample = np.unique(np.linspace(0, len(run) - 1, POINTS).astype(int))
+    at, height = run[sample], off[sample]
+    i, j = np.array(list(combinations(range(len(sample)), 2))).reshape(-1, 2).T
+    far = at[j] - at[i] >= at[-1] / 4.0
+    i, j = i[far], j[far]
+    if not len(i):
         return None
-    i, j = pairs.T
     slope = np.zeros(len(i)) if closed else (height[j] - height[i]) / (at[j] - at[i])
     lines = height[i, None] + slope[:, None] * (at - at[i, None])
     rest = height - lines
@@ -138,14 +139,14 @@ class Finding(Parameters):
     smallest: int = quantity(3, "pins a feature has at least", at_least=1)
 
 
-#: What a person calls a feature, by its kind: with one crest, without, and without but flat.
+#: Names of a feature's form, by its kind: with one crest, without a crest, and without but flat.
 FORMS = {"boss": ("ridge", "mound", "plateau"), "crease": ("valley", "hollow", "basin")}
-#: A top is flat when more than half of what is above half its height is above this share of it.
+#: A top is flat when, of the pins above half its height, more than half are above this share of it.
 FLAT = 0.9
-#: Saddles and mounds count from so many thresholds on.
+#: Saddles and mounds below this many thresholds are ignored.
 DEEP = 2.0
-#: Bodies of two parts of a boss or crease keep this share of a pitch from their common border, each: with a
-#: common wall a welded file would use its edges four times. Slicers close so narrow a gap.
+#: Gap between the bodies of two parts of a boss or crease and their common border, in pitches: with a common
+#: wall, a welded file would use its edges four times. Slicers close so narrow a gap.
 GAP = 0.005
 
 
@@ -161,12 +162,12 @@ class Feature:
     region: Region
     """The part of the skin."""
     apart: Region
-    """The same, without a narrow strip beside the feature it is divided from."""
+    """The same without a narrow strip along the border to the feature it was divided from."""
     extreme: float
     """Largest height of a boss, or depth of a crease, off the former surface, m."""
     crests: tuple[Floats, ...]
-    """(p, 3): The lines along its top, or its bottom, m; the longest first. A closed one ends where it
-    begins."""
+    """(p, 3): Lines along its top, or its bottom, m; the longest first. The last point of a closed one is its
+    first."""
     flat: bool
     """Whether most of its top is level."""
 
@@ -198,63 +199,70 @@ class Feature:
     @property
     def crest_length(self) -> float:
         """Length of all crest lines, in space, m."""
-        return float(sum(np.linalg.norm(np.diff(line, axis=0), axis=1).sum() for line in self.crests))
+        return float(sum(measure_in_space(line) for line in self.crests))
 
     def figures(self) -> dict[str, object]:
-        """Return what is listed of it, in SI units."""
+        """Return its figures for a list, in SI units."""
         return {
-            "name": self.name, "kind": self.kind, "form": self.form, "pins": self.pins.tolist(),
+            "name": self.name,
+            "kind": self.kind,
+            "form": self.form,
+            "pins": self.pins.tolist(),
             "area": self.area,
-            "height" if self.kind == "boss" else "depth": self.extreme, "volume": self.volume,
-            "crest_length": self.crest_length, "crests": [line.tolist() for line in self.crests],
-        }  # fmt: skip
+            "height" if self.kind == "boss" else "depth": self.extreme,
+            "volume": self.volume,
+            "crest_length": self.crest_length,
+            "crests": [line.tolist() for line in self.crests],
+        }
 
 
 def find(grid: SurfaceGrid, finding: Finding | None = None) -> list[Feature]:
     """Return the features of a skin: bosses, then creases, the largest of each first."""
-    # Points belong together that the skin's triangles join: two bosses that only touch at the threshold are
-    # two. What a saddle parts, and a mound that stands on a ridge, is a feature by itself.
+    # Points are in one region if triangles of the skin join them: bosses that only touch at the threshold are
+    # two. The parts beside a saddle, and a mound on a ridge, are features of their own.
     finding, features = finding or Finding(), []
-    list_steps(grid.formed.shift / grid.formed.pitch)  # refuses rows that have no neighbors
+    list_steps(grid.formed.shift / grid.formed.pitch)  # refuses rows without neighbors
     for kind, sign in (("boss", 1.0), ("crease", -1.0)):
-        some = sorted(_of_kind(grid, finding, kind, sign), key=lambda feature: -settle(feature.volume * 1e9))
-        features += [replace(feature, number=number) for number, feature in enumerate(some, 1)]
+        unordered = _find_kind(grid, finding, kind, sign)
+        ordered = sorted(unordered, key=lambda feature: -settle(feature.volume * 1e9))
+        features += [replace(feature, number=number) for number, feature in enumerate(ordered, 1)]
     return features
 
 
-def _of_kind(grid: SurfaceGrid, finding: Finding, kind: str, sign: float) -> Iterator[Feature]:
-    """Give the features of one kind, not yet numbered."""
+def _find_kind(grid: SurfaceGrid, finding: Finding, kind: str, sign: float) -> Iterator[Feature]:
+    """Yield the features of a kind, not yet numbered."""
     off = settle(sign * grid.raised)
     inside = off > finding.threshold
     faces = grid.faces[inside[grid.faces].any(axis=1)]
-    edges = faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    edges = list_edges(faces)
     label = label_components(len(off), edges[inside[edges].all(axis=1)])
     # All corners of a triangle that are inside are joined by it, and so have one label.
     of_face = np.where(inside[faces], label[faces], -1).max(axis=1)
     at_pins = settle(sign * grid.formed.raised)
     pins = _by_label(np.where(inside[grid.pins], label[grid.pins], -1))
     for name, block in _by_label(of_face).items():
-        own_pins = pins.get(name, np.empty(0, np.int64))
-        if len(own_pins) < finding.smallest:
+        in_block = pins.get(name, np.empty(0, np.int64))
+        if len(in_block) < finding.smallest:
             continue
         region = cut(grid.position, grid.former, off, faces[block], finding.threshold)
         least = DEEP * finding.threshold
-        whole = find_ridges(grid.formed, own_pins, at_pins, least)
-        every = [part for ridge in whole for part in find_parts(ridge, least)]
-        for part, own, piece, apart in _shared_out(grid, every, own_pins, region, finding.smallest):
+        ridges = find_ridges(grid.formed, in_block, at_pins, least)
+        parts = [part for ridge in ridges for part in find_parts(ridge, least)]
+        for part, of_part, piece, apart in _divide(grid, parts, in_block, region, finding.smallest):
             lines = tuple(crest.points for crest in part.crests)
-            high = at_pins[own]
-            flat = np.mean(high[high >= 0.5 * high.max()] >= FLAT * high.max()) > 0.5
-            yield Feature(kind, 0, own, piece, apart, float(piece.off.max()), lines, bool(flat))
+            height = at_pins[of_part]
+            upper = height[height >= 0.5 * height.max()]
+            flat = bool(np.mean(upper >= FLAT * height.max()) > 0.5)
+            yield Feature(kind, 0, of_part, piece, apart, float(piece.off.max()), lines, flat)
 
 
-def _shared_out(
+def _divide(
     grid: SurfaceGrid, every: list[Ridge], pins: Indices, region: Region, smallest: int
 ) -> Iterator[tuple[Ridge, Indices, Region, Region]]:
-    """Give each part with pins enough its pins, its piece of a region, and this apart from the others."""
-    place = grid.formed.position[pins]
+    """Yield each part that has enough pins, its pins, its piece of a region, and the piece less its gaps."""
+    position = grid.formed.position[pins]
     while len(every) > 1:
-        owner = find_first_largest(-measure_distances(place, every))
+        owner = find_first_largest(-measure_distances(position, every))
         count = np.bincount(owner, minlength=len(every))
         if count.min() >= smallest:
             break
@@ -272,34 +280,39 @@ def _shared_out(
 
 
 def _nearer(region: Region, every: list[Ridge]) -> Floats:
-    """Return how much nearer the points of a region are to the last part than to the others, m, (k,)."""
+    """Return by how much the points of a region are nearer to the last part than to the others, (k,), m."""
     away = measure_distances(region.position, every)
     return np.asarray(away[:-1].min(axis=0) - away[-1])
 
 
 def _by_label(label: Faces) -> dict[int, Indices]:
-    """Return for each label from 0 on where it stands, ascending."""
+    """Return the indices of each label from 0 on, ascending."""
     order = np.argsort(label, kind="stable")
     names, starts = np.unique(label[order], return_index=True)
-    places = zip(names.tolist(), np.split(order, starts[1:]), strict=False)  # without labels, one of none
-    return {name: some for name, some in places if name >= 0}
+    groups = zip(names.tolist(), np.split(order, starts[1:]), strict=False)  # without labels, one empty group
+    return {name: group for name, group in groups if name >= 0}
 
 
 def make_table(features: list[Feature]) -> list[tuple[str, ...]]:
-    """Return a table for a person: a head, and a row of texts a feature, in mm."""
+    """Return a table to be read: a head, and a row of texts per feature, in mm."""
     head = ("feature", "form", "pins", "area, mm²", "height or depth, mm", "crest, mm", "volume, mm³")
     rows = [
         (
-            one.name, one.form, str(len(one.pins)), f"{one.area * 1e6:.1f}", f"{one.extreme * 1e3:.2f}",
-            f"{one.crest_length * 1e3:.1f}", f"{one.volume * 1e9:.0f}",
+            feature.name,
+            feature.form,
+            str(len(feature.pins)),
+            f"{feature.area * 1e6:.1f}",
+            f"{feature.extreme * 1e3:.2f}",
+            f"{feature.crest_length * 1e3:.1f}",
+            f"{feature.volume * 1e9:.0f}",
         )
-        for one in features
-    ]  # fmt: skip
+        for feature in features
+    ]
     return [head, *rows]
 
 
 def summarize(features: list[Feature]) -> str:
-    """Return how many there are in a few words."""
+    """Return the numbers of bosses and creases in words."""
     kinds = (("boss", "bosses"), ("crease", "creases"))
     counts = [(sum(feature.kind == kind for feature in features), kind, plural) for kind, plural in kinds]
     return " and ".join(f"{count} {kind if count == 1 else plural}" for count, kind, plural in counts)

@@ -1,9 +1,9 @@
 """Stepped bed as one printable body: a prism for every pin.
 
-The parts are those that are nearest to a pin: squares in an aligned bed, hexagons in a shifted one. Where
-neighbors differ in height a wall stands between them. Two squares that meet at a corner only, and are
-both higher than the other two there, would touch along a line without thickness, which no printer can
-make: they are joined by a bridge as narrow as `BRIDGE`.
+The part of a pin is the area nearest to it: a square in an aligned bed, a hexagon in a shifted one. A wall
+stands between neighbors of different heights. Two squares that meet only at a corner, and are both higher
+than the other two there, would touch along a line without thickness, which no printer can make: a bridge of
+half the width `BRIDGE` joins them.
 """
 
 from dataclasses import dataclass, replace
@@ -16,14 +16,14 @@ from .formed import BASE_THICKNESS, Formed, find_base_level, take_corners
 
 #: Half the width of a bridge, in pitches along x and rows along y.
 BRIDGE = 0.05
-#: Heights above the base are taken to the nearest multiple of this, m: a wall lower than a file's float32
-#: can hold would have no area there.
+#: Heights above the base are rounded to multiples of this, m: a wall lower than float32 resolves would have
+#: no area in a file.
 STEP = 1e-7
 
 
 @dataclass(frozen=True, eq=False)
 class Parts:
-    """Division of the bed into parts, one a pin, with the sides of each part in sequence."""
+    """Division of the bed into parts, one per pin, with the sides of each part in sequence."""
 
     corner: Floats
     """(k, 2): Where the parts meet, m."""
@@ -31,7 +31,7 @@ class Parts:
     end: Indices
     """(e,): Corners of each side of each part; the part is to the left."""
     pin: Indices
-    """(e,): Whose side it is."""
+    """(e,): The pin of each side."""
     twin: Indices
     """(e,): The same side seen from the part beyond; -1 at the edge of the bed."""
 
@@ -48,32 +48,32 @@ def make_parts(formed: Formed) -> Parts:
     size = len(corner)
     sides = start * size + end
     order = np.argsort(sides)
-    place = np.minimum(np.searchsorted(sides, end * size + start, sorter=order), len(sides) - 1)
-    twin = order[place]
+    rank = np.minimum(np.searchsorted(sides, end * size + start, sorter=order), len(sides) - 1)
+    twin = order[rank]
     return Parts(corner, start, end, pin, np.where((start[twin] == end) & (end[twin] == start), twin, -1))
 
 
 def make_pins_solid(formed: Formed, base_thickness: float = BASE_THICKNESS) -> tuple[Floats, Faces, Indices]:
-    """Return vertices (v, 3), m, first the middles of tops, faces (f, 3) and their pins of the closed bed."""
+    """Return vertices (v, 3), m, first the middles of tops, faces (f, 3) and their pins."""
     level = find_base_level(formed.height, base_thickness)
     steps = np.maximum(np.rint((formed.height - level) / STEP), 1.0).astype(np.int64)
     height = level + steps * STEP
-    made, n = make_parts(replace(formed, height=height)), len(steps)
+    parts, n = make_parts(replace(formed, height=height)), len(steps)
     # Each corner has a vertex at the height of every part about it, and one of the base.
-    k, above = len(made.corner), int(steps.max()) + 1
-    keys = np.concatenate([made.start * above + steps[made.pin], np.arange(k) * above])
+    k, above = len(parts.corner), int(steps.max()) + 1
+    keys = np.concatenate([parts.start * above + steps[parts.pin], np.arange(k) * above])
     names, number = np.unique(keys, return_inverse=True)
     number = number.ravel() + 2 * n
-    own, ground = number[: len(made.start)], number[len(made.start) :]
+    here, ground = number[: len(parts.start)], number[len(parts.start) :]
     at, up = np.divmod(names, above)
     middle = np.column_stack([formed.position, height])
     below = np.column_stack([formed.position, np.full(n, level)])
-    vertices = np.concatenate([middle, below, np.column_stack([made.corner[at], level + up * STEP])])
-    ahead = own[_following(made.pin)]
-    top = np.column_stack([made.pin, own, ahead]).astype(np.int32)
-    bottom = np.column_stack([made.pin + n, ground[made.end], ground[made.start]]).astype(np.int32)
-    walls, whose = _walls(made, steps, own, ahead, ground)
-    return vertices, np.concatenate([top, bottom, walls]), np.concatenate([made.pin, made.pin, whose])
+    vertices = np.concatenate([middle, below, np.column_stack([parts.corner[at], level + up * STEP])])
+    ahead = here[_following(parts.pin)]
+    top = np.column_stack([parts.pin, here, ahead]).astype(np.int32)
+    bottom = np.column_stack([parts.pin + n, ground[parts.end], ground[parts.start]]).astype(np.int32)
+    walls, whose = _walls(parts, steps, here, ahead, ground)
+    return vertices, np.concatenate([top, bottom, walls]), np.concatenate([parts.pin, parts.pin, whose])
 
 
 def _following(pin: Indices) -> Indices:
@@ -85,21 +85,21 @@ def _following(pin: Indices) -> Indices:
 
 
 def _walls(
-    made: Parts, steps: Indices, own: Indices, ahead: Indices, ground: Indices
+    parts: Parts, steps: Indices, here: Indices, ahead: Indices, ground: Indices
 ) -> tuple[Faces, Indices]:
-    """Return the triangles of the walls a part has above its neighbors, and their pins."""
+    """Return the triangles of the walls of parts above their neighbors, and their pins."""
     # The vertices of a corner are numbered in the order of their heights: a wall uses consecutive ones.
-    other = np.where(made.twin >= 0, steps[made.pin[made.twin]], 0)
-    side = np.flatnonzero(steps[made.pin] > other)
-    twin = made.twin[side]
+    other = np.where(parts.twin >= 0, steps[parts.pin[parts.twin]], 0)
+    side = np.flatnonzero(steps[parts.pin] > other)
+    twin = parts.twin[side]
     # The feet of the wall: the neighbor's vertices, or beyond the bed those of the base.
-    left = np.where(twin >= 0, ahead[twin], ground[made.start[side]])
-    right = np.where(twin >= 0, own[twin], ground[made.end[side]])
-    i, step = _counted(own[side] - left)
-    one = np.column_stack([left[i] + step, right[i], left[i] + step + 1]).astype(np.int32)
+    left = np.where(twin >= 0, ahead[twin], ground[parts.start[side]])
+    right = np.where(twin >= 0, here[twin], ground[parts.end[side]])
+    i, step = _counted(here[side] - left)
+    lower = np.column_stack([left[i] + step, right[i], left[i] + step + 1]).astype(np.int32)
     j, step = _counted(ahead[side] - right)
-    two = np.column_stack([right[j] + step, right[j] + step + 1, own[side][j]]).astype(np.int32)
-    return np.concatenate([one, two]), made.pin[side][np.concatenate([i, j])]
+    upper = np.column_stack([right[j] + step, right[j] + step + 1, here[side][j]]).astype(np.int32)
+    return np.concatenate([lower, upper]), parts.pin[side][np.concatenate([i, j])]
 
 
 def _counted(counts: Indices) -> tuple[Indices, Indices]:
@@ -112,30 +112,30 @@ def _counted(counts: Indices) -> tuple[Indices, Indices]:
 def _squares(formed: Formed) -> tuple[Floats, Indices]:
     """Return corners and loops of an aligned bed: where four parts meet are two corners, mostly the same."""
     rows, columns = formed.rows, formed.columns
-    place = formed.position.reshape(rows, columns, 2)
-    step_x, step_y = place[0, 1, 0] - place[0, 0, 0], place[1, 0, 1] - place[0, 0, 1]
-    x = place[0, 0, 0] + step_x * (np.arange(columns + 1) - 0.5)
-    y = place[0, 0, 1] + step_y * (np.arange(rows + 1) - 0.5)
+    position = formed.position.reshape(rows, columns, 2)
+    step_x, step_y = position[0, 1, 0] - position[0, 0, 0], position[1, 0, 1] - position[0, 0, 1]
+    x = position[0, 0, 0] + step_x * (np.arange(columns + 1) - 0.5)
+    y = position[0, 0, 1] + step_y * (np.arange(rows + 1) - 0.5)
     corner = np.stack(np.meshgrid(x, y), axis=-1)
     top = formed.height.reshape(rows, columns)
     a, b, c, d = take_corners(top)
     ac = np.minimum(a, c) > np.maximum(b, d)
     bd = np.minimum(b, d) > np.maximum(a, c)
-    # The lower one stands towards -y, and towards +x where a and c are joined, towards -x where b and d are.
+    # The lower corner is moved towards -y, and towards +x where a and c are joined, -x where b and d are.
     lean = np.pad(ac.astype(np.float64) - bd, 1)
     apart, joined_ac, joined_bd = lean != 0.0, lean > 0.0, lean < 0.0
     away = BRIDGE * np.stack([lean * step_x, -np.abs(lean) * step_y], axis=-1)
     lower = np.arange(apart.size).reshape(apart.shape)
     upper = np.where(apart, apart.size + np.cumsum(apart.ravel()).reshape(apart.shape) - 1, lower)
     corners = np.concatenate([(corner + away).reshape(-1, 2), (corner - away)[apart]])
-    # Two corners a part has where four meet, by its place among them, in the order of its loop.
+    # The two corners of a part where four meet, by its position among them, in the order of its loop.
     corners_at = (
         (upper, np.where(joined_ac, lower, upper)),
         (np.where(joined_bd, lower, upper), upper),
         (lower, np.where(joined_ac, upper, lower)),
         (np.where(joined_bd, upper, lower), lower),
     )
-    loop = [take_corners(table)[place] for place, pair in enumerate(corners_at) for table in pair]
+    loop = [take_corners(table)[number] for number, pair in enumerate(corners_at) for table in pair]
     loops = np.stack(loop, axis=-1).reshape(rows * columns, 8)
     return corners, loops if step_x * step_y > 0.0 else loops[:, ::-1]
 

@@ -8,18 +8,18 @@ from ..base.arrays import Floats
 from ..model.fingertip import Fingertip, make_matrices
 from ..model.layout import Grid
 
-#: Steps a pitch at which a ray is looked at on its way over the bed.
+#: Steps per pitch at which the height of a ray over the bed is compared.
 STEPS = 4
-#: How far behind the middle of a view without perspective its rays begin, in its own unit.
+#: Distance behind the middle of an orthographic view at which its rays begin, in its own unit.
 BEHIND = 1e5
-#: Smaller components of a direction whose largest is 1 are none: a division by them may overflow.
+#: Smaller components of a direction whose largest is 1 count as 0: a division by them may overflow.
 PARALLEL = 1e-200
 
 
 def find_ray(lens: Floats, seen: Floats, screen: Floats) -> tuple[Floats, Floats]:
-    """Return origin and unit direction (3,) of the ray through a place of a picture, `screen` (2,), -1 to 1.
+    """Return origin and unit direction (3,) of the ray through a point of a picture, `screen` (2,), -1 to 1.
 
-    `lens` (4, 4), from the camera's space to the picture's; `seen` (4, 4), from the wanted space to the
+    `lens` (4, 4) maps the camera's space to the picture's; `seen` (4, 4) the space of the result to the
     camera's, which looks along -z. Blender's own function has single precision: it is off by up to a pixel.
     """
     across = np.array([lens[0, 0], lens[1, 1]])
@@ -33,7 +33,7 @@ def find_ray(lens: Floats, seen: Floats, screen: Floats) -> tuple[Floats, Floats
 
 
 def intersect_surface(grid: Grid, height: Floats, origin: Floats, direction: Floats) -> Floats | None:
-    """Return where a ray meets flat tops (n,) without gaps, (3,), m: on a top exactly, or on a pin's side."""
+    """Return where a ray meets flat tops (n,) without gaps, (3,), m: exactly on a top, or on a pin's side."""
     if not (np.isfinite(origin).all() and np.isfinite(direction).all() and direction.any()):
         return None
     direction = direction / np.abs(direction).max()
@@ -62,7 +62,7 @@ def intersect_surface(grid: Grid, height: Floats, origin: Floats, direction: Flo
 
 
 def _inside(origin: Floats, direction: Floats, low: Floats, high: Floats) -> tuple[float, float]:
-    """Return when a ray enters and leaves a box; it never does where the first is after the last."""
+    """Return when a ray enters and leaves a box; the first is after the last when it misses the box."""
     parallel = np.abs(direction) < PARALLEL
     if np.any(parallel & ((origin < low) | (origin > high))):
         return 1.0, 0.0
@@ -71,7 +71,7 @@ def _inside(origin: Floats, direction: Floats, low: Floats, high: Floats) -> tup
 
 
 def find_ground_height(grid: Grid, height: Floats, x: float, y: float, radius: float) -> float:
-    """Return the mean height of the pins within a radius of a place, m; without any, that of the nearest."""
+    """Return the mean height of the pins within a radius of a point, m; without any, that of the nearest."""
     cells = grid.disc(x, y, radius)
     if not cells.size:
         cells = grid.at(np.array([x]), np.array([y]))

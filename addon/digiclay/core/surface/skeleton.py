@@ -1,11 +1,12 @@
 """Skeleton of a feature: the pins that remain when it is thinned from its lowest pin upwards.
 
-A pin is removed, the lowest first, if that neither parts the rest nor opens a hole in it; the end of a line
-stays. The skeleton is one pin wide, runs along the top, and is joined and closed as the feature is. A hollow
-that a person sees as the inside of a ring counts as a hole, even where its bottom belongs to the feature.
+A pin is removed, the lowest first, if that neither divides the rest nor opens a hole in it; the end of a
+line stays. The skeleton is one pin wide, runs along the top, and is connected and closed as the feature is.
+A hollow that looks like the inside of a ring counts as a hole, even where its bottom belongs to the
+feature.
 
-Everywhere `beside` int (k, 8 or 6) is the neighbors of a feature's pins, numbered from 0, -1 where there is
-none; `on_bed` bool (k, 8 or 6) is where the bed continues; `off` (k,) are heights over the ground, m.
+In all functions `beside` int (k, 8 or 6) has the neighbors of a feature's pins, numbered from 0, -1 for none;
+`on_bed` bool (k, 8 or 6) tells where the bed continues; `off` (k,) are heights over the ground, m.
 """
 
 import heapq
@@ -18,9 +19,9 @@ from ..model.layout import SQUARE
 
 #: A hollow is a hole when it is deeper than this share of the lowest way out of it.
 DEEP = 0.25
-#: The end of a line stays when it is higher than this share of the pin it hangs on.
+#: The end of a line stays when it is higher than this share of its neighbor.
 END = 0.5
-#: A pin is ahead when it is this much further that way than the neighbors are.
+#: A pin is ahead when it is this many times as far in that direction as the neighbors are.
 AHEAD = 1.25
 
 
@@ -29,15 +30,15 @@ def measure_half_width(beside: Indices, on_bed: Flags) -> int:
     inner, count = np.ones(len(beside), bool), 0
     while inner.any():
         # Where the bed ends the feature might go on.
-        kept = inner & np.all(np.where(beside >= 0, inner[beside], ~on_bed), axis=1)
-        if np.array_equal(kept, inner):  # it covers the whole bed
+        rest = inner & np.all(np.where(beside >= 0, inner[beside], ~on_bed), axis=1)
+        if np.array_equal(rest, inner):  # it covers the whole bed
             break
-        inner, count = kept, count + 1
+        inner, count = rest, count + 1
     return max(1, count)
 
 
 def average_neighbors(beside: Indices, on_bed: Flags, off: Floats, times: int) -> Floats:
-    """Return heights averaged with those of the neighbors, the ground's included, some times."""
+    """Return heights averaged `times` times with those of the neighbors; the ground around has height 0."""
     count = on_bed.sum(axis=1)
     for _ in range(times):
         heights = np.where(beside >= 0, off[beside], 0.0)
@@ -55,12 +56,12 @@ def find_skeleton(beside: Indices, on_bed: Flags, off: Floats) -> Indices:
 
 
 def _hollows(beside: Indices, on_bed: Flags, off: Floats) -> list[int]:
-    """Return the lowest pin of each hollow that is deep enough, by filling them up."""
+    """Return the lowest pin of each hollow that is deep enough, by flooding them."""
     inside = np.all((beside >= 0) | ~on_bed, axis=1)
     lower = np.any((beside >= 0) & (off[beside] < off[:, None]), axis=1)
     if not np.any(inside & ~lower):
         return []
-    # Which hollow a pin drains into; the last one is the ground outside, which is lower than all.
+    # The hollow that each pin drains into; the last one is the ground outside, the lowest of all.
     count = len(off)
     hollow = list(range(count + 1))
     lowest = [*off.tolist(), -np.inf]
@@ -79,22 +80,22 @@ def _hollows(beside: Indices, on_bed: Flags, off: Floats) -> list[int]:
         for other in neighbors[pin]:
             if other < 0 or (other < count and not flooded[other]):
                 continue
-            one, two = root(pin), root(other)
-            if one == two:
+            shallow, deep = root(pin), root(other)
+            if shallow == deep:
                 continue
-            if lowest[one] < lowest[two]:
-                one, two = two, one
-            # The shallower of two hollows ends here, at the lowest way out of it.
-            if height[pin] - lowest[one] > DEEP * height[pin]:
-                holes.append(bottom[one])
-            hollow[one] = two
+            if lowest[shallow] < lowest[deep]:
+                shallow, deep = deep, shallow
+            # The shallower of the two hollows ends here, at its lowest outlet.
+            if height[pin] - lowest[shallow] > DEEP * height[pin]:
+                holes.append(bottom[shallow])
+            hollow[shallow] = deep
     return holes
 
 
 def _thinned(beside: Indices, top: Floats, holes: list[int]) -> Indices:
-    """Take pins off, the lowest first."""
-    count, ways = beside.shape
-    simple, ends = (_SIMPLE[ways], _ENDS[ways])
+    """Return the pins that remain when all that can go are removed, the lowest first."""
+    count, directions = beside.shape
+    simple, ends = (_SIMPLE[directions], _ENDS[directions])
     neighbors, height = beside.tolist(), top.tolist()
     left = [True] * count + [False]  # the last one stands for no pin, number -1
     for pin in holes:
@@ -123,7 +124,7 @@ def _thinned(beside: Indices, top: Floats, holes: list[int]) -> Indices:
 
 
 def _continues(neighbors: list[list[int]], left: list[bool], around: list[int], code: int) -> bool:
-    """Return whether a line two pins wide continues from a pin with two neighbors: all beyond lies ahead."""
+    """Return whether a pin with two neighbors ends a line two pins wide: all pins beyond lie ahead."""
     steps = _STEPS[len(around)]
     two = [bit for bit in range(len(around)) if code >> bit & 1]
     ahead = 0.5 * (steps[two[0]] + steps[two[1]])
@@ -138,19 +139,19 @@ def _continues(neighbors: list[list[int]], left: list[bool], around: list[int], 
     return True
 
 
-def _is_simple(code: int, ways: int) -> bool:
-    """Return whether what is left stays joined as it is without a pin whose neighbors have these bits."""
-    there = [bool(code >> bit & 1) for bit in range(ways)]
-    if ways == 6:
-        return sum(there[k] and not there[k - 1] for k in range(ways)) == 1
-    # Squares: what is left is joined across corners, what is gone is not.
-    gone = [not one for one in there]
+def _is_simple(code: int, directions: int) -> bool:
+    """Return whether removing a pin leaves its neighbors, those of the bits, connected as they are."""
+    there = [bool(code >> bit & 1) for bit in range(directions)]
+    if directions == 6:
+        return sum(there[k] and not there[k - 1] for k in range(directions)) == 1
+    # Squares: remaining pins are joined across corners, removed ones are not.
+    gone = [not left for left in there]
     crossings = (gone[k] and not (gone[k + 1] and gone[(k + 2) % 8]) for k in range(0, 8, 2))
     return sum(crossings) == 1
 
 
 _SIMPLE = {ways: [_is_simple(code, ways) for code in range(1 << ways)] for ways in (6, 8)}
-#: How many neighbors the end of a line has with these bits, one or two side by side; 0 where it is no end.
+#: Neighbors of a line's end by these bits: one, or two side by side; 0 where it is no end.
 _ENDS = {
     ways: [code.bit_count() if simple and code.bit_count() < 3 else 0 for code, simple in enumerate(table)]
     for ways, table in _SIMPLE.items()

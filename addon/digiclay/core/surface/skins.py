@@ -1,14 +1,14 @@
 """Skins over the pin tops: interpolation between them.
 
 A skin divides every pitch into the same number of parts, along the rows and across them; between two rows
-that are shifted against each other the points shift along. Every pin top is one of its points. There
+that are shifted against each other its points shift gradually. Every pin top is one of its points.
 
 *bilinear* is straight between pins: the bilinear patch over four pins of an aligned bed, the triangle
-over three of a staggered or hexagonal one;
-*smooth* is a monotone cubic spline along each row, and then across the rows: through every pin, and nowhere
-above or below the pins it stands between;
+over three of a staggered or hexagonal one.
+*smooth* is a monotone cubic spline along each row, then across the rows: through every pin, and nowhere
+above or below the pins around it.
 *membrane* is stretched over the flat ends of the pins: level over the ends and straight between them, along
-each row and then across the rows.
+each row, then across the rows.
 """
 
 from collections.abc import Callable
@@ -23,7 +23,7 @@ from ..base.arrays import Faces, Floats
 from ..base.spline import interpolate_monotone
 from .formed import NO_PIN, Formed, make_skin
 
-#: Flat part of a pin's end, of a pitch, at most: a skin needs room to come down between two pins.
+#: Largest radius of a pin's flat end, in pitches: a skin needs room to descend between two pins.
 WIDEST = 0.45
 #: Skins by name, with their lines in the help.
 SKINS: dict[str, str] = {
@@ -34,7 +34,7 @@ SKINS: dict[str, str] = {
 
 
 def place_points(formed: Formed, parts: int) -> Floats:
-    """Return the points of a skin, m, shape (rows, columns, 2), with `parts` points a pitch."""
+    """Return the points of a skin, m, shape (rows, columns, 2), with `parts` points per pitch."""
     across = _linear(formed.position.reshape(formed.rows, formed.columns, 2), parts)
     return np.swapaxes(_linear(np.swapaxes(across, 0, 1), parts), 0, 1)
 
@@ -58,15 +58,13 @@ def interpolate_level(knot: Floats, value: Floats, at: Floats, cap: float) -> Fl
     low = np.clip(knot.searchsorted(at, side="right") - 1, 0, len(knot) - 2)
     step = knot[low + 1] - knot[low]
     share = flatten_share((at - knot[low]) / step, cap / step)[:, None]
-    made: Floats = value[low] + share * (value[low + 1] - value[low])
-    return made
+    return np.asarray(value[low] + share * (value[low + 1] - value[low]))
 
 
-def flatten_share(share: Floats, cap: Any) -> Floats:
-    """Return shares of a rise between two pins, level over ends of a radius `cap`, at shares of the way."""
+def flatten_share(share: Floats, cap: Floats | float) -> Floats:
+    """Return shares of the rise between pins with flat ends of radius `cap`, at shares of the distance."""
     cap = np.minimum(cap, WIDEST)
-    risen: Floats = np.clip((share - cap) / (1.0 - 2.0 * cap), 0.0, 1.0)
-    return risen
+    return np.asarray(np.clip((share - cap) / (1.0 - 2.0 * cap), 0.0, 1.0))
 
 
 def _linear(values: Floats, parts: int) -> Floats:
@@ -112,27 +110,31 @@ def _join_rows(
     lines = np.arange(len(point))
     period = 2 * parts if formed.shift else 1
     for phase in range(period):
-        # All these lines have their points at the same x: one pass of splines serves them all.
-        some = lines[phase::period]
-        if not some.size:
+        # These lines have their points at the same x: one pass of splines serves them all.
+        same_x = lines[phase::period]
+        if not same_x.size:
             break
         at_rows = np.empty((formed.rows, point.shape[1]))
         for start in range(2 if formed.shift else 1):
             step = slice(start, None, 2 if formed.shift else 1)
-            at_rows[step] = interpolate(first[start, :, 0], pins[step].T, point[some[0], :, 0]).T
-        fine[some] = interpolate(first[:, 0, 1], at_rows, point[some, 0, 1])
+            at_rows[step] = interpolate(first[start, :, 0], pins[step].T, point[same_x[0], :, 0]).T
+        fine[same_x] = interpolate(first[:, 0, 1], at_rows, point[same_x, 0, 1])
     return _bound(formed, pins, point[..., 0], fine, parts) if formed.shift else fine
 
 
 def _bound(formed: Formed, pins: Floats, x: Floats, fine: Floats, parts: int) -> Floats:
-    """Return a skin kept between the pins beyond the end of a shifted row, which is continued straight."""
+    """Return a skin bounded by the heights of the pins beyond the end of a shifted row."""
     row = np.minimum(np.arange(len(fine)) // parts, formed.rows - 2)
     along = formed.position.reshape(formed.rows, formed.columns, 2)[..., 0]
-    way = np.sign(along[0, 1] - along[0, 0])
+    direction = np.sign(along[0, 1] - along[0, 0])
     for end, inner in ((0, 1), (-1, -2)):
-        # The nearer end of the two rows a line is between, and the four pins of the last cell.
-        ends = np.stack([along[row, end], along[row + 1, end]]) * way
-        beyond = x * way < ends.max(axis=0)[:, None] if end == 0 else x * way > ends.min(axis=0)[:, None]
+        # The ends of the two rows beside a line, and the four pins of the last cell.
+        ends = np.stack([along[row, end], along[row + 1, end]]) * direction
+        beyond = (
+            x * direction < ends.max(axis=0)[:, None]
+            if end == 0
+            else x * direction > ends.min(axis=0)[:, None]
+        )
         cell = np.stack([pins[row, end], pins[row, inner], pins[row + 1, end], pins[row + 1, inner]])
         bounded = np.clip(fine, cell.min(axis=0)[:, None], cell.max(axis=0)[:, None])
         fine = np.where(beyond, bounded, fine)
@@ -141,7 +143,7 @@ def _bound(formed: Formed, pins: Floats, x: Floats, fine: Floats, parts: int) ->
 
 @dataclass(frozen=True, eq=False)
 class SurfaceGrid:
-    """Rows and columns of points of a skin, `parts` a pitch: in plan (m, 2), now and before (m,), m."""
+    """Rows and columns of points of a skin, `parts` per pitch: in plan (m, 2), now and before (m,), m."""
 
     formed: Formed
     parts: int
@@ -158,12 +160,12 @@ class SurfaceGrid:
 
     @property
     def raised(self) -> Floats:
-        """How far each point is above where it was before, m."""
+        """Height of each point above its former height, m."""
         return self.height - self.former
 
     @property
     def pins(self) -> Faces:
-        """Which point each pin top is, shape (n,)."""
+        """The point at each pin top, (n,)."""
         index = np.arange(self.rows * self.columns, dtype=np.int32).reshape(self.rows, self.columns)
         return index[:: self.parts, :: self.parts].ravel()
 
@@ -182,18 +184,16 @@ class SurfaceGrid:
         return {"height": self.height, "force": force, "mode": mode}
 
     def values_with_base(self, level: float) -> dict[str, Floats]:
-        """Return the same, and after it that of as many points of a base: no force, and no pin's mode."""
+        """Return the same, followed by as many points of a base: without force, in the mode of no pin."""
         base = {"height": level, "force": 0.0, "mode": float(NO_PIN)}
-        return {
-            name: np.append(value, np.full(value.size, base[name])) for name, value in self.values().items()
-        }
+        values = self.values()
+        return {name: np.append(values[name], np.full_like(values[name], base[name])) for name in base}
 
 
 def fit_skin(formed: Formed, skin_name: str, parts: int, cap: float) -> SurfaceGrid:
-    """Return a skin of `SKINS` with `parts` points a pitch; `cap`: radius of a pin's flat end, m."""
+    """Return a skin of `SKINS` with `parts` points per pitch; `cap`: radius of a pin's flat end, m."""
     position = place_points(formed, parts)
     rows, columns = position.shape[:2]
-    now, before = (
-        interpolate_skin(formed, pins, skin_name, parts, cap) for pins in (formed.height, formed.former)
-    )
+    now = interpolate_skin(formed, formed.height, skin_name, parts, cap)
+    before = interpolate_skin(formed, formed.former, skin_name, parts, cap)
     return SurfaceGrid(formed, parts, position.reshape(-1, 2), now, before, rows, columns)
