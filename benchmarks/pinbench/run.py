@@ -8,7 +8,6 @@ import warnings
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from importlib.metadata import version
-from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -20,9 +19,7 @@ from ..report import Curves, Report, Steps, tabulate
 from .problem import Problem, read_problems
 
 ADAPTERS = Path(__file__).parent / "adapters"
-NAMES = ("own", "numpy_runge_kutta", "python_loop", "scipy_solvers", "mujoco_force", "mujoco_contact")
-#: Engine whose adapter is left out where its package is absent.
-OPTIONAL = {"mujoco_force": "mujoco", "mujoco_contact": "mujoco"}
+NAMES = ("own", "numpy_runge_kutta", "scipy_solvers", "mujoco_force")
 #: Problems and settings of a method with --quick.
 QUICK, FEW = ("damped_pins", "relaxation_alone"), 2
 #: Runs, of which the median counts; processor time from which on one is enough, and from which on the finer
@@ -47,8 +44,6 @@ class Answer:
     height_error: float
     force_error: float
     seconds: float
-    apart: bool
-    """Whether its contact model is another one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,33 +53,28 @@ class Adapter:
     name: str
     methods: dict[str, tuple[float, ...]]
     prepare: Callable[..., Any]
-    apart: frozenset[str]
 
 
 def load_adapter(path: Path) -> Adapter:
     """Return the adapter in a file; DigiclayError where it is none."""
-    spec = importlib.util.spec_from_file_location(f"pinbench_{path.stem}", path)
+    spec = importlib.util.spec_from_file_location(f"{__package__}.adapters.{path.stem}", path)
     try:
-        if path.parent == ADAPTERS:
-            module = importlib.import_module(f".adapters.{path.stem}", __package__)
-        elif spec is None or spec.loader is None:
+        if spec is None or spec.loader is None:
             raise ImportError("it must end with .py")
-        else:
-            module = importlib.util.module_from_spec(spec)
-            spec.loader.exec_module(module)
+        module = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(module)
         methods = {str(name): tuple(map(float, given)) for name, given in module.METHODS.items()}
         if not all(methods.values()) or not callable(module.prepare):
             raise ValueError("METHODS must have settings for each method, and prepare must be a function")
-        return Adapter(path.stem, methods, module.prepare, frozenset(getattr(module, "APART", ())))
+        return Adapter(path.stem, methods, module.prepare)
     except Exception as error:
         raise DigiclayError(f"peers: {path} is no adapter: {_describe(error)}") from None
 
 
 def list_adapters(others: Sequence[str] = ()) -> list[Adapter]:
-    """Return all adapters, then those of other files."""
-    paths = [ADAPTERS / f"{name}.py" for name in NAMES]
-    present = [p for p in paths if p.stem not in OPTIONAL or importlib.util.find_spec(OPTIONAL[p.stem])]
-    return [load_adapter(path) for path in (*present, *map(Path, others))]
+    """Return all adapters, that of MuJoCo where it is installed, then those of other files."""
+    names = [name for name in NAMES if name != "mujoco_force" or importlib.util.find_spec("mujoco")]
+    return [load_adapter(path) for path in (*(ADAPTERS / f"{name}.py" for name in names), *map(Path, others))]
 
 
 def solve(adapter: Adapter, problem: Problem, method: str, setting: float) -> Answer | None:
@@ -108,8 +98,7 @@ def solve(adapter: Adapter, problem: Problem, method: str, setting: float) -> An
         raise DigiclayError(f"peers: {where}: {_describe(error)}") from None
     errors = problem.compare(answer[:, 0], answer[:, 1])
     period = statistics.median(seconds) / problem.count
-    apart = method in adapter.apart
-    return Answer(problem.name, adapter.name, method, f"{setting:g}", *errors, period, apart)
+    return Answer(problem.name, adapter.name, method, f"{setting:g}", *errors, period)
 
 
 def _describe(error: Exception) -> str:
@@ -126,7 +115,7 @@ def measure(arguments: argparse.Namespace, steps: Steps) -> Report:
 
         for problem in steps.through(list(problems.values()), lambda problem: problem.name):
             reference.write(problem)
-        return Report(list_problems(read_problems()))
+        return Report(["The references are written."])
     adapters = list_adapters(arguments.files)
     if arguments.quick:
         problems = {name: problems[name] for name in QUICK}
@@ -141,8 +130,7 @@ def measure(arguments: argparse.Namespace, steps: Steps) -> Report:
                 steps(f"{problem.name}: {method}")
     rows = [asdict(answer) for answer in answers]
     mujoco = [f"mujoco-core {version('mujoco-core')}"] if importlib.util.find_spec("mujoco") else []
-    lines = [*mujoco, *list_problems(problems), *list_answers(answers)]
-    return Report(lines, rows, draw_curves(answers))
+    return Report([*mujoco, *list_answers(answers)], rows, draw_curves(answers))
 
 
 def run_method(
@@ -161,59 +149,33 @@ def draw_curves(answers: Sequence[Answer]) -> Curves:
     """Return the work-precision plot; of forces where no pin moves."""
     panels: dict[str, dict[str, list[tuple[float, float]]]] = {}
     for answer in answers:
-        label = f"{answer.method} (other contact)" if answer.apart else answer.method
-        points = panels.setdefault(answer.problem, {}).setdefault(label, [])
+        points = panels.setdefault(answer.problem, {}).setdefault(answer.method, [])
         if 0.0 < answer.force_error < 1e3:
             points.append((answer.seconds * 1e6, answer.force_error * 1e6))
     return Curves(panels, "CPU time a period, µs", "largest force error, µN")
 
 
-def list_problems(problems: dict[str, Problem]) -> Iterator[str]:
-    """Give the table of problems."""
-    yield "\nThe problems; the last columns are how far another solver of SciPy is from the reference.\n"
-    head = ("problem", "pins", "judged", "periods", "height, pm", "force, nN")
-    rows = []
-    for problem in problems.values():
-        apart = problem.file["reference"]["apart"]
-        sizes = f"{problem.places[0].size}", f"{problem.pins.size}", f"{problem.count}"
-        rows.append([problem.name, *sizes, f"{apart['height'] * 1e12:.2g}", f"{apart['force'] * 1e9:.2g}"])
-    yield from table(head, rows)
-
-
 def list_answers(answers: Sequence[Answer]) -> Iterator[str]:
-    """Give the tables of answers, those of another contact model apart, and of the fastest."""
-    same, other = ([a for a in answers if a.apart == apart] for apart in (False, True))
+    """Give the tables of answers and of the fastest."""
     yield "\nAnswers: largest errors of judged pins; processor time of a run, without set-up, over periods.\n"
-    yield from tabulate(map(asdict, same), RUNS, left=3)
-    if other:
-        yield "\nForms with another contact model: not comparable with those above.\n"
-        yield from tabulate(map(asdict, other), RUNS, left=3)
-    won: set[tuple[str, str]] = set()
+    yield from tabulate(map(asdict, answers), RUNS, left=3)
     for quantity, unit, factor in (("height_error", "µm", 1e6), ("force_error", "µN", 1e6)):
         yield f"\nThe fastest method at an error of {quantity.partition('_')[0]} of at most, µs a period;"
         yield "(x) is the time of digiclay's fastest over that of the fastest other engine.\n"
-        rows = {answer.problem: [answer.problem] for answer in same}
-        for (name, row), level in product(rows.items(), LEVELS[quantity]):
-            fit = [a for a in same if a.problem == name and getattr(a, quantity) <= level]
-            won |= {(name, best.engine) for best in fastest(fit)}
-            row.append(compare(fit))
-        yield from table(
-            ("problem", *(f"{level * factor:g} {unit}" for level in LEVELS[quantity])), [*rows.values()]
-        )
-    lost = "; ".join(f"{engine} on {name}" for name, engine in sorted(won) if engine != "own")
-    yield f"\nAnother engine wins at one of these errors at least: {lost or 'none'}."
-
-
-def fastest(answers: Sequence[Answer]) -> list[Answer]:
-    """Return the fastest of some answers, alone; none of none."""
-    return sorted(answers, key=lambda answer: answer.seconds)[:1]
+        head = ["problem", *(f"{level * factor:g} {unit}" for level in LEVELS[quantity])]
+        rows = [
+            [name, *(compare([a for a in answers if a.problem == name and getattr(a, quantity) <= level])
+                     for level in LEVELS[quantity])]
+            for name in dict.fromkeys(answer.problem for answer in answers)
+        ]  # fmt: skip
+        yield from table(head, rows)
 
 
 def compare(fit: Sequence[Answer]) -> str:
     """Return the fastest method of answers within an error, and digiclay's time over that of the others."""
     if not fit:
         return "-"
-    (best,) = fastest(fit)
-    own, others = (fastest([a for a in fit if (a.engine == "own") is ours]) for ours in (True, False))
-    ratio = f" ({own[0].seconds / others[0].seconds:.2f})" if own and others else ""
+    best = min(fit, key=lambda answer: answer.seconds)
+    ours, others = ([a.seconds for a in fit if (a.engine == "own") is own] for own in (True, False))
+    ratio = f" ({min(ours) / min(others):.2f})" if ours and others else ""
     return f"{best.method} {best.seconds * 1e6:.0f}{ratio}"

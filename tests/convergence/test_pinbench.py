@@ -20,13 +20,10 @@ ANSWERS = {
     "digiclay euler": (2.5e-3, 15e-6, 5e-3),
     "digiclay adaptive": (1e-6, 20e-12, 5e-6),
     "Runge-Kutta 4, numpy": (2.5e-3, 20e-9, 20e-6),
-    "Runge-Kutta 4, Python loop": (2.5e-3, 20e-9, 20e-6),
     "SciPy LSODA": (1e-5, 5e-6, 30e-6),
     "SciPy RK45": (1e-5, 0.1e-6, 30e-6),
     "SciPy RK23": (1e-5, 0.2e-6, 200e-6),
     "MuJoCo, applied force": (1e-3, 7e-6, 12e-3),
-    "MuJoCo, moving joint limits": (1e-3, 7e-6, None),
-    "MuJoCo, contacts of spheres": (1e-3, 0.5e-3, None),
 }
 
 
@@ -42,13 +39,10 @@ def test_an_adapter_answers_the_small_problems_within_its_tolerance(method: str)
     adapter = find_adapter(method)
     damped, relaxed = (run.solve(adapter, PROBLEMS[name], method, setting) for name in run.QUICK)
     assert damped is not None
+    assert relaxed is not None
     assert 0.0 < damped.height_error < height
+    assert 0.0 < relaxed.force_error < force
     assert damped.seconds > 0.0
-    if force is None:
-        assert relaxed is None
-    else:
-        assert relaxed is not None
-        assert 0.0 < relaxed.force_error < force
 
 
 def test_every_method_has_a_row_and_every_adapter_at_most_60_lines_of_code() -> None:
@@ -131,7 +125,6 @@ def test_a_broken_adapter_is_one_line_and_exit_code_2(word, tmp_path, monkeypatc
 def test_a_strangers_adapter_is_a_file_on_the_command_line(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(run, "NAMES", ("own",))
     text = (run.ADAPTERS / "numpy_runge_kutta.py").read_text(encoding="utf-8")
-    text = text.replace("from ..problem", "from benchmarks.pinbench.problem")
     (tmp_path / "mine.py").write_text(text, encoding="utf-8")
     out = ["--out", str(tmp_path / "results")]
     assert main(["peers", "--quick", "--quiet", str(tmp_path / "mine.py"), *out]) == 0
@@ -142,17 +135,14 @@ def test_a_strangers_adapter_is_a_file_on_the_command_line(tmp_path, monkeypatch
     assert ',mine,"Runge-Kutta 4, numpy",' in (tmp_path / "results" / "peers.csv").read_text(encoding="utf-8")
 
 
-def test_the_page_says_where_another_engine_wins_and_keeps_other_contact_models_apart() -> None:
-    def make(engine: str, seconds: float, *, apart: bool = False) -> run.Answer:
-        return run.Answer("p", engine, engine, "0.001", 1e-8, 1e-6, seconds, apart)
-
-    answers = [make("own", 2.0), make("fast", 1.0), make("other", 0.5, apart=True)]
-    page = list(run.list_answers(answers))
-    assert page[-1].endswith("fast on p.")
-    split = next(i for i, line in enumerate(page) if "another contact model" in line)
-    assert not any("other " in line for line in page[:split])
-    assert run.compare(answers[:2]) == "fast 1000000 (2.00)"
-    assert list(run.list_answers(answers[:1]))[-1].endswith("none.")
+def test_the_fastest_is_compared_with_digiclay() -> None:
+    fast, own = (
+        run.Answer("p", engine, engine, "0.001", 1e-8, 1e-6, seconds)
+        for engine, seconds in (("fast", 1.0), ("own", 2.0))
+    )
+    assert [run.compare(fit) for fit in ([own, fast], [own], [])] == [
+        "fast 1000000 (2.00)", "own 2000000", "-",
+    ]  # fmt: skip
 
 
 def test_an_engine_that_diverges_has_infinite_errors_and_is_never_the_fastest() -> None:
