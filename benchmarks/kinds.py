@@ -19,8 +19,6 @@ from .report import Report, Steps
 
 #: The paper's session.
 PAPER = "ridge_mound_valley"
-#: Recorded strokes of the made things.
-STROKES = Path(__file__).parent / "strokes"
 #: Packages that benchmarks need, and the extra that has them.
 EXTRAS = {"scipy": "suite", "websockets": "serve"}
 EXAMPLES = """\
@@ -102,16 +100,6 @@ BENCHMARKS = {
     "stack": Benchmark(
         "runs_together.measure", "sessions a second, one at a time and many in one call",
         scene=PAPER,
-    ),
-    "made": Benchmark(
-        "made.measure", "things formed by recorded strokes, beside the intended relief (needs bpy)",
-        ("", "letter_a --bed paper", "leaf face --pictures made"),
-        {
-            "things THING": {"nargs": "*", "help": ", ".join(sorted(p.stem for p in STROKES.glob("*.toml")))},
-            "--bed BED": "a size of beds; default: that of the strokes' file",
-            "--pictures FOLDER": (Path, "also draw them, formed and intended"),
-        },
-        needs="bpy",
     ),
     "serve": Benchmark(
         "processes.measure_serve", "deadlines of digiclay serve, and poses to pins, with a client",

@@ -6,9 +6,9 @@ from digiclay.core.model.layout import Layout, make_grid
 from digiclay.recorded.pointer_strokes import read_strokes
 from digiclay.settings.devices import BEDS
 
-from benchmarks.intended import find_relief
 from tests.window.blender_window import FORMED, Seen, down
 from tests.window.hand_strokes import DRAWN, HALF, STROKES, TAPS, THINGS
+from tests.window.intended import find_relief
 
 PLAYED = {"script": "hand_strokes.py", "size": (800, 560), "by_hand": True}
 #: The columns of the bed that lie on the strokes, 3 mm a pin, and their row.
