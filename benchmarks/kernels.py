@@ -79,7 +79,7 @@ def measure(arguments: argparse.Namespace, steps: Steps) -> Report:
     """Compare the runs of each kernel with those of the first."""
     step, names, rows = QUICK if arguments.quick else 1, list(list_scenes()), list[Row]()
     kernels = {name: (sys.executable, change) for name, change in KERNELS.items()}
-    kernels |= {python: (python, {}) for python in arguments.python}
+    kernels |= {_find_numpy(python): (python, {}) for python in arguments.python}
     with tempfile.TemporaryDirectory() as scratch:
         folders = {name: Path(scratch) / str(number) for number, name in enumerate(kernels)}
         for name in steps.through(list(kernels)):
@@ -104,6 +104,17 @@ def measure(arguments: argparse.Namespace, steps: Steps) -> Report:
     }  # fmt: skip
     title = f"\nlargest differences from {REFERENCE}; modes: of so many pins at once\n"
     return Report([title, *tabulate(shown, columns)], rows)
+
+
+def _find_numpy(python: str) -> str:
+    """Return the name and version of the numpy of a Python."""
+    script = "import numpy; print('numpy', numpy.__version__)"
+    found = subprocess.run(
+        [python, "-c", script], capture_output=True, text=True, timeout=LONGEST, check=False
+    )
+    if found.returncode:
+        raise DigiclayError(f"kernels: {python} has no numpy that can be imported.")
+    return found.stdout.strip()
 
 
 def _run(name: str, python: str, change: dict[str, str], folder: Path, step: int) -> None:
