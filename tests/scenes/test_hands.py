@@ -186,8 +186,8 @@ def test_nobody_knows_who_presses_a_pin_just_below_two_predicted_fingertips(
     one, own = np.full(1, REST), np.zeros((hands.rows, 1))
     basis, mode = np.ones((6, 1)), np.zeros(1, np.int8)
     pin = Measurement(basis, one, np.full(1, 5e-3), one, mode, own, np.zeros(1, np.intp))
-    shares, sure = hands._share(
-        np.full((2, 1), REST + below), np.zeros(1, np.intp), pin, np.zeros(1, np.intp)
+    shares, sure = hands.division.divide_force(
+        np.zeros(1, np.intp), np.full((2, 1), REST + below), pin, np.zeros(1, np.intp)
     )
     assert sure.tolist() == [known]
     assert shares.ravel().tolist() == [1.0, 0.0]

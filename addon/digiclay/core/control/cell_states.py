@@ -105,6 +105,16 @@ class Patch(NamedTuple):
         """Where the fingertip is, m; None: none is felt."""
         return (self.x, self.y) if self.felt else None
 
+    @property
+    def top(self) -> float:
+        """Height of the blister's top, m: as far as is known that of the surface around it."""
+        return self.edge
+
+    @property
+    def ground(self) -> float:
+        """Height of the surface around the blister, m."""
+        return self.edge
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class CellStates(Tracking):
@@ -180,7 +190,13 @@ class CellStatesControl:
 
     #: A cell remembers how many periods it has been critical, and of several fingers whose it is.
     rows = 1
-    whose = 0
+    #: See `following.FollowingControl`.
+    division, pin_rows = "CellDivision", ()
+
+    @property
+    def blister_radius(self) -> float:
+        """How far from the fingertip pins may be in its blister, m: it begins at the pressed cells."""
+        return self.blister.radius + self.parameters.jump
 
     def begin(self) -> Patch:
         """Return the memory before a session."""

@@ -137,42 +137,43 @@ WHOLE, SHARED = Whole(), Shared()
 
 
 class Columns:
-    """The active cells in columns, one a finger: those in its disc, and its share of those in none."""
+    """Active cells in columns, one a finger: those in its disc, and its part of those in no disc.
+
+    Entries (k,) are the cells of all columns, those of the first finger first.
+    """
 
     def __init__(self, basis: Floats, discs: tuple[Floats, Floats, Floats]) -> None:
-        x, y, radius = (part[:, None] for part in discs)
-        inside = (basis[1] - x) ** 2 + (basis[2] - y) ** 2 <= radius * np.abs(radius) * (
-            1.0 + RELATIVE_TOLERANCE
-        )
-        (left,) = (~np.logical_or.reduce(inside)).nonzero()
+        x, y, radius = (values[:, None] for values in discs)
+        limit = radius * np.abs(radius) * (1.0 + RELATIVE_TOLERANCE)
+        inside = (basis[1] - x) ** 2 + (basis[2] - y) ** 2 <= limit
+        (left,) = (~inside.any(axis=0)).nonzero()
         inside[np.arange(left.size) * len(inside) // max(left.size, 1), left] = True
-        self.inside = inside
-        self.finger, self.flat = inside.nonzero()
-        # Cells (g,) in several columns; of their (p,) entries: fingers, which of these cells, and numbers in
-        # `flat`; which entries are each cell's, (c, g); cells of the entries, and places, (2, p), m.
-        self.double, self.named, self.which, self.pairs, self._entries = find_copies(inside)
-        self.several = self.double[self.which]
-        self.places = basis[1:3, self.several]
-        # Of each cell the one command, or one of those for it.
-        self.obeyed = np.empty(basis.shape[1], np.intp)
-        self.obeyed[self.flat] = np.arange(self.flat.size)
-        self._basis = basis
+        self.inside, self._basis = inside, basis
+        #: Finger and cell of each entry.
+        self.finger, self.cell = inside.nonzero()
+        #: Cells in several columns, and their entries; cells of these, and where they are, (2, p), m.
+        self.copies = find_copies(inside)
+        self.cells = self.copies.cells[self.copies.which]
+        self.places = basis[1:3, self.cells]
+        #: The entry of each cell, (m,); of one in several columns any.
+        self.only = np.empty(basis.shape[1], np.intp)
+        self.only[self.cell] = np.arange(self.cell.size)
 
     def pick(self, rank: Floats) -> Cells:
-        """Return which of `flat` has the highest rank, (p,), of each cell in several columns, (g,)."""
-        first = find_first_largest(rank.take(self._entries))
-        best = self._entries[first, np.arange(self.double.size)]
-        picked: Cells = self.pairs[best]
+        """Return the entry of the highest rank, (p,), of each cell in several columns, (g,)."""
+        entries = self.copies.entries
+        first = find_first_largest(rank[entries])
+        picked: Cells = self.copies.number[entries[first, np.arange(first.size)]]
         return picked
 
     @cached_property
     def padded(self) -> tuple[Cells, Flags, Floats, Cells]:
-        """The columns side by side, (w, f): cells; which are none; basis, (6, w, f); where all are."""
-        sizes = np.count_nonzero(self.inside, axis=1)
+        """The columns side by side, (w, f): cells; which are none; basis, (6, w, f); where entries are."""
+        sizes = self.inside.sum(axis=1)
         absent = np.arange(sizes.max())[:, None] >= sizes
         cells = np.zeros(absent.shape, np.intp)
-        cells.T[~absent.T] = self.flat
+        cells.T[~absent.T] = self.cell
         basis = self._basis[:, cells]
         basis[:, absent] = OUTSIDE
-        finger, place = (~absent.T).nonzero()
-        return cells, absent, basis, place * len(sizes) + finger
+        finger, row = (~absent.T).nonzero()
+        return cells, absent, basis, row * len(sizes) + finger

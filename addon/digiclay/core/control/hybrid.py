@@ -184,6 +184,14 @@ class HybridControl:
         """State rows a cell needs."""
         return self.pulp.filters + OWN_ROWS + self.servo.rows
 
+    #: See `following.FollowingControl`.
+    division = "PredictedDivision"
+
+    @property
+    def blister_radius(self) -> float:
+        """How far from the fingertip pins may be in its blister, m."""
+        return self.blister.radius
+
     @property
     def pin_rows(self) -> tuple[int, ...]:
         """Rows of the command a cell follows, whoever gave it: how far it is led, and its speeds."""

@@ -96,6 +96,11 @@ class Follower(NamedTuple):
         return Follower(phase, period, estimate, top, edge, heading, trim, felt, 0, *self[9:])
 
     @property
+    def ground(self) -> float:
+        """Height of the surface around the blister, m."""
+        return self.edge
+
+    @property
     def place(self) -> tuple[float, float] | None:
         """Where the fingertip is, m; None: none is followed."""
         if self.phase is IDLE or self.master.phase is not IDLE:

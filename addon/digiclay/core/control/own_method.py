@@ -246,12 +246,6 @@ class Guarded:
     """Control period, s; state rows a cell needs."""
     pace: Pace = field(default_factory=Pace)
 
-    def __getattr__(self, name: str) -> Any:
-        """Return what a controller for each of several fingers has besides, see `hands`."""
-        if name.startswith("_"):
-            raise AttributeError(name)
-        return getattr(self.inner, name)
-
     def begin(self) -> Any:
         """Return the memory before a session."""
         with self._report("begin"):

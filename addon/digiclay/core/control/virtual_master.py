@@ -112,6 +112,16 @@ class Master(NamedTuple):
         """Where the fingertip is, m; None: none is followed."""
         return None if self.phase is IDLE else (self.x, self.y)
 
+    @property
+    def top(self) -> float:
+        """Height of the blister's top, m."""
+        return self.height
+
+    @property
+    def ground(self) -> float:
+        """Height of the surface around the blister, m."""
+        return self.edge
+
 
 @dataclass(frozen=True, eq=False)
 class MasterCell:
@@ -219,6 +229,9 @@ class VirtualMasterControl(BatchControl):
     ground: EdgeGround | OwnGround = GROUNDS["edge"]
     """Surface from which the blister rises."""
 
+    #: See `following.FollowingControl`.
+    division = "PinDivision"
+
     @property
     def rows(self) -> int:
         """State rows a cell needs."""
@@ -228,6 +241,11 @@ class VirtualMasterControl(BatchControl):
     def pin_rows(self) -> range:
         """Rows of the pin itself, whichever of several blisters it is in: its ground before the first."""
         return range(self.rows)
+
+    @property
+    def blister_radius(self) -> float:
+        """How far from the fingertip pins may be in its blister, m."""
+        return self.blister.radius
 
     def find_batch_class(self, count: int) -> type[VirtualMasterControl]:
         """Return the class of the controller of a batch of so many runs."""

@@ -1,15 +1,17 @@
 """Interface of the control methods: what is measured of cells, commanded to them and asked of the method."""
 
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..base.arrays import Floats
-from .layout import Disc
+from ..base.arrays import Cells, Floats
+from .layout import Disc, Discs
 
 NONE: Floats = np.empty(0)
+#: What a controller remembers from one period to the next; each method has a type of its own.
+Memory: TypeAlias = Any
 
 
 class Measurement(NamedTuple):
@@ -35,10 +37,10 @@ class Measurement(NamedTuple):
     """(rows, m): What the sensors remember of each cell."""
     present: tuple[int, ...] = ()
     """In a batch how many of the cells, the first, take part in each run; empty: all do."""
-    discs: Any = None
+    discs: Discs | None = None
     """With several fingers x, y and radius, m, (f,) each, of the discs of their active cells."""
-    pressing: Any = None
-    """(f, m): Then also the force of each finger, N; no more than a name for who presses, see `hands`."""
+    pressing: Floats | None = None
+    """(f, m): Then also the force of each finger, N, which only names new fingers; see `pin_division`."""
 
 
 class Commands(NamedTuple):
@@ -48,6 +50,10 @@ class Commands(NamedTuple):
     mode: NDArray[np.int8]
     command: Floats
 
+    def take(self, entries: Cells) -> "Commands":
+        """Return some of them, by their numbers in a row."""
+        return Commands(self.target.take(entries), self.mode.take(entries), self.command.take(entries))
+
 
 class Controller(Protocol):
     """Control method with its parameters; its memory is an argument and a result."""
@@ -56,13 +62,13 @@ class Controller(Protocol):
     def rows(self) -> int:
         """State rows a cell needs."""
 
-    def begin(self) -> Any:
+    def begin(self) -> Memory:
         """Return the memory before a session."""
 
-    def locate(self, memory: Any, touched: Measurement) -> tuple[Any, Disc | None]:
+    def locate(self, memory: Memory, touched: Measurement) -> tuple[Memory, Disc | None]:
         """Take in the cells the fingertip may touch; return memory and the disc x, y, radius to control."""
 
-    def command(self, memory: Any, seen: Measurement) -> tuple[Any, Commands]:
+    def command(self, memory: Memory, seen: Measurement) -> tuple[Memory, Commands]:
         """Return memory and orders for the cells of the disc and all that still move."""
 
 

@@ -28,6 +28,7 @@ from .schema import STEPPERS, Finger, Scene
 
 if TYPE_CHECKING:
     from ..control.device_info import DeviceInfo
+    from ..control.pin_division import PinDivision
 
 
 #: Cells that several fingers press: module and function of the plan.
@@ -230,19 +231,21 @@ def _build_method(scene: Scene, devices: list[DeviceInfo]) -> Controller:
     touches = [device.cell.touch for device in devices]
     if len(controllers) == 1 or not all(touches):
         return controllers[0]
-    from ..control.cell_hands import CellHands
+    from ..control.following import FollowingControl
     from ..control.hands import HandInGroups, HandTogether
+    from ..control.own_method import Guarded
     from ..control.servo import BatchControl
     from ..control.side_by_side import join_controllers
 
-    if not (hasattr(controllers[0], "blister") and hasattr(controllers[0].begin(), "place")):
-        return controllers[0]  # it follows no fingertip
+    inner = [own.inner if isinstance(own, Guarded) else own for own in controllers]
+    following = tuple(own for own in inner if isinstance(own, FollowingControl))
+    if not following:
+        return controllers[0]
     tips = [touch.fingertip for touch in touches if touch]
     sizes, heights = tuple(max(tip.length, tip.width) for tip in tips), tuple(tip.height for tip in tips)
     felt = max(getattr(scene.control, "felt_force", 0.0), devices[0].force_floor)
-    each = tuple(controllers)
+    kind: type[PinDivision] = import_part("control.pin_division", following[0].division)
+    division, each = kind(following, sizes, heights, felt), tuple(controllers)
     if isinstance(each[0], BatchControl):
-        return HandTogether(each, sizes, heights, felt, join_controllers(controllers))
-    if hasattr(each[0], "whose"):
-        return CellHands(each, sizes, sizes, felt)  # which of two undersides is nearer is asked of balls
-    return HandInGroups(each, sizes, heights, felt)
+        return HandTogether(each, division, join_controllers(controllers))
+    return HandInGroups(each, division)

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from ..base.arrays import Floats
 from ..base.errors import StateError
 from ..base.modes import Mode
-from ..control.hands import Hands
+from ..control.pin_division import Hands
 from ..engine.simulation import begin
 from ..engine.state import ActiveSet, Rows, State
 from ..engine.system import System

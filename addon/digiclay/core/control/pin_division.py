@@ -1,0 +1,367 @@
+"""Division of pins among fingers: whose each pin is, who sees its force, and whose command it obeys.
+
+Each finger has a controller, which sees and commands the pins around its finger as if it were alone. Sensors
+measure the force on a pin, not the finger that presses it. So a pin that two fingers press is divided twice
+in a control period:
+
+- `assign`, before the controllers locate their fingertips: the pin belongs to the finger whose underside is
+  lowest over it. This finger sees the whole force, the other one sees none. A pressed pin far from all
+  fingers begins a new one.
+- `choose`, after both have commanded the pin: it obeys the finger it belongs to.
+
+Here undersides are those of balls that stand on top of the blisters, for the master of Method I is where its
+fingertip is. `CellDivision` has what is different with Method II, `PredictedDivision` with Method III.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..base.arrays import TIE, TINY, Cells, Flags, Floats, any_true, find_first_largest
+from ..base.modes import Mode
+from ..model.control_interface import Measurement
+from ..model.fingertip import continue_ball
+from ..model.layout import RELATIVE_TOLERANCE, Disc
+from .finger_sections import BEYOND, Columns
+from .following import Follower, FollowingControl, PredictingControl
+from .travel import measure_square
+
+#: How far from a finger a pin may belong to it, in its largest semi-axes: 12 mm of the default one.
+CAPTURE = 1.2
+#: Shares of that within which pressed pins begin a new finger, and within which pins are under one.
+NEW, UNDER = 0.65, 0.5
+#: How far above a pressed pin the underside of the finger that presses it may be taken to be, m.
+REACHED = 6e-3
+#: How far a pin may stand above a fingertip's underside and tell where it is, m: one that another fingertip's
+#: blister holds up beside it would draw its master there.
+ASIDE = 1.5e-3
+#: How near a pressed pin two undersides must be for both to be able to press it, m.
+UNCLEAR = 0.2e-3
+#: Share of a pin that a finger does not see, not even its height.
+HIDDEN = -1.0
+#: No finger.
+NOBODY = -1
+#: Rank of the command of the finger that presses the pin: above all others.
+PRESSING = 2.0
+#: Row of the periods for which Method II remembers a pin to be critical, and what stands there for a finger
+#: that the pin does not obey.
+PERIODS, ANOTHER = 0, -1.0
+#: Where a finger is that is not followed: beyond every pin.
+NOWHERE = (BEYOND, BEYOND)
+
+
+class Hands(NamedTuple):
+    """Memory of the controllers, and the discs they control, m; a negative radius: none."""
+
+    fingers: tuple[Follower, ...]
+    discs: tuple[Disc, ...]
+    pressed: tuple[Cells, Cells] | None = None
+    """From locating to commanding: the pressed pins, (q,), ascending, and the fingers they belong to."""
+
+    @property
+    def losses(self) -> int:
+        """How often a finger was lost."""
+        return sum(follower.losses for follower in self.fingers)
+
+
+class Blisters(NamedTuple):
+    """Blisters of f fingers, (f,) each: middle and radius, below 0: none; heights of ground and top, m."""
+
+    x: Floats
+    y: Floats
+    radius: Floats
+    ground: Floats
+    top: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class PinDivision:
+    """Rules by which f fingers divide the pins."""
+
+    controllers: tuple[FollowingControl, ...]
+    """The fingers' own; fingers that are alike have one and the same."""
+    sizes: tuple[float, ...]
+    heights: tuple[float, ...]
+    """Largest semi-axis of each fingertip, and that upwards, m."""
+    felt: float
+    """Force from which on a pin begins a new finger, N."""
+
+    @cached_property
+    def fingers(self) -> Cells:
+        """Numbers of the fingers, (f, 1)."""
+        return np.arange(len(self.controllers))[:, None]
+
+    @cached_property
+    def _radii(self) -> Floats:
+        """Largest semi-axes of the fingertips, (f, 1), m."""
+        return np.array(self.sizes)[:, None]
+
+    @cached_property
+    def captures(self) -> Floats:
+        """How far from each finger a pin may belong to it, (f, 1), m."""
+        captures: Floats = CAPTURE * (1.0 + RELATIVE_TOLERANCE) * self._radii
+        return captures
+
+    # Before the controllers locate their fingertips.
+
+    def assign(self, memory: Hands, touched: Measurement, pressed: Cells) -> tuple[Cells, Floats]:
+        """Return which finger each pressed pin (q,) belongs to, and the undersides over it, (f, q), m."""
+        if not pressed.size:
+            return pressed, np.zeros((len(self.controllers), 0))
+        height = touched.height[pressed]
+        under = self.find_undersides(memory, touched.quadratic_basis.take(pressed, axis=1), height)
+        under[under > height + REACHED] = np.inf
+        return self._begin_fingers(touched, pressed, find_lowest(under)), under
+
+    def find_undersides(self, memory: Hands, basis: Floats, height: Floats) -> Floats:
+        """Return the undersides of fingers over pins of a `height`, (f, q), m; infinite: too far away."""
+        x, y = np.array([follower.place or NOWHERE for follower in memory.fingers]).T
+        tops = np.array([follower.top for follower in memory.fingers])[:, None]
+        return self._lay_balls(measure_square(x, y, basis), tops)
+
+    def _lay_balls(self, square: Floats, lowest: Any) -> Floats:
+        """Return undersides of balls over pins, (f, q), m, by squared distances, m², and lowest points, m."""
+        under = self._radii * continue_ball(square / self._radii**2) + (lowest + self._radii)
+        return np.where(square > self.captures**2, np.inf, under)
+
+    def _begin_fingers(self, touched: Measurement, pressed: Cells, owner: Cells) -> Cells:
+        """Return the owners; pressed pins of nobody begin new fingers about the strongest forces."""
+        force, seeds = np.where(owner == NOBODY, touched.force[pressed], 0.0), []
+        if force.max() < self.felt:
+            return owner
+        idle = sorted(set(range(len(self.controllers))) - set(owner.tolist()))
+        x, y = touched.quadratic_basis[1:3, pressed]
+        while idle and force.max() >= self.felt:
+            strongest = int(find_first_largest(force))
+            # The true finger only names the new one, so that figures of finger and controller agree.
+            assert touched.pressing is not None
+            presses = int(find_first_largest(touched.pressing[:, pressed[strongest]]))
+            finger = presses if presses in idle else idle[0]
+            idle.remove(finger)
+            distance = np.hypot(x - x[strongest], y - y[strongest])
+            distance[distance > NEW * self.captures[finger]] = np.inf
+            force[distance < np.inf] = 0.0
+            seeds.append((finger, distance))
+        if not seeds:
+            return owner
+        # Of fingers that land in one period each has the pins nearest to it.
+        fingers, distances = (np.array(part) for part in zip(*seeds, strict=True))
+        near = (owner == NOBODY) & (distances < np.inf).any(axis=0)
+        return np.where(near, fingers[find_first_largest(-distances)], owner)
+
+    def flatten(
+        self, memory: Hands, touched: Measurement, owner: Cells, under: Floats, pressed: Cells
+    ) -> Cells:
+        """Return the owners of pressed pins by fingertips that are less tall than wide.
+
+        A pin that stands far above a fingertip is not pressed by it.
+        """
+        tops = np.array([follower.top for follower in memory.fingers])[:, None]
+        tips = tops + (under - tops) * (np.array(self.heights)[:, None] / self._radii)
+        nearest = find_lowest(np.where(tips < touched.height[pressed] - ASIDE, np.inf, tips))
+        return np.where(nearest == NOBODY, owner, nearest)
+
+    def share_pressed(self, owner: Cells, under: Floats, touched: Measurement, pressed: Cells) -> Floats:
+        """Return the share of each finger in the force on each pressed pin, (f, q)."""
+        return self.share_whole(owner)
+
+    def share_whole(self, owner: Cells) -> Floats:
+        """Return the shares of fingers in forces, (f, q): none of pins that belong to another finger."""
+        shares: Floats = ((owner == self.fingers) | (owner == NOBODY)).astype(np.float64)
+        return shares
+
+    # Before they command their pins.
+
+    def claim(self, memory: Hands, seen: Measurement, shared: Cells) -> tuple[Cells, Floats]:
+        """Return whose the pins in several discs are, (g,), and the share of each finger in them, (f, g)."""
+        owner = np.full(shared.size, NOBODY)
+        if memory.pressed:
+            (pressed, pressing), cells = memory.pressed, seen.cells[shared]
+            at = np.minimum(pressed.searchsorted(cells), pressed.size - 1)
+            owner = np.where(pressed[at] == cells, pressing[at], NOBODY)
+        return owner, self.share_whole(owner)
+
+    def mask(self, seen: Measurement) -> None:
+        """Hide, in place, what fingers must not see of the pins in their discs."""
+
+    # After they have commanded them.
+
+    def choose(
+        self, memory: Hands, seen: Measurement, owner: Cells, columns: Columns, target: Floats
+    ) -> Cells:
+        """Return which command each pin in several discs obeys, (g,); `target`: commanded heights, m.
+
+        That of the finger it belongs to; else that of the finger above it; else, in several blisters, the one
+        that moves it farthest off its ground; outside of all that of the nearest, but of those that move it.
+        """
+        copies = columns.copies
+        finger, (x, y) = copies.row, columns.places
+        blisters = Blisters(*(values[finger] for values in self.find_blisters(memory)))
+        square = (x - blisters.x) ** 2 + (y - blisters.y) ** 2
+        inside = square <= blisters.radius * np.abs(blisters.radius)
+        commanded = target[copies.number]
+        still = np.abs(commanded - seen.target[columns.cells]) <= TIE
+        rank = np.where(inside, np.abs(commanded - blisters.ground), np.where(still, -1.0, -0.5) - square)
+        under = inside & (square <= (UNDER**2 * self.captures**2)[finger, 0])
+        rank = np.where(under, 1.0 - square, rank)
+        rank[owner[copies.which] == finger] = PRESSING
+        return columns.pick(rank)
+
+    def find_blisters(self, memory: Hands) -> Blisters:
+        """Return the blisters of all fingers."""
+        rows = []
+        for controller, follower in zip(self.controllers, memory.fingers, strict=True):
+            place = follower.place
+            radius = controller.blister_radius * (1.0 + RELATIVE_TOLERANCE) if place else -1.0
+            rows.append((*(place or NOWHERE), radius, follower.ground, follower.top))
+        return Blisters(*np.array(rows).T)
+
+    def remember(self, rows: Floats, obeyed: Cells) -> None:
+        """Let all fingers remember of each pin's command what the finger it obeys does; rows (f, r, m)."""
+        pins = np.arange(obeyed.size)
+        for row in self.controllers[0].pin_rows:
+            rows[:, row] = rows[obeyed, row, pins]
+
+
+class CellDivision(PinDivision):
+    """Rules for Method II, which has neither a master nor an estimate of the fingertip.
+
+    Beside one fingertip pins may stand high that another one follows low. So each controller sees as
+    following, in its blister or frozen only the pins that obeyed it last. A pressed pin belongs to the finger
+    whose underside is nearest, for no pin is pressed deep; and pins obey the nearer finger.
+    """
+
+    def _find_places(self, memory: Hands) -> Floats:
+        """Return where fingers are, (f, 2), m, from the first force on: cells follow later."""
+        places = []
+        for follower, (x, y, radius) in zip(memory.fingers, memory.discs, strict=True):
+            places.append(follower.place or ((x, y) if radius >= 0.0 else NOWHERE))
+        return np.array(places)
+
+    def find_undersides(self, memory: Hands, basis: Floats, height: Floats) -> Floats:
+        """Return how far pins are from undersides, (f, q), m; a fingertip is on the pin nearest to it."""
+        x, y = self._find_places(memory).T
+        square = measure_square(x, y, basis)
+        nearest = find_first_largest(-square.T)
+        under: Floats = self._lay_balls(square, 0.0) + height[nearest][:, None] - height
+        return np.abs(under)
+
+    def mask(self, seen: Measurement) -> None:
+        """Show each finger the pins that obey another one as if they held their height."""
+        seen.mode[seen.own[PERIODS] == ANOTHER] = Mode.HOLD
+
+    def choose(
+        self, memory: Hands, seen: Measurement, owner: Cells, columns: Columns, target: Floats
+    ) -> Cells:
+        """Return which command each pin in several discs obeys, (g,): that of the nearer finger.
+
+        A finger that would leave the pin unchanged has no say unless it is above it; the pressing finger has
+        priority.
+        """
+        copies = columns.copies
+        finger, (x, y) = copies.row, columns.places
+        at_x, at_y = self._find_places(memory)[finger].T
+        order = (x - at_x) ** 2 + (y - at_y) ** 2
+        still = np.abs(target[copies.number] - seen.target[columns.cells]) <= TIE
+        order += still & (order > (UNDER**2 * self.captures**2)[finger, 0])
+        order[owner[copies.which] == finger] = -1.0
+        return columns.pick(-order)
+
+    def remember(self, rows: Floats, obeyed: Cells) -> None:
+        """Let the finger that each pin obeys remember it, and all others that it obeys another one."""
+        obedience, pins = rows[:, PERIODS], np.arange(obeyed.size)
+        remembered = obedience[obeyed, pins]
+        obedience[:] = ANOTHER
+        obedience[obeyed, pins] = remembered
+
+
+class PredictedDivision(PinDivision):
+    """Rules for Method III, which predicts the underside of each fingertip and its force on a pin."""
+
+    controllers: tuple[PredictingControl, ...]
+
+    @cached_property
+    def _alike(self) -> dict[PredictingControl, list[int]]:
+        """Which fingers have each controller."""
+        alike: dict[PredictingControl, list[int]] = {}
+        for finger, controller in enumerate(self.controllers):
+            alike.setdefault(controller, []).append(finger)
+        return alike
+
+    def find_undersides(self, memory: Hands, basis: Floats, height: Floats) -> Floats:
+        """Return the predicted undersides over pins, (f, q), m; infinite: too far away."""
+        x, y = np.array([follower.place or NOWHERE for follower in memory.fingers]).T
+        under = np.full((x.size, basis.shape[1]), np.inf)
+        for controller, fingers in self._alike.items():
+            followed = [finger for finger in fingers if x[finger] < BEYOND]
+            if followed:
+                followers = [memory.fingers[finger] for finger in followed]
+                under[followed] = controller.predict_under(followers, basis)
+        return np.where(measure_square(x, y, basis) > self.captures**2, np.inf, under)
+
+    def share_pressed(self, owner: Cells, under: Floats, touched: Measurement, pressed: Cells) -> Floats:
+        """Return the share of each finger in the force on each pressed pin, (f, q); `HIDDEN`: of none.
+
+        A finger that is not followed yet shares nothing: it would draw the estimates of the others to it.
+        """
+        shares, certain = self.divide_force(owner, under, touched, pressed)
+        shares[:, owner == NOBODY] = 0.0
+        shares[:, ~certain] = HIDDEN
+        return shares
+
+    def divide_force(
+        self, owner: Cells, under: Floats, measured: Measurement, pins: Cells
+    ) -> tuple[Floats, Flags]:
+        """Return the shares of fingers in the forces on pins (q,), (f, q), and which of them are certain.
+
+        Of a pin that several may press each has its share of the forces predicted; where none is predicted,
+        it is uncertain who presses the pin.
+        """
+        shares, certain = self.share_whole(owner), np.ones(pins.size, np.bool_)
+        height = measured.height[pins]
+        (several,) = ((under < height + UNCLEAR).sum(axis=0) > 1).nonzero()
+        if several.size:
+            forces = np.maximum(height[several] - under[:, several], 0.0)
+            rows = measured.own[:, pins[several]].reshape(len(forces), -1, several.size)
+            for controller, fingers in self._alike.items():
+                forces[fingers] = controller.predict_force(forces[fingers], rows[fingers])
+            total = forces.sum(axis=0)
+            certain[several] = total > 0.0
+            shares[:, several] = np.where(total > 0.0, forces / np.maximum(total, TINY), shares[:, several])
+        return shares, certain
+
+    def claim(self, memory: Hands, seen: Measurement, shared: Cells) -> tuple[Cells, Floats]:
+        """Return whose the pins in several discs are, (g,), and the share of each finger in them, (f, g).
+
+        A pin belongs to the fingertip that presses it, or would if a blister raised it to its top. Where the
+        blister of one finger would press the pin into another fingertip, and not the other way round, the pin
+        is hidden from the one: it cannot be high for it.
+        """
+        if not shared.size:
+            return super().claim(memory, seen, shared)
+        basis, height = seen.quadratic_basis.take(shared, axis=1), seen.height[shared]
+        under = self.find_undersides(memory, basis, height)
+        owner = find_lowest(under)
+        shares, _ = self.divide_force(owner, under, seen, shared)
+        lowest, second = under.min(axis=0), np.where(owner == self.fingers, np.inf, under).min(axis=0)
+        blisters = self.find_blisters(memory)
+        square = measure_square(blisters.x, blisters.y, basis)
+        inside = square <= (blisters.radius * np.abs(blisters.radius))[:, None]
+        raised = np.where(inside, np.maximum(blisters.top, blisters.ground)[:, None], -np.inf)
+        harms = raised > lowest + TIE
+        pressed = (seen.force[shared] != 0.0) | harms.any(axis=0)
+        harms &= (under > lowest + TIE) | (raised > second + TIE)
+        harms &= ~(harms | np.isinf(under)).all(axis=0)
+        if any_true(harms):
+            shares[harms] = HIDDEN
+            owner = find_lowest(np.where(harms, np.inf, under))
+        return np.where(pressed, owner, NOBODY), shares
+
+
+def find_lowest(under: Floats) -> Cells:
+    """Return the finger with the lowest of undersides (f, q), (q,); `NOBODY`: all are infinite."""
+    return np.where(under.min(axis=0) == np.inf, NOBODY, find_first_largest(-under))
