@@ -24,7 +24,7 @@ from itertools import combinations
 
 import numpy as np
 
-from ..core.base.arrays import Floats
+from ..core.base.arrays import TIE, Floats
 from ..core.model.fingertip import Fingertip
 from .nominal import LIMITS, Device, find_nominal, find_undersides, returns
 from .pose import lean_finger, turn_image, turn_toward
@@ -52,8 +52,6 @@ Point = tuple[float, float, float]
 CROSS, DESCEND, OUTRUN = 1.0, 0.4, 5.0
 #: How fast it comes down the last way, m/s, and how far above the highest pin it passes over the bed, m.
 APPROACH, CLEARANCE = 0.1, 4e-3
-#: Heights that differ by less count as equal, m.
-NEAR = 1e-9
 #: How far the fingertip may be off its height while it goes on along the path, m.
 SLACK = 0.5e-3
 #: How much wider than it is the fingertip is taken to be beside pins that are locked.
@@ -70,7 +68,7 @@ FIRM, PATIENCE, HURRY = 0.5, 0.1, 1.0
 #: faster, the fingertip runs into pins whose valves have not opened yet.
 DRAG, SPAN, PRESS = 0.1, 30.0, 0.02
 #: The fingertip comes down on a slope where it touches a pin so far above the surface below it, m.
-UNEVEN = 0.5e-3
+UNEVEN = 0.5e-3 + TIE
 #: An image comes down no nearer to another one, in largest semi-axes of the fingertip; where all its path is
 #: so near to what another one goes along, it leaves that to the valves; so near, in pitches, it is the same.
 #: Where two meet none lifts: beside the blister of another one pins then run away upwards.
@@ -170,7 +168,7 @@ def follow(
         before, (stroke, place) = stroke, step
         if (stroke.phase, stroke.image) != (before.phase, before.image):
             way = replace(way, safe=find_safe(stroke, device, now))
-        turn = _turn(stroke, path[-1][3:], place[2] >= way.safe - NEAR, period)
+        turn = _turn(stroke, path[-1][3:], place[2] >= way.safe - TIE, period)
         path.append(np.array([*place, *turn]))
         if stroke.phase != before.phase:
             break
@@ -197,7 +195,8 @@ def follow_images(
     if (tracking := stroke.tracking) and tracking.hard < math.inf:
         gap = min((math.dist(*pair) for pair in combinations(poses[:, :2].tolist(), 2)), default=math.inf)
         count = _count_while(lambda periods: gap >= 2.0 * tracking.reach(periods * period), count)
-        hard = tracking.hard if gap < 2.0 * tracking.radius else hard
+        if gap < 2.0 * tracking.radius - TIE:
+            hard = tracking.hard
     for part in stroke.parts:
         if count > 1:
             count = _count_settled(part, device, poses[part.image % len(poses)], count, period)
@@ -234,7 +233,7 @@ def _count_settled(part: Stroke, device: Device, pose: Floats, most: int, period
 def _stands(part: Stroke, pose: Floats) -> bool:
     """Tell whether an image is so near the pins that it no longer looks at how they stand."""
     # What others form counts until it is near the pins: then it would wait for those that creep.
-    return part.standing is not None and bool(pose[2] <= part.touch + CLEARANCE + NEAR)
+    return part.standing is not None and bool(pose[2] <= part.touch + CLEARANCE + TIE)
 
 
 def _follow_once(
@@ -272,11 +271,11 @@ def _yield(
     still waits when the hand has let go begins at the end of its path, if it is free there.
     """
     earlier = [other for other in earlier if other.backward == part.backward]
-    least = APART * max(device.finger.length, device.finger.width)
+    least = APART * max(device.finger.length, device.finger.width) - TIE
     near = any(math.dist(pose[:2], other[:2]) < least for other in down)
     if near and part.phase == PRESSING:
         return replace(part, phase=YIELDING, standing=None, climb=0.0, pace=0.0)
-    if part.phase != YIELDING or pose[2] < find_safe(part, device, now) - NEAR:
+    if part.phase != YIELDING or pose[2] < find_safe(part, device, now) - TIE:
         return part
 
     fixed = part.held or part.backward or part.accumulate or part.brush not in BOTH_WAYS
@@ -286,7 +285,7 @@ def _yield(
             return replace(part, samples=part.samples[::-1], reached=0, backward=True, phase=ABOVE)
 
     def is_same(other: Stroke, index: int, apart: float = SAME * device.grid.layout.pitch) -> bool:
-        return math.dist(part.place(index), other.place(index)) < apart
+        return math.dist(part.place(index), other.place(index)) < apart - TIE
 
     for other in earlier:
         while part.reached < other.reached and is_same(other, part.reached):
@@ -316,7 +315,7 @@ def find_safe(stroke: Stroke, device: Device, now: Floats) -> float:
     # Before the fingertip is down for the first time nothing is raised, and not all of the path is known.
     if len(stroke.images) > 1 and stroke.phase in (ABOVE, YIELDING):
         # In whole steps, else it would wait until pins that others form have crept to their heights.
-        highest = CLEARANCE * math.ceil(max(highest, float(now.max())) / CLEARANCE)
+        highest = CLEARANCE * math.ceil(max(highest, float(now.max())) / CLEARANCE - TIE)
     elif stroke.brush.rises and stroke.phase != ABOVE:
         raised = max(sample.depth for sample in stroke.samples)
         highest = device.highest if stroke.accumulate else min(highest + raised, device.highest)
@@ -326,11 +325,11 @@ def find_safe(stroke: Stroke, device: Device, now: Floats) -> float:
 def cross(stroke: Stroke, place: Point, safe: float, period: float) -> tuple[Stroke, Point]:
     """Rise to a safe height, m, then cross to the path's first place, or to where it is gone along next."""
     x, y, z = place
-    if z < safe - NEAR:
+    if z < safe - TIE:
         return stroke, (x, y, min(safe, z + DESCEND * period))
     to_x, to_y = stroke.place(stroke.reached)
     far, length = math.hypot(to_x - x, to_y - y), CROSS * period
-    if far > length:
+    if far > length + TIE:
         return stroke, (x + (to_x - x) * length / far, y + (to_y - y) * length / far, z)
     return replace(stroke, phase=PRESSING), (to_x, to_y, z)
 
@@ -342,7 +341,7 @@ def drag(
     for reached in range(stroke.reached + 1, len(stroke.samples)):
         to_x, to_y = stroke.place(reached)
         far = math.hypot(to_x - x, to_y - y)
-        if far > length:
+        if far > length + TIE:
             return stroke, x + length / far * (to_x - x), y + length / far * (to_y - y)
         x, y, length, stroke = to_x, to_y, length - far, _reach(stroke, device, reached)
     return None if stroke.held else (stroke, x, y)
@@ -370,17 +369,17 @@ def _step(stroke: Stroke, way: Way, place: Point) -> tuple[Stroke, Point] | None
     if stroke.phase in (LEAVING, YIELDING):
         # Pins that look for the fingertip are not to find it again.
         lift = max(DESCEND, OUTRUN * stroke.tracking.speed) if stroke.tracking else DESCEND
+        above = min(way.safe, z + lift * way.period)
         if stroke.phase == YIELDING:
-            return stroke, (x, y, max(z, min(way.safe, z + lift * way.period)))
-        z = min(way.safe, z + lift * way.period)
-        return (leave(stroke) if z >= way.safe - NEAR else stroke), (x, y, z)
+            return stroke, (x, y, max(z, above))
+        return (leave(stroke) if above >= way.safe - TIE else stroke), (x, y, above)
     if stroke.brush in STAMPS:
         return _wait_for_stamp(stroke, way, place)
     if stroke.phase == PRESSING:
         return _press(stroke, way, place)
     if stroke.phase == RISING:
         stroke, z = _climb(stroke, z, stroke.lowest, way.period)
-        return replace(stroke, phase=DRAGGING if abs(z - stroke.lowest) < NEAR else RISING), (x, y, z)
+        return replace(stroke, phase=DRAGGING if abs(z - stroke.lowest) < TIE else RISING), (x, y, z)
     return _drag_on(stroke, way, place)
 
 
@@ -389,7 +388,7 @@ def _wait_for_stamp(stroke: Stroke, way: Way, place: Point) -> tuple[Stroke, Poi
     x, y, z = place
     if stroke.held:
         return None
-    if z < way.safe - NEAR:
+    if z < way.safe - TIE:
         return stroke, (x, y, min(way.safe, z + DESCEND * way.period))
     return replace(stroke, phase=FINISHING, image=len(stroke.images) - 1), place
 
@@ -411,10 +410,10 @@ def _press(stroke: Stroke, way: Way, place: Point) -> tuple[Stroke, Point]:
         fastest = min(fastest, max(braked, SUDDEN * way.period))
     # One limit after the other, the last that it comes to.
     for end, speed in ((touch + CLEARANCE, DESCEND), (touch, APPROACH), (lowest, fastest)):
-        if z > end:
+        if z > end + TIE:
             z = max(end, z - speed * way.period)
             break
-    return alter(stroke, phase=after if z - lowest < NEAR else PRESSING), (x, y, z)
+    return alter(stroke, phase=after if z - lowest < TIE else PRESSING), (x, y, z)
 
 
 def _drag_on(stroke: Stroke, way: Way, place: Point) -> tuple[Stroke, Point] | None:
@@ -422,7 +421,7 @@ def _drag_on(stroke: Stroke, way: Way, place: Point) -> tuple[Stroke, Point] | N
     (x, y, z), tracking, device = place, stroke.tracking, way.device
     lowest = stroke.lowest
     if tracking is None or abs(z - lowest) <= SLACK:
-        if stroke.drawn and abs(z - lowest) < NEAR:
+        if stroke.drawn and abs(z - lowest) < TIE:
             return replace(stroke, phase=LEAVING), place
         speed = min(DRAG, SPAN * (device.finger.width / 2))
         if tracking:

@@ -15,7 +15,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from ..core.base.arrays import Cells, Flags, Floats
+from ..core.base.arrays import TIE, Cells, Flags, Floats
 from ..core.control.blister import Blister
 from ..core.model.fingertip import LEVEL, Fingertip, compute_forms, compute_underside
 from ..core.model.layout import Grid, Layout
@@ -128,15 +128,15 @@ def returns(stroke: Stroke, first: int, index: int, width: float) -> bool:
     path = np.array([(sample.x, sample.y) for sample in stroke.samples[first : index + 1]])
     steps = np.hypot(*np.diff(path, axis=0).T)
     gone = np.concatenate([[0.0], np.cumsum(steps)])
-    far = gone[-1] - gone > RETURN * 2.0 * width
-    return bool((np.hypot(*(path - path[-1]).T)[far] < width).any())
+    far = gone[-1] - gone > RETURN * 2.0 * width + TIE
+    return bool((np.hypot(*(path - path[-1]).T)[far] < width - TIE).any())
 
 
 def _mark(nominal: Nominal, stroke: Stroke, device: Device, image: Image, index: int) -> None:
     """Bring pins about the path from a sample to the next one, `index`, to their heights, in place."""
     last, sample = stroke.samples[max(index - 1, 0)], stroke.samples[index]
     length = math.hypot(sample.x - last.x, sample.y - last.y)
-    parts = max(1, math.ceil(length / device.grid.layout.pitch))
+    parts = max(1, math.ceil(length / device.grid.layout.pitch - TIE))
     row = [_between(last, sample, part / parts) for part in range(parts + 1)]
     places = [image.place(one.x, one.y) for one in row]
     level = device.find_level(stroke, image, nominal.before)
@@ -166,7 +166,7 @@ def _mark(nominal: Nominal, stroke: Stroke, device: Device, image: Image, index:
         low, high = LIMITS[stroke.brush]
         change = change.clip(low, high)
         nominal.near[cells] = True
-        nominal.height[cells] = np.where(np.abs(change) > np.abs(now - own), own + change, now)
+        nominal.height[cells] = np.where(np.abs(change) > np.abs(now - own) + TIE, own + change, now)
 
 
 def find_frame(stroke: Stroke, device: Device) -> tuple[float, float]:
@@ -176,9 +176,10 @@ def find_frame(stroke: Stroke, device: Device) -> tuple[float, float]:
     """
     first, last = stroke.samples[0], stroke.samples[-1]
     x, y = last.x - first.x, last.y - first.y
-    if math.hypot(x, y) < device.grid.layout.pitch:
+    half = math.hypot(x, y)
+    if half < device.grid.layout.pitch - TIE:
         return find_radius(device.finger, device.grid.layout), 0.0
-    return math.hypot(x, y), math.atan2(y, x)
+    return half, math.atan2(y, x)
 
 
 def _stamp(nominal: Nominal, stroke: Stroke, device: Device) -> Nominal:

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from ..core.base.arrays import Floats
+from ..core.base.arrays import TIE, Floats
 from .stroke import Image
 
 
@@ -31,7 +31,7 @@ def turn_image(turn: Floats, image: Image) -> Floats:
     turned = _multiply(np.array([math.cos(half), 0.0, 0.0, math.sin(half)]), turn)
     # A half turn about its own axis leaves an ellipsoid as it is.
     other = _multiply(turned, np.array([0.0, 0.0, 0.0, 1.0]))
-    return turned if abs(float(turned @ turn)) >= abs(float(other @ turn)) else other
+    return turned if abs(float(turned @ turn)) >= abs(float(other @ turn)) - TIE else other
 
 
 def turn_toward(turn: Floats, aim: Floats, angle: float) -> Floats:

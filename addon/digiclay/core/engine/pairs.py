@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..base.arrays import TINY, Cells, Flags, Floats, any_true, find_copies
+from ..base.arrays import TIE, TINY, Cells, Flags, Floats, any_true, find_copies
 from ..model.fingers import HandPeriod, HandTouch, gather_places
 from ..model.fingertip import compute_reach
 from ..model.layout import RELATIVE_TOLERANCE, Discs, join_discs
@@ -196,7 +196,7 @@ class Pairs:
         after = self.move(under)
         flat[self.forces] = after
         flat[self.filters] = self.own[self.pulp, :count]
-        return Moved(before[:, :count], self.own[0, :count], (forces > 0.0) | (after > 0.0), under)
+        return Moved(before[:, :count], self.own[0, :count], np.maximum(forces, after) > TIE, under)
 
 
 class Moved(NamedTuple):

@@ -178,7 +178,7 @@ class Grid:
         x, y, radius = discs
         square = (self.x[:, None] - x) ** 2
         square += (self.y[:, None] - y) ** 2
-        covered: Flags = square <= radius * np.abs(radius)
+        covered: Flags = square <= radius * np.abs(radius) * (1.0 + RELATIVE_TOLERANCE)
         return covered
 
     def at(self, x: Floats, y: Floats) -> Cells:

@@ -192,7 +192,7 @@ def _heights(shape: Shape, relief: Relief, at: Placement, tops: Tops, actuator: 
         factor = relief.value_length
         if relief.length is not None:
             factor *= math.sqrt(at.factor_x * at.factor_y) / relief.length
-    elif high > low:
+    elif not math.isclose(low, high):  # interpolated values of one level differ in their last bits
         factor = (shape.rise if shape.relief == "rise" else actuator.stroke - foot) / (high - low)
     else:
         factor = 0.0

@@ -14,7 +14,7 @@ from typing import Any, BinaryIO, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.arrays import Floats
+from ..base.arrays import TIE, Floats
 from ..base.errors import ParameterError
 from ..mesh_io.mesh_limits import LARGEST, make_refusal
 from ..model.layout import RELATIVE_TOLERANCE, Grid
@@ -349,7 +349,7 @@ class HeightMap:
             return _bilinear(means, rows, columns)
 
         share = np.ones(grid.count) if self.share is None else interpolate(self.share)
-        covered &= share >= 0.5
+        covered &= share >= 0.5 - TIE
         value = interpolate(self.values) / np.where(covered, share, 1.0)
         return Tops(np.where(covered, value, 0.0), covered, np.zeros(grid.count, np.bool_))
 
