@@ -105,11 +105,10 @@ def carry_out(arguments: argparse.Namespace) -> int:
     with open_batch(out, made) as folder:
         for job in made.jobs:
             folder.describe(job)
-        if arguments.prepare:
-            say(arguments, f"{len(made.jobs)} jobs written to {out / 'jobs'}")
-            return 0
         failed = {job.name: job.error for job in made.jobs if job.error}
-        if arguments.submit:
+        if arguments.prepare:
+            say(arguments, f"{len(made.jobs) - len(failed)} jobs written to {out / 'jobs'}")
+        elif arguments.submit:
             say(arguments, *write_farm_files(folder, arguments.submit, arguments.program, arguments.chunk))
         elif not _finish(arguments, folder, failed):
             return STOPPED
