@@ -86,6 +86,20 @@ def test_a_replay_in_another_state_ends_bit_for_bit_as_the_take_did(clay):
     assert 0.0 < np.abs(find_heights(clay) - drawn).max() < 20e-6
 
 
+@pytest.mark.parametrize(
+    "layout", [{"pitch": 4.0}, {"rows": 9, "columns": 16}, {"arrangement": "staggered"}, {"rows": 11}]
+)
+def test_a_take_of_another_layout_is_refused_though_it_may_have_as_many_pins(clay, layout):
+    number = record(clay)
+    for name, value in layout.items():
+        setattr(clay.digiclay.layout, name, value)
+    assert bpy.ops.digiclay.rebuild() == {"FINISHED"}
+    places = bridge.read_cells(clay.data)["position"].tolist()
+    with pytest.raises(RuntimeError, match="must have the layout of the bed"):
+        bpy.ops.digiclay.take_replay(take=number)
+    assert bridge.read_cells(clay.data)["position"].tolist() == places
+
+
 def test_a_baked_take_shows_its_end_at_its_last_frame_and_starts_no_session(clay):
     record(clay)
     drawn = find_heights(clay)

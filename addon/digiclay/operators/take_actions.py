@@ -212,9 +212,12 @@ class ReplayTake(TimedAction, bpy.types.Operator):
         self._numbers = takes.list_fingers(bed, self.take, len(self._take.scene.fingers))
         self._states = play_take(self._take, refine(self._take.scene, self.parts))
         self._system, self._state = next(self._states)
-        if self._system.grid.count != len(bed.data.vertices):
-            here, there = len(bed.data.vertices), self._system.grid.count
-            raise DigiclayError(f"The take is of a bed of {there} pins (got one of {here}).")
+        plan = self._take.scene.layout
+        if properties.find_layout_mismatch(bed, plan):
+            raise DigiclayError(
+                f"The take must have the layout of the bed (got {plan.rows} x {plan.columns} pins, "
+                f"{1e3 * plan.pitch:g} mm apart, {plan.arrangement})."
+            )
         self._clock, self._at = Clock(), 0
 
     def _place(self, bed: Any) -> None:
