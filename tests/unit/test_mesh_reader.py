@@ -306,6 +306,7 @@ def many_nodes(tree: dict[str, Any]) -> None:
            f"must not need an extension that changes its vertices (got one.gltf: {name})")
           for name in ("KHR_draco_mesh_compression", "EXT_meshopt_compression", "VENDOR_anything")),
         (lambda tree: tree.update(extensionsUsed=["EXT_mesh_gpu_instancing"]), "EXT_mesh_gpu_instancing)"),
+        (lambda tree: tree.update(extensionsUsed=["KHR_node_visibility"]), "KHR_node_visibility)"),
         (lambda tree: tree["nodes"][0].update(skin=0), "must not be bent by a skin or by weights"),
         (lambda tree: tree["nodes"][0].update(weights=[0.0, 0.5]), "must not be bent by a skin"),
         (with_uri("data:text/plain,abc"), "not base64"),

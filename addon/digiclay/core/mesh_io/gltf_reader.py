@@ -36,8 +36,8 @@ ITEMS = {"SCALAR": 1, "VEC3": 3}
 TRIANGLES, STRIP, FAN = 4, 5, 6
 #: Extensions that change no vertex, or that are read.
 HARMLESS = re.compile(r"KHR_(materials|texture|lights|xmp|animation|mesh_quantization)\w*|EXT_texture\w*")
-#: One that adds copies where a reader is free not to know of it.
-COPIES = "EXT_mesh_gpu_instancing"
+#: Those that add copies or hide nodes where a reader is free not to know of them.
+OPTIONAL = ("EXT_mesh_gpu_instancing", "KHR_node_visibility")
 
 
 def read(path: Path, data: bytes) -> tuple[Floats, Indices]:
@@ -47,7 +47,7 @@ def read(path: Path, data: bytes) -> tuple[Floats, Indices]:
         if not str(tree["asset"]["version"]).startswith("2."):
             raise ValueError(f"its version is {str(tree['asset']['version'])[:20]}")
         needed = [one for one in tree.get("extensionsRequired", []) if not HARMLESS.fullmatch(one)]
-        needed += [COPIES] if COPIES in tree.get("extensionsUsed", []) else []
+        needed += [one for one in OPTIONAL if one in tree.get("extensionsUsed", [])]
         if needed:
             raise make_refusal("must not need an extension that changes its vertices", path.name, needed[0])
         file = _File(path, tree, binary)
