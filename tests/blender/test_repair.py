@@ -104,6 +104,33 @@ def test_a_bed_is_deleted_with_its_fingertip_and_undo_brings_both_back(everythin
     assert whole(*beds())
 
 
+@pytest.mark.parametrize("what", ["cube", "bed", "cube, with a hand"])
+def test_a_bed_joined_into_another_object_takes_its_fingertips_along_and_undo_brings_them_back(what):
+    if what == "bed":
+        into = added(1.0)
+    else:
+        bpy.ops.mesh.primitive_cube_add()
+        into = bpy.context.object
+    stays = into.name
+    bed = added()
+    if "hand" in what:
+        assert bpy.ops.digiclay.add_hand() == {"FINISHED"}
+        done("Add Hand")
+    name, before = bed.name, {one.name for one in bpy.context.scene.objects}
+    select(bed)
+    into.select_set(True)
+    bpy.context.view_layer.objects.active = into
+    assert bpy.ops.object.join() == {"FINISHED"}
+    done("Join")
+    (kept,) = (one for one in bpy.context.scene.objects if one.parent is None)
+    assert kept.name == stays
+    assert whole(*beds()) if what == "bed" else len(bpy.context.scene.objects) == 1
+    undone()
+    assert {one.name for one in bpy.context.scene.objects} == before
+    assert {fingertip_of(each) is not None for each in beds()} == {True}
+    assert bpy.data.objects[name] in beds()
+
+
 def test_a_click_on_the_ball_takes_hold_of_its_fingertip_alone():
     bed, other = added(), added(1.0)
     tip = fingertip_of(bed)

@@ -78,6 +78,7 @@ PLAYBACKS = {
     "of 29.97 frames a second": (TICK, 1.0, 1, 1, {"fps": 30, "fps_base": 1.001}),
     "by steps of three frames": (TICK, 3.75, 3, 1, {"frame_step": 3}),
     "from frame 101 on": (TICK, 1.25, 1, 101, {"frame_start": 101}),
+    "from before frame 0 on": (TICK, 1.25, 1, -30, {"use_preview_range": True, "frame_preview_start": -30}),
     "stretched to twice its time": (TICK, 1.25, 1, 1, {"frame_map_new": 200}),
     "pressed into half its time": (TICK, 1.25, 1, 1, {"frame_map_new": 50}),
 }
