@@ -5,7 +5,9 @@ import io
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import product
 from pathlib import Path
+from time import process_time
 from typing import Any, TextIO, TypeVar
 
 import numpy as np
@@ -147,3 +149,18 @@ def _write_cell(row: Row, key: str, form: str = "", factor: str = "1") -> str:
     if value is None:
         return ""
     return format(value if factor == "1" else value * float(factor), form)
+
+
+#: Something whose time is measured.
+Work = Callable[[], object]
+
+
+def time_by_turns(works: Sequence[Work], repeats: int) -> list[float]:
+    """Return the median processor time of each work, s; what else the machine does befalls all alike."""
+    times = np.zeros((repeats, len(works)))
+    for turn, number in product(range(repeats), range(len(works))):
+        began = process_time()
+        works[number]()
+        times[turn, number] = process_time() - began
+    medians: list[float] = np.median(times, axis=0).tolist()
+    return medians

@@ -1,31 +1,23 @@
 """Benchmark ``stack``: sessions a second, alone and in a batch."""
 
 import argparse
-from collections.abc import Callable
 from dataclasses import replace
-from threading import Semaphore, Thread
-from time import thread_time
 from typing import Any
 
-import numpy as np
 from digiclay.commands.arguments import scene_of
 from digiclay.core.batch.run_together import measure_together, run_together
 from digiclay.core.scene.schema import Scene
 from digiclay.core.session.run_scene import run
 from digiclay.core.studies.evaluation import evaluate
 
-from .report import Curves, Report, Row, Steps, tabulate
+from .report import Curves, Report, Row, Steps, Work, tabulate, time_by_turns
 
 #: Runs in one call; a sweep puts 32 to 63 together.
 COUNTS = (1, 4, 16, 32, 64, 128)
 #: Simulated time of a run, s.
 DURATION = 4.0
-#: Control periods after which the other work has its turn.
-TURN = 10
 #: Goal of the runs a second, over those of one run at a time.
 GOAL = 8.0
-#: Some work, which asks after each control period whether to stop.
-Work = Callable[[Callable[[], bool]], object]
 #: What varies from run to run: section, key, and from which to which share of its value. The first leaves the
 #: cells alike, the second does not.
 STUDIES: dict[str, tuple[str, str, float, float]] = {
@@ -46,67 +38,23 @@ def study(scene: Scene, name: str, count: int) -> list[Scene]:
     return [scene.with_sections(**{section: replace(part, **{key: getattr(part, key) * s})}) for s in shares]
 
 
-def time_in_turns(*works: Work) -> list[float]:
-    """Return the processor time of two works, s, in turns: what else the machine does befalls both alike."""
-    spent, batons, under_way = [0.0, 0.0], (Semaphore(0), Semaphore(0)), {0, 1}
-
-    def carry_out(place: int) -> None:
-        other, asked, since = 1 - place, 0, 0.0
-
-        def hand_on() -> bool:
-            nonlocal asked, since
-            asked += 1
-            if asked % TURN == 0 and other in under_way:
-                spent[place] += thread_time() - since
-                batons[other].release()
-                batons[place].acquire()
-                since = thread_time()
-            return False
-
-        batons[place].acquire()
-        since = thread_time()
-        try:
-            works[place](hand_on)
-        finally:
-            spent[place] += thread_time() - since
-            under_way.remove(place)
-            batons[other].release()
-
-    threads = [Thread(target=carry_out, args=[place]) for place in (0, 1)]
-    for thread in threads:
-        thread.start()
-    batons[0].release()
-    for thread in threads:
-        thread.join()
-    return spent
-
-
 def _compare(scene: Scene, name: str, count: int, repeats: int) -> list[Row]:
     """Run a study; return the runs a second of each kind of work, one run alone and all in one call."""
     scenes = study(scene, name, count)
     plain = study(replace(scene, recorder=None), name, count)
     middle, bare = scenes[count // 2], plain[count // 2]
     works: dict[str, tuple[Work, Work]] = {
-        "simulated": (
-            lambda stopped: run(bare, stopped=stopped),
-            lambda stopped: list(run_together(plain, stopped=stopped)),
-        ),
-        "recorded and judged": (
-            lambda stopped: evaluate(middle, stopped),
-            lambda stopped: list(measure_together(scenes, stopped=stopped)),
-        ),
+        "simulated": (lambda: run(bare), lambda: list(run_together(plain))),
+        "recorded and judged": (lambda: evaluate(middle), lambda: list(measure_together(scenes))),
         "errors estimated too": (
-            lambda stopped: evaluate(middle, stopped, errors=True),
-            lambda stopped: list(measure_together(scenes, errors=True, stopped=stopped)),
+            lambda: evaluate(middle, errors=True), lambda: list(measure_together(scenes, errors=True)),
         ),
     }  # fmt: skip
     rows: list[Row] = []
     for what, pair in works.items():
-        times = np.median([time_in_turns(*pair) for _ in range(repeats)], 0)
-        one, many = (1.0 / times[0]).item(), (count / times[1]).item()
-        rows.append(
-            {"study": name, "runs": count, "what": what, "alone": one, "together": many, "times": many / one}
-        )
+        one, all_runs = time_by_turns(pair, repeats)
+        speeds = {"alone": 1.0 / one, "together": count / all_runs, "times": count * one / all_runs}
+        rows.append({"study": name, "runs": count, "what": what, **speeds})
     return rows
 
 

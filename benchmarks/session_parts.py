@@ -8,6 +8,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 from dataclasses import fields, is_dataclass, replace
+from functools import partial
 from pathlib import Path
 from time import perf_counter, process_time
 from types import CodeType, FrameType
@@ -28,7 +29,7 @@ from digiclay.core.scene.schema import Scene
 from digiclay.core.session.accuracy import Replay
 from digiclay.core.session.memory_limit import check_memory
 
-from .report import Report, Steps, tabulate
+from .report import Report, Steps, tabulate, time_by_turns
 
 
 def replaying(scene: Scene, commands: Floats) -> System:
@@ -52,13 +53,10 @@ def solve(scene: Scene, commands: Floats | None = None) -> list[Floats]:
     return [np.array(column) for column in zip(*rows, strict=True)]
 
 
-def time_run(scene: Scene) -> float:
-    """Return the CPU time of a run of which nothing is kept, s."""
-    _, states = run(scene)
-    started = process_time()
-    for _ in states:
+def simulate(system: System, scene: Scene, count: int) -> None:
+    """Simulate so many control periods of a scene, and keep nothing."""
+    for _ in periods(system, scene.trajectories(), begin(system), count):
         pass
-    return process_time() - started
 
 
 #: Methods that make an array or bytes: Python's profiler does not see those that a `functools.partial` calls.
@@ -319,12 +317,12 @@ def _compare(scene: Scene, full: list[Floats], repeats: int) -> dict[str, Any]:
     """Return a scene's cost, and its differences from the full one, m and N."""
     system = assemble(scene)
     calls = period_calls(system, scene.trajectories(), min(scene.periods, 400))[0]
-    spent = statistics.median(time_run(scene) for _ in range(repeats)) / scene.periods
+    (spent,) = time_by_turns([partial(simulate, system, scene, scene.periods)], repeats)
     replayed, live = (
         [float(np.abs(found - exact).max()) for found, exact in zip(run[:2], full, strict=False)]
         for run in (solve(scene, full[2]), solve(scene))
     )
     return {
-        "calls": statistics.median(calls), "seconds": spent, "bytes": 8 * system.rows.count,
+        "calls": statistics.median(calls), "seconds": spent / scene.periods, "bytes": 8 * system.rows.count,
         "replayed_m": replayed[0], "replayed_N": replayed[1], "live_m": live[0], "live_N": live[1],
     }  # fmt: skip

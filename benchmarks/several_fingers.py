@@ -2,17 +2,14 @@
 
 import argparse
 import math
-import statistics
-import time
-from collections import deque
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 from digiclay.core.control.blister import Blister
 from digiclay.core.control.methods import find_method
-from digiclay.core.engine.simulation import begin, periods
 from digiclay.core.metrics.summary import compute_metrics, split_fingers
 from digiclay.core.model.trajectory import Path, Waypoint
 from digiclay.core.scene.assembly import assemble
@@ -20,7 +17,8 @@ from digiclay.core.scene.scene_source import find, load
 from digiclay.core.scene.schema import Scene
 from digiclay.core.session.run_scene import run, select_rows
 
-from .report import Report, Row, Steps, tabulate
+from .report import Report, Row, Steps, tabulate, time_by_turns
+from .session_parts import simulate
 
 #: Numbers of fingers, and where ten of them press, mm: two hands.
 COUNTS = (1, 2, 5, 10)
@@ -145,20 +143,14 @@ def measure_near(method: str, name: str, turn: float = TURN) -> tuple[list[Row],
 
 def measure_cost(method: str, count: int, repeats: int) -> list[float]:
     """Return processor time a period of `COUNTS` fingers, s: medians of runs of so many periods, in turns."""
-    made = []
+    works = []
     for fingers in COUNTS:
         depth = PRESSED if method else 39.0
         ways = [[(0.0, x, y, 41.0), (0.3, x, y, depth), (1.0, x, y, depth), (3.0, x + 10, y + 3, depth)]
                 for x, y in PLACES[:fingers]]  # fmt: skip
         scene = make_scene(method, ways, 25)
-        made.append((assemble(scene), scene.trajectories()))
-    times: list[list[float]] = [[] for _ in COUNTS]
-    for _ in range(repeats):
-        for (system, trajectories), spent in zip(made, times, strict=True):
-            started = time.process_time()
-            deque(periods(system, trajectories, begin(system), count), maxlen=0)
-            spent.append((time.process_time() - started) / count)
-    return [statistics.median(spent) for spent in times]
+        works.append(partial(simulate, assemble(scene), scene, count))
+    return [spent / count for spent in time_by_turns(works, repeats)]
 
 
 #: Columns of the tables.
