@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from typing import TypeVar
 
 from digiclay.core.studies.speed_limits import find_free_speed
@@ -23,7 +24,7 @@ from .results import (
     onset_among,
 )
 from .scenes import METHODS, NAMES
-from .simulations import GAUSSIAN, NO_RISE, WINDOWS
+from .simulations import GAUSSIAN, NO_RISE, STAGGERED, WINDOWS
 
 MM = 1e3
 ONE, TWO = METHODS
@@ -442,6 +443,9 @@ def varied(variant: str, results: Results) -> Evidence:
     evidence.why = "It holds where what is followed without the change is followed with it. "
     evidence.why += f"Not so: {'; '.join(evidence.missed)}." if evidence.missed else ""
     return evidence
+
+
+staggered, gaussian = (partial(varied, variant) for variant in (STAGGERED, GAUSSIAN))
 
 
 def _write_drag(one: Dragged) -> str:

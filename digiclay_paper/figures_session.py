@@ -17,7 +17,17 @@ from .scenes import METHODS, NAMES, THIRD
 PRESSING, LIFTING = (0.5, 1.5), (2.4, 3.4)
 
 
-def heights_and_force(sessions: Mapping[str, Session], title: str) -> Any:
+def heights_and_force(results: Results) -> Any:
+    """Draw heights and total force of the session."""
+    return draw_heights(results.session, f"The paper's session{results.slowness}")
+
+
+def heights_at_own_times(results: Results) -> Any:
+    """Draw the same at the times that the session has in the paper."""
+    return draw_heights(results.printed, "The paper's session at its own times")
+
+
+def draw_heights(sessions: Mapping[str, Session], title: str) -> Any:
     """Draw the heights of the same cells, and the total force, side by side for all methods."""
     cells = session_cells(sessions[METHODS[0]].history)
     spots = sessions[METHODS[0]].history["position"][cells] * MM

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from digiclay.cli import main
 
-from digiclay_paper.claims import CLAIMS
+from digiclay_paper.claims import TEXTS
 from digiclay_paper.results import DRAGS
 from digiclay_paper.scenes import COMPARED
 
@@ -82,7 +82,7 @@ def test_method_one_leaves_the_sections_asked_for_and_method_two_a_cross_with_a_
 
 def test_every_claim_has_numbers_those_of_the_metrics_a_verdict_and_a_reason_if_it_fails(text, numbers):
     rows = claims(text)
-    assert len(rows) == len(CLAIMS)
+    assert len(rows) == len(TEXTS["claim"])
     assert [row for row in rows if len(row) != 4 or not all(row[:3])] == []
     assert [row[0] for row in rows if not re.search(r"\d|never lost", row[1])] == []
     assert [row[0] for row in rows if row[2] != "**holds**" and not row[3]] == []

@@ -62,7 +62,7 @@ def test_the_bundled_wheels_are_those_of_the_manifest_with_their_license(content
 def test_the_wheel_has_the_package_and_those_beside_it_and_no_benchmark(wheel: Path) -> None:
     names = set(zipfile.ZipFile(wheel).namelist())
     assert {name.split("/")[0] for name in names if ".dist-info/" not in name} == {"digiclay", *BESIDE}
-    beside = {f"{name}/{path.name}" for name in BESIDE for path in (ROOT / name).glob("*.py")}
+    beside = {f"{name}/{path.name}" for name in BESIDE for path in (ROOT / name).glob("*.*")}
     shipped = {"digiclay/manual/guide.html", "digiclay/sample_shapes/sessions/tap.toml"}
     assert (beside | shipped) - names == set()
     assert len(beside) > 20

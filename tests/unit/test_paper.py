@@ -31,7 +31,7 @@ from digiclay_paper.evidence import (
     trade,
     varied,
 )
-from digiclay_paper.figures_session import heights_and_force
+from digiclay_paper.figures_session import draw_heights
 from digiclay_paper.paper_figures import COLUMNS, NAMED, curves, letter, table
 from digiclay_paper.relief_sections import LIMITS, asked_for, sections
 from digiclay_paper.results import AS_IT_IS, SESSION, WAYS, Dragged, Located, Results, Session, Swing
@@ -143,7 +143,7 @@ def test_a_session_a_method_loses_the_finger_in_is_run_again_slowly_enough(lost:
     assert "lifts at up to 10.0 mm/s, and Method II follows a lift of 6.0 mm/s" in claim.why
     assert "run again 2.1 times as long: Method I never lost, Method II never lost" in claim.why
     # It is drawn with the same cells and scales for both methods.
-    figure = heights_and_force(lost.session, "title")
+    figure = draw_heights(lost.session, "title")
     one, two = (axes for axes in figure.axes if axes.get_label().endswith("heights"))
     assert len(one.get_lines()) == len(two.get_lines()) > 0
     assert one.get_ylim() == two.get_ylim()
