@@ -79,7 +79,7 @@ BENCHMARKS = {
         ("", "mine.py --out results"),
         {
             "files FILE": {"nargs": "*", "help": "more adapters: Python files, see benchmarks/README.md"},
-            "--make-references": "make the references of the problems again, instead (4 minutes)",
+            "--make-references": "make the references of the problems again, instead (10 minutes)",
         },
         needs="scipy",
     ),

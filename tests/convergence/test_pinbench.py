@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from benchmarks.__main__ import main
-from benchmarks.pinbench import run
+from benchmarks.pinbench import reference, run
 from benchmarks.pinbench.problem import Law, read_problems
 
 PROBLEMS = read_problems()
@@ -73,6 +73,16 @@ def test_a_finer_step_of_another_method_comes_to_the_reference(name: str) -> Non
         height, force = {"stiff": (0.3e-6, 0.2e-3), "turbulent_valve": (6e-6, 0.6e-3)}.get(name, (5e-8, 1e-5))
         assert answer.height_error < height, method
         assert answer.force_error < force, method
+
+
+def test_references_that_are_made_again_are_those_of_the_file() -> None:
+    # The files' are of another implementation of the law, good to 1 pm and 0.1 nN as the README says.
+    problem, some = PROBLEMS["turbulent_valve"], slice(0, 1)
+    again = reference.solve_pins(problem, problem.pins[some], *reference.METHODS[0])
+    for key, values, most in zip(("heights", "forces"), again, (1e-12, 1e-10), strict=True):
+        np.testing.assert_allclose(
+            values, np.array(problem.file["reference"][key])[:, some], rtol=0, atol=most
+        )
 
 
 @pytest.mark.parametrize(
