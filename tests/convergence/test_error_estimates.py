@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from digiclay.core.model.valve import Fluid, Valve
 from digiclay.core.scene.scene_source import SAMPLES
-from digiclay.core.scene.schema import Scene, Simulation
+from digiclay.core.scene.schema import STEPPERS, Scene, Simulation
 from digiclay.core.scene.toml_table import resolve
 from digiclay.core.session.accuracy import (
     FINER,
@@ -143,7 +143,7 @@ def draw_scene(random: np.random.Generator, stepper: str) -> Scene:
 FORMING = ("virtual_master", "cell_states", "hybrid", "elastic", "plastic", "viscous")
 
 
-@pytest.mark.parametrize("stepper", ["bernoulli", "richardson", "adaptive"])
+@pytest.mark.parametrize("stepper", STEPPERS)
 def test_an_estimate_covers_the_truth_in_95_of_100_scenes(stepper: str) -> None:
     random, missed = np.random.default_rng(38), []
     for number in range(MANY):

@@ -475,6 +475,13 @@ def test_a_finger_is_lost_where_contact_ends_though_it_rises_no_faster_than_a_pi
     assert [tuple(one) for one in found] == [pytest.approx(one, abs=11e-3) for one in wanted]
 
 
+@pytest.mark.parametrize("rows", [1, 2])
+def test_a_history_of_a_row_or_two_has_no_losses_unless_contact_ends(rows: int) -> None:
+    """A single row has no gradient."""
+    force, ends = np.array([0.4, 0.0])[:rows], rows - 1
+    assert len(summary.find_losses(TIME[:rows], force, np.zeros(rows), 24e-3)) == ends
+
+
 @pytest.mark.parametrize(
     ("lost", "said"),
     [

@@ -10,7 +10,7 @@ from typing import Any
 
 from ..core.base.errors import DigiclayError, OutputError
 from ..core.files import run_folder
-from ..core.metrics.metric_table import ERRORS, METRICS, RUN, describe_errors
+from ..core.metrics.metric_table import ERRORS, METRICS, RUN, describe_errors, describe_losses
 from ..core.scene.toml_table import format_scene
 from ..core.studies.job_table import JOB, SCENE, Job, JobSeries, Outputs
 from ..core.studies.series import Kind, open_series
@@ -131,6 +131,7 @@ class Folder:
                 (fact.label, _format(metrics.get(name), fact.factor, fact.shown))
                 for name, fact in FACTS.items()
             ),
+            ("losses", describe_losses(metrics)),
             ("not to be trusted", metrics.get("beyond_a_finger", "")),
             (
                 "errors",

@@ -19,7 +19,7 @@ from ..scene.recorder import HistoryWriter, Recorder, Recording, Stretch
 from ..scene.schema import Scene
 from ..session.accuracy import Errors, compare, explain_absence, make_reference
 from ..session.memory_limit import check_memory
-from ..session.run_scene import Result, evaluate, report
+from ..session.run_scene import Result, evaluate, measure_losses, report
 from .play import Instant, Play, begin_play, keep_runs, locate_fingers, make_divergence_error, play_all
 from .structure import Findings, describe_structure
 
@@ -123,7 +123,10 @@ class Sums:
             near = [np.argmin((grid.x - x) ** 2 + (grid.y - y) ** 2) for x, y in places]
             self._ways[same] = moments, tip, np.unique(near)
         moments, tip, cells = self._ways[same]
-        metrics = compute_metrics_from_sums(sums, moments, tip, grid.positions, scene.set_point, cells)
+        metrics: dict[str, Any] = {
+            **compute_metrics_from_sums(sums, moments, tip, grid.positions, scene.set_point, cells),
+            **measure_losses(scene, play.batch.systems[index], moments, [(total, tip[:, 2])]),
+        }
         return report(scene, now.ended(index), metrics)
 
     def _sum(self, active: ActiveSet) -> Floats:

@@ -312,8 +312,9 @@ def find_losses(time: Floats, total_force: Floats, height: Floats, free_speed: f
     A loss lasts until the next contact, until the fingertip rises faster, or to the end.
     """
     losses = []
-    for end in find_contact_ends(time, total_force).tolist():
-        rise = np.gradient(height, time)
+    ends = find_contact_ends(time, total_force)  # none in a single row, which has no gradient
+    rise = np.gradient(height, time) if ends.size else height
+    for end in ends.tolist():
         if rise[(time > end - 0.2) & (time <= end + 0.1)].max() <= free_speed:
             over = time[(time > end) & ((total_force > 0.0) | (rise > free_speed))]
             losses.append(Loss(end, float(over[0] if over.size else time[-1]) - end))

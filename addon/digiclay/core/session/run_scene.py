@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import platform
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import MappingProxyType
@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.arrays import Floats
 from ..base.errors import explain_os_error
 from ..engine.simulation import begin, periods
 from ..engine.system import System
@@ -113,6 +114,18 @@ class Ended(NamedTuple):
     losses: int | None
 
 
+def measure_losses(
+    scene: Scene, system: System, time: Floats, felt: Iterable[tuple[Floats, Floats]]
+) -> dict[str, list[dict[str, float]]]:
+    """Return losses and time without contact, s, of fingers by force, N, and height, m, (t,); {}: no loss."""
+    lost = []
+    for total_force, height in felt:
+        losses = find_losses(time, total_force, height, system.fastest)
+        lost.append({"losses": len(losses), "time": sum(loss.time for loss in losses)})
+    # Only what is to hold a force can lose a fingertip.
+    return {"lost": lost} if scene.set_point and any(one["losses"] for one in lost) else {}
+
+
 def evaluate(
     scene: Scene,
     system: System,
@@ -132,19 +145,16 @@ def evaluate(
         "total_force": rows["force"].sum(axis=1),
         "position": system.grid.positions,
     }
-    each, depths, lost = [], [], []
+    each, depths, felt = [], [], []
     for finger, own in zip(scene.fingers, split_fingers(history), strict=True):
         each.append(compute_metrics(own, scene.set_point))
-        losses = find_losses(moments, own["total_force"], own["fingertip"][:, 2], system.fastest)
-        lost.append({"losses": len(losses), "time": sum(loss.time for loss in losses)})
+        felt.append((own["total_force"], own["fingertip"][:, 2]))
         if system.cell.touch is not None and finger.fingertip:
             depths.append(find_indentations(finger.fingertip, own))
     metrics: dict[str, Any] = take_worst(each)
     if system.fingers > 1:
         metrics["fingers"] = each
-    # Only what is to hold a force can lose a fingertip.
-    if scene.set_point and any(one["losses"] for one in lost):
-        metrics["lost"] = lost
+    metrics |= measure_losses(scene, system, moments, felt)
     if depths:
         depth = np.max(depths, axis=0)
         metrics["max_indentation"] = float(depth.max())

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from ..base.errors import OutputError
 from ..control.methods import find_method
 from ..files.run_folder import format_json, read_json, write_whole
-from ..metrics.metric_table import ERRORS
+from ..metrics.metric_table import ERRORS, describe_losses
 from ..scene.toml_table import format_scene, write_part
 from .axes import Axis, Point, Record
 from .evaluation import FIGURES, TIMES, evaluate
@@ -161,13 +161,16 @@ def format_table(
     records: Iterable[Record],
     names: Sequence[str],
 ) -> str:
-    """Return points as CSV: varied parameters, metrics, time and errors, failure; SI units, in the header."""
+    """Return points as CSV: varied parameters, metrics, time and errors, losses, failure; SI units on top."""
     names = list(dict.fromkeys((*names, *EFFORT)))
     units = [*varied, *((name, FIGURES[name].unit) for name in names)]
-    table: list[Sequence[Any]] = [[*(f"{name} ({unit})" if unit else name for name, unit in units), "error"]]
+    table: list[Sequence[Any]] = [
+        [*(f"{name} ({unit})" if unit else name for name, unit in units), "lost", "error"]
+    ]
     for values, record in zip(rows, records, strict=True):
         figures = record.get("figures", {})
-        table.append([*values, *map(figures.get, names), record.get("error", "")])
+        lost, error = describe_losses(record), record.get("error", "")
+        table.append([*values, *map(figures.get, names), lost, error])
     return format_csv(table)
 
 
