@@ -1,8 +1,10 @@
-"""Figures of the pages beside what the commands give now: no page is stale unseen."""
+"""Figures of the pages beside what the commands give now, or stored results: no page is stale unseen."""
 
 import argparse
+import csv
 import math
 import re
+import subprocess
 import tomllib
 from collections.abc import Mapping
 from functools import cache
@@ -19,33 +21,42 @@ from .kinds import PAPER
 from .report import Report, Row, Steps, tabulate
 
 ROOT = Path(__file__).parents[1]
-#: A number of a page.
-NUMBER = re.compile(r"\d+(?:\.\d+)?(?:e-?\d+)?")
+RESULTS = Path(__file__).with_name("results")
+#: A number of a page, and the blank between its thousands.
+NUMBER, THOUSANDS = re.compile(r"\d+(?:\.\d+)?"), re.compile(r"(?<=\d) (?=\d{3}\b)")
+#: Factors of units that only pages have, beside `FACTORS`.
+UNITS = {**FACTORS, "ms": 1e3, "nm": 1e9, "pm": 1e12, "µN": 1e6, "nN": 1e9, "million": 1e-6}
 #: A figure where its row of the table says nothing else: two digits may be off by 5 %.
-USUAL: Row = {"number": 1, "scene": PAPER, "set": [], "off": 0.05, "slow": False}
+USUAL: Row = {
+    "number": 1, "scene": PAPER, "set": [], "off": 0.05, "slow": False, "stored": "", "where": {}, "head": "",
+    "rows": [],
+}  # fmt: skip
 #: Motion of each speed, and the fastest that is tried, m/s.
 WAYS: dict[str, Drag | Lift] = dict(zip(SPEEDS, (Drag(), Lift()), strict=True))
 FASTEST = 80e-3
 
 
-def read_figures() -> list[Row]:
-    """Return the figures of figures.toml; a row with several metrics has numbers that follow one another."""
-    table = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
+@cache
+def read_plan() -> dict[str, Any]:
+    """Return figures.toml."""
+    return tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
+
+
+def read_figures(page: str | None = None) -> list[Row]:
+    """Return the figures of a page, or of all, as the text has them; OutputError where one is missing."""
     figures: list[Row] = []
-    for row in table["figure"]:
-        figure = {**USUAL, **row}
-        for place, (metric, unit) in enumerate(row["metrics"]):
-            figures.append({**figure, "metric": metric, "unit": unit, "number": figure["number"] + place})
+    for row in ({**USUAL, **given} for given in read_plan()["figure"] if page in (None, given["page"])):
+        text = (ROOT / row["page"]).read_text(encoding="utf-8")
+        rest = text[text.find(row["head"]) :]
+        for label, where in row["rows"] or [[row["after"], {}]]:
+            rest = rest.partition(label)[2]
+            numbers = NUMBER.findall(THOUSANDS.sub("", rest))
+            for place, (metric, unit, *own) in enumerate(row["metrics"], row["number"]):
+                if len(numbers) < place:
+                    raise OutputError(f"{row['page']} has no number {place} behind {label!r}.")
+                found = {"of": metric, "unit": unit, "behind": label, "text": numbers[place - 1]}
+                figures += [{**row, **found, "where": row["where"] | where | dict(*own)}] if metric else []
     return figures
-
-
-def read_page(figure: Row, text: str) -> float:
-    """Return the number that a page has for a figure; OutputError when it has no such text or number."""
-    _, _, rest = text.partition(figure["after"])
-    numbers = NUMBER.findall(rest)
-    if len(numbers) < figure["number"]:
-        raise OutputError(f"{figure['page']} has no number {figure['number']} behind {figure['after']!r}.")
-    return float(numbers[figure["number"] - 1])
 
 
 @cache
@@ -58,36 +69,60 @@ def measure_scene(name: str, settings: tuple[str, ...], metric: str, *, errors: 
     return (done.estimate_errors() or done).metrics if errors else done.metrics
 
 
-def judge(figure: Row) -> Row:
-    """Return a figure with the number of its page, the one of now, their ratio, and whether it is stale."""
-    metric, settings = figure["metric"], tuple(figure["set"])
+@cache
+def read_stored(name: str) -> tuple[list[Row], str]:
+    """Return the rows of a stored result, and its name with the commit it was stored in, and the date."""
+    lines = (RESULTS / name).read_text(encoding="utf-8").splitlines()
+    words = ["git", "log", "-1", "--format=%h, %as", "--", name]
+    stored = subprocess.run(words, cwd=RESULTS, capture_output=True, text=True, check=False).stdout
+    return list(csv.DictReader(line for line in lines if line[0] != "#")), f"{name}, {stored.strip()}"
+
+
+def find_stored(figure: Row) -> float:
+    """Return a figure of a stored result, of several columns the nearest; OutputError unless of one row."""
+    wanted = figure["where"].items()
+    rows = [row for row in read_stored(figure["stored"])[0] if wanted <= row.items()]
+    if len(rows) != 1:
+        raise OutputError(f"{figure['stored']} must have one row of {figure['where']} (got {len(rows)}).")
+    factor = UNITS.get(figure["unit"], 1.0)
+    values = (factor * float(rows[0][name]) for name in figure["of"].split(" or "))
+    return min(values, key=lambda value: abs(value - float(figure["text"])))
+
+
+def find_run(figure: Row) -> float:
+    """Return a figure of a run of now."""
+    metric, settings = figure["of"], tuple(figure["set"])
     of_speed = metric if metric in WAYS else ""
     found = measure_scene(figure["scene"], settings, of_speed, errors=metric in ERRORS)[metric]
-    now = math.nan if found is None else found * FACTORS.get(figure["unit"], 1.0)
-    there = read_page(figure, (ROOT / figure["page"]).read_text(encoding="utf-8"))
-    ratio = now / there if there else math.nan
-    stale = "" if abs(ratio - 1.0) <= figure["off"] else "STALE"
-    behind = " ".join(figure["after"].strip("\n |").split())
-    return {**figure, "behind": behind[-40:], "there": there, "now": now, "ratio": ratio, "stale": stale}
+    return math.nan if found is None else found * UNITS.get(figure["unit"], 1.0)
+
+
+def judge(figure: Row) -> Row:
+    """Return a figure with the numbers of its page and of its source, and whether it is stale."""
+    stored, text = figure["stored"], figure["text"]
+    there, digits = float(text), len(text.partition(".")[2])
+    now = find_stored(figure) if stored else find_run(figure)
+    off = 0.0 if stored else figure["off"] * there
+    near = abs(now - there) <= off or round(now, digits) == there
+    source = read_stored(stored)[1] if stored else "run"
+    behind = " ".join(figure["behind"].strip("\n |").split())[-40:]
+    judged = {"behind": behind, "there": there, "now": now, "source": source}
+    return {**figure, **judged, "stale": "" if near else "STALE"}
 
 
 COLUMNS = {
-    "page": "page", "behind": "behind", "metric": "metric", "unit": "unit", "of the page": "there .4g",
-    "now": "now .4g", "ratio": "ratio .3f", "off by more than": "off g", "": "stale",
+    "page": "page", "behind": "behind", "figure": "of", "unit": "unit", "of the page": "there .4g",
+    "of the source": "now .4g", "source": "source", "": "stale",
 }  # fmt: skip
 
 
 def measure(arguments: argparse.Namespace, steps: Steps) -> Report:
     """Compare the figures of one page, or of all."""
-    figures = read_figures()
-    pages = list(dict.fromkeys(figure["page"] for figure in figures))
+    pages = list(dict.fromkeys(row["page"] for row in read_plan()["figure"]))
     if arguments.page not in (None, *pages):
         raise OutputError(f"PAGE must be one of {', '.join(pages)} (got {arguments.page}).")
-    chosen = [
-        figure
-        for figure in figures
-        if arguments.page in (None, figure["page"]) and not (arguments.quick and figure["slow"])
-    ]
+    figures = read_figures(arguments.page)
+    chosen = [figure for figure in figures if not (arguments.quick and figure["slow"])]
     rows = [judge(figure) for figure in steps.through(chosen, lambda figure: figure["page"])]
     stale = sum(row["stale"] != "" for row in rows)
     lines = [*tabulate(rows, COLUMNS, 4), f"{stale} of {len(rows)} figures are stale."]

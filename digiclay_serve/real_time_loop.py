@@ -211,3 +211,4 @@ def _hand_over(session: Session, writer: PartWriter | None) -> None:
     take = make_take(session.scene, session.recording, end)
     if take is not None:
         writer.put(take)
+        writer.efforts[writer.session] = _find_effort(session)

@@ -119,14 +119,14 @@ def carry_out(arguments: argparse.Namespace) -> int:
             )
         finally:
             written = writer.finish() if writer else []
-        figures["counts"] = doors.close()
+        figures |= {"counts": doors.close(), "takes": list(writer.efforts.values()) if writer else []}
     if arguments.report is not None:
         write_whole(arguments.report, format_json({**figures, "diverged": session.diverged}))
     if not arguments.quiet:
         for line in _summary(figures):
             _tell(line)
-    for path in written:
-        _tell(f"take written to {path}")
+    for path, effort in zip(written, figures["takes"], strict=False):
+        _tell(f"take written to {path}: {effort['simulated']:.1f} s in real time; {describe_errors(effort)}")
     if writer and writer.failure:
         raise OutputError(writer.failure)
     return 0

@@ -267,11 +267,13 @@ class PartWriter(AbstractContextManager["PartWriter"]):
     def __init__(self, folder: Path, *, overwrite: bool = False) -> None:
         self.folder, self._overwrite = folder, overwrite
         self.failure = ""
+        #: Simulated time and errors of each take by its number, as the metrics of a run have them.
+        self.efforts: dict[int, dict[str, Any]] = {}
         self._old: list[Path] = []
         self._claim = ExitStack()
         self._parts: queue.Queue[tuple[Path, Take] | None] = queue.Queue(WAITING)
         self._thread = threading.Thread(target=self._write_all, daemon=True)
-        self._session = self._part = 1
+        self.session = self._part = 1
 
     def __enter__(self) -> PartWriter:
         claim = claim_folder(self.folder, overwrite=self._overwrite, content=TAKE)
@@ -285,7 +287,7 @@ class PartWriter(AbstractContextManager["PartWriter"]):
         if self.failure:
             return
         try:
-            self._parts.put_nowait((self.folder / f"take_{self._session:03}_part_{self._part:05}.npz", take))
+            self._parts.put_nowait((self.folder / f"take_{self.session:03}_part_{self._part:05}.npz", take))
         except queue.Full:
             self.failure = f"The disk is too slow for the take: {self.folder} has what was written until now."
         self._part += 1
@@ -293,7 +295,7 @@ class PartWriter(AbstractContextManager["PartWriter"]):
     def end_session(self) -> None:
         """Have the next part begin a take of its own."""
         if self._part > 1:
-            self._session, self._part = self._session + 1, 1
+            self.session, self._part = self.session + 1, 1
 
     def finish(self) -> list[Path]:
         """Wait for the disk, and join the parts of each take; return the takes."""

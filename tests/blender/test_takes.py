@@ -20,6 +20,7 @@ from digiclay.core.session.take import Take
 from digiclay.device import view
 from digiclay.device.instant import Instant
 from digiclay.live import beds, tick
+from digiclay.overlay.sections import effort_message, error_message
 from digiclay.recorded import bake, takes
 from digiclay.roles import ROLE, fingertip_of
 from digiclay.sessions import running
@@ -66,6 +67,23 @@ def record(clay: Any) -> str:
     assert bpy.ops.digiclay.take_keep(name="A press") == {"FINISHED"}
     tick.stop(clay.session_uid)
     return takes.list_takes(clay)[-1].number
+
+
+def test_a_take_states_time_and_error_of_its_session_also_in_another_file(clay, tmp_path):
+    begin_recording(clay)
+    press(clay)
+    session, name = running.find(clay), clay.name
+    assert session.errors is not None
+    bpy.ops.digiclay.take_keep(name="A press")
+    takes.add(clay, takes.read(clay), "Without a session")
+    tick.stop(clay.session_uid)
+    save_and_open(tmp_path / "kept.blend")
+    known, unknown = (one.effort for one in takes.list_takes(bpy.data.objects[name]))
+    # 120 periods, as long as one took of late.
+    assert known == pytest.approx((120 * session.clock.cost, *session.errors[:2]))
+    assert effort_message(known).endswith(error_message(session.errors[:2]))
+    assert "not estimated" in effort_message(unknown)
+    assert "not estimated yet" in effort_message(known[:1])
 
 
 def test_a_replay_in_another_state_ends_bit_for_bit_as_the_take_did(clay):

@@ -1,36 +1,79 @@
-"""Figures of the pages are what the commands give now; one that is stale is told."""
+"""Figures of the pages are what the commands give now, or stored; one that is stale is told."""
 
+import re
 from pathlib import Path
 from typing import Any
 
 import pytest
+from digiclay.core.base.errors import OutputError
 
 from benchmarks import figures
 from benchmarks.__main__ import main
 
-QUICK = [figure for figure in figures.read_figures() if not figure["slow"]]
+FIGURES = [figure for figure in figures.read_figures() if not figure["slow"]]
+RUNS = [figure for figure in FIGURES if not figure["stored"]]
+STORED = sorted({(figure["page"], figure["stored"]) for figure in FIGURES if figure["stored"]})
 README = (figures.ROOT / "README.md").read_text(encoding="utf-8")
+STABILITY = (figures.ROOT / "docs/stability.md").read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize("figure", QUICK, ids=lambda figure: f"{figure['page']} {figure['metric']}")
+@pytest.mark.parametrize("figure", RUNS, ids=lambda figure: f"{figure['page']} {figure['of']}")
 def test_a_figure_of_a_page_is_what_the_command_gives(figure: Any) -> None:
     judged = figures.judge(figure)
     assert judged["stale"] == "", judged
 
 
+@pytest.mark.parametrize(("page", "stored"), STORED)
+def test_a_figure_of_a_page_is_that_of_its_stored_result(page: str, stored: str) -> None:
+    judged = [figures.judge(one) for one in FIGURES if (one["page"], one["stored"]) == (page, stored)]
+    assert [one for one in judged if one["stale"]] == []
+    assert len(judged) > 10
+
+
+#: A cell of a table that begins with a number, as a measured one does.
+MEASURED = re.compile(r"[*~]*\d[\d.]*( \d{3})*( ?([µmnp]?[msNA]|mm/s|x|%|MB|million))?\b")
+
+
+def count_measured(text: str) -> int:
+    """Return how many rows of a page's tables have a number in a cell that is not the first."""
+    rows = (line.strip()[1:-1].split("|")[1:] for line in text.splitlines() if line.startswith("|"))
+    return sum(any(MEASURED.match(cell.strip()) for cell in row) for row in rows)
+
+
+def test_each_page_with_a_table_of_figures_has_rows_or_says_why_not() -> None:
+    told = {row["page"] for row in figures.read_plan()["figure"]}, set(figures.read_plan()["without"])
+    assert told[0] & told[1] == set()
+    pages = [figures.ROOT / "README.md", *sorted((figures.ROOT / "docs").glob("*.md"))]
+    counts = {str(page.relative_to(figures.ROOT)): page.read_text(encoding="utf-8") for page in pages}
+    measured = {page for page, text in counts.items() if count_measured(text) > 2 or "| commit |" in text}
+    assert measured - (told[0] | told[1]) == set()
+
+
 @pytest.mark.parametrize(
-    ("page", "code", "said"),
+    ("name", "page", "code", "said"),
     [
-        (README, 0, "0 of 1 figures are stale."),
-        (README.replace("26.5 s", "26.6 s"), 1, "1 of 1 figures are stale."),
-        ("", 2, "README.md has no number 2 behind"),
+        ("README.md", README, 0, "0 of 1 figures are stale."),
+        ("README.md", README.replace("26.5 s", "26.6 s"), 1, "1 of 1 figures are stale."),
+        ("README.md", "", 2, "README.md has no number 2 behind"),
+        ("docs/stability.md", STABILITY, 0, "\n0 of "),
+        ("docs/stability.md", STABILITY.replace("| 7.64 |", "| 7.63 |"), 1, "\n1 of "),
+        ("docs/stability.md", STABILITY.replace("| c0 = 0 |", "| c0 = 1 |"), 2, "behind '| c0 = 0 |'"),
+        ("docs/stability.md", "", 2, "docs/stability.md has no number 1 behind"),
     ],
 )
 def test_a_stale_page_is_told_and_one_that_has_lost_its_figure_refused(
-    page: str, code: int, said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Any
+    name: str, page: str, code: int, said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Any
 ) -> None:
     monkeypatch.setattr(figures, "ROOT", tmp_path)
-    (tmp_path / "README.md").write_text(page, encoding="utf-8")
-    assert main(["figures", "README.md", "--quiet"]) == code
+    (tmp_path / "docs").mkdir()
+    (tmp_path / name).write_text(page, encoding="utf-8")
+    assert main(["figures", name, "--quiet"]) == code
     told = capsys.readouterr()
     assert said in told.out + told.err
+
+
+def test_a_figure_of_no_row_of_its_stored_result_or_of_several_is_refused() -> None:
+    one = next(figure for figure in FIGURES if figure["stored"] == "stiff.csv")
+    for where in ({"case": "none"}, {"stepper": "bernoulli"}):
+        with pytest.raises(OutputError, match=r"stiff\.csv must have one row"):
+            figures.judge({**one, "where": where})

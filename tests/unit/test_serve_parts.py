@@ -115,6 +115,15 @@ def test_a_new_pose_begins_its_period_early_by_one_at_most(restless: bool) -> No
     assert figures["elapsed"]["p50"] > 0.0
 
 
+def test_each_take_has_its_simulated_time_and_errors_or_why_there_are_none(tmp_path: Path) -> None:
+    doors, session = Asked(restless=False), begin_session(STILL)
+    with PartWriter(tmp_path / "out") as writer:
+        run_session(session, cast(Doors, doors), writer, 1.0, doors.stopped, print)
+        assert len(writer.finish()) == 1
+    simulated = pytest.approx(doors.shown[-1][0] * session.system.period)
+    assert writer.efforts == {1: {"simulated": simulated, "errors_absent": "not yet"}}
+
+
 def test_frames_and_report_have_the_errors_since_the_last_reset() -> None:
     session = begin_session(resolve({**SMALL, "trajectory": WAIT}))
     told = [make_frame(session).errors]

@@ -47,7 +47,7 @@ def write_recovery(*_: Any) -> None:
     for session in running.list_sessions():
         bed, take = find_bed(session.uid, session.name), takes.read_recording(session)
         if bed is not None and take is not None:
-            running.put(replace(session, saved_take=takes.add(bed, take, fingers=session.numbers).number))
+            running.put(replace(session, saved_take=takes.add(bed, take, session=session).number))
 
 
 @bpy.app.handlers.persistent

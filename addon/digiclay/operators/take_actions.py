@@ -24,6 +24,7 @@ from ..core.session.take import play as play_take
 from ..device import view
 from ..device.instant import find_ellipsoids
 from ..live import beds, handlers, tick
+from ..overlay.sections import effort_message
 from ..recorded import bake, takes
 from ..recorded.pointer_strokes import play_strokes, read_strokes
 from ..roles import bed_of, fingertips_of
@@ -70,8 +71,9 @@ def keep_take(operator: Any, context: Any) -> set[str] | None:
     if take is None:
         operator.report({"WARNING"}, localize("Nothing was recorded: the session was paused"))
         return {"CANCELLED"}
-    entry = takes.add(bed, take, operator.name, session.numbers)
-    operator.report({"INFO"}, localize("{}: {:.1f} s kept", entry.name, entry.seconds))
+    entry = takes.add(bed, take, operator.name, session)
+    words = localize("{}: {:.1f} s kept", entry.name, entry.seconds)
+    operator.report({"INFO"}, f"{words}. {effort_message(entry.effort)}")
     return None
 
 
@@ -238,7 +240,8 @@ class ReplayTake(TimedAction, bpy.types.Operator):
         )  # fmt: skip
         beds.write(bed, begun[0])
         view.show_state(bed, system, self._state)
-        seconds = f"{self._take.duration:.1f} s"
+        effort = effort_message(takes.find(bed, self.take).effort)
+        seconds = f"{self._take.duration:.1f} s ({effort})"
         if state == self._take.end:
             self.report({"INFO"}, localize("Replayed {}: it ends in the same state, bit for bit", seconds))
             return {"FINISHED"}

@@ -1,7 +1,7 @@
 """Sections of the overlay, and their placement in a view; no Blender."""
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -132,11 +132,18 @@ class Pen:
             self.picture.words.append(Words(x + 3.5 * radius, y, size, self.look.ink, text))
 
 
-def error_message(errors: tuple[float, float] | None) -> str:
+def error_message(errors: Sequence[float] | None) -> str:
     """Return the text of the estimated errors of a height, m, and of a cell's force, N."""
     if errors is None:
         return localize("Solver error: not estimated yet")
     return localize("Solver error: about {}, {}", _size(errors[0] * 1e6, "µm"), _size(errors[1] * 1e3, "mN"))
+
+
+def effort_message(effort: tuple[float, ...]) -> str:
+    """Return the text of the time that a take took, s, and of its errors, or of what is not known."""
+    if not effort:
+        return localize("Time and error not estimated: replay it in finer steps")
+    return localize("{:.2g} s of computing. {}", effort[0], error_message(effort[1:] or None))
 
 
 def force_message(force: float, *, beyond: bool = False, hardest: float | None = None) -> str:

@@ -3,7 +3,7 @@
 from typing import Any
 
 from ..live import beds, follow
-from ..overlay.sections import error_message
+from ..overlay.sections import effort_message, error_message
 from ..recorded import bake, takes
 from ..roles import bed_of
 from ..sessions import running
@@ -116,6 +116,7 @@ def takes_panel(sidebar: Any, context: Any) -> None:
         baking.source, baking.take = "TAKE", entry.number
         row.operator("digiclay.take_export", text="", icon="EXPORT").take = entry.number
         row.operator("digiclay.take_remove", text="", icon="X").take = entry.number
+        draw_lines(layout, effort_message(entry.effort), "NONE")
     layout.operator("digiclay.play_strokes", icon="CURVE_PATH")
     layout.separator()
     if bake.is_baked(bed):

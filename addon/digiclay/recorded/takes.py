@@ -33,13 +33,16 @@ class Entry(NamedTuple):
     #: The user's.
     name: str
     seconds: float
+    #: What its session took, s, and its estimated errors of height, m, and force, N, where they are known.
+    effort: tuple[float, ...]
 
 
 def list_takes(bed: Any) -> list[Entry]:
     """Return the takes of a bed, oldest first."""
     takes = bed.get(PROPERTY) or {}
     numbers = sorted(takes.keys(), key=int)
-    return [Entry(number, takes[number]["name"], takes[number]["seconds"]) for number in numbers]
+    rows = ((number, takes[number]) for number in numbers)
+    return [Entry(number, row["name"], row["seconds"], tuple(row.get("effort", ()))) for number, row in rows]
 
 
 def find(bed: Any, number: str = "") -> Entry:
@@ -60,16 +63,17 @@ def read_recording(session: Running) -> Take | None:
     return None if recording is None else make_take(session.scene, recording, session.snapshot)
 
 
-def add(bed: Any, take: Take, name: str = "", fingers: tuple[int, ...] = ()) -> Entry:
-    """Add a take to a bed, with the numbers of its fingertips; without a name it gets its number."""
+def add(bed: Any, take: Take, name: str = "", session: Running | None = None) -> Entry:
+    """Add a take to a bed, with fingertips, time and errors of its session; without a name by its number."""
     if PROPERTY not in bed:
         bed[PROPERTY] = {}
     takes = bed[PROPERTY]
     number = str(max(map(int, takes.keys()), default=0) + 1)
     takes[number] = {"name": name or f"Take {number}", "seconds": take.duration, "data": to_bytes(take)}
-    if fingers:
-        takes[number]["fingers"] = bytes(fingers)
-    return Entry(number, takes[number]["name"], take.duration)
+    if session:
+        takes[number]["fingers"] = bytes(session.numbers)
+        takes[number]["effort"] = [take.periods * session.clock.cost, *(session.errors or ())[:2]]
+    return find(bed, number)
 
 
 def keep_recording(bed: Any, session: Running) -> str:
@@ -77,7 +81,7 @@ def keep_recording(bed: Any, session: Running) -> str:
     take = read_recording(session)
     if take is None:
         return ""
-    entry = add(bed, take, fingers=session.numbers)
+    entry = add(bed, take, session=session)
     return localize("The recording ended and was kept as {} ({:.1f} s)", entry.name, entry.seconds)
 
 

@@ -11,7 +11,7 @@ from ..base.quantity import find_nearest_name
 from ..batch.run_together import measure_together
 from ..batch.structure import Findings, describe_structure
 from ..control.methods import find_method
-from ..metrics.metric_table import ERRORS, METRICS, RUN, describe_errors, describe_losses
+from ..metrics.metric_table import ERRORS, METRICS, RUN, describe_errors
 from ..scene.schema import Scene
 from ..session.accuracy import describe_bends, make_reference
 from ..session.run_scene import Result, run
@@ -37,8 +37,6 @@ RUNS = 32
 #: Bytes a batch may take for what the metrics need of its runs, and bytes that is a row: a run's history goes
 #: by unseen.
 BUDGET, BYTES_A_ROW = 2**30, 41
-#: Points at which a fingertip was lost that a line names.
-MOST_LOST = 3
 #: Where a record says why its point was run by itself although it stood in a batch.
 ALONE = "alone"
 #: What a record says beside its figures, where there is anything to say.
@@ -94,7 +92,7 @@ def has_errors(record: Record) -> bool:
 
 
 def describe_effort(records: Mapping[int, Record]) -> str:
-    """Return run time and largest errors of points, where these were estimated, and which lost contact."""
+    """Return the run time of points and their largest errors, and where these were estimated."""
     figures = {index: record["figures"] for index, record in sorted(records.items()) if "figures" in record}
     judged = {index: found for index, found in figures.items() if found.get("height_error") is not None}
     spent = sum(found.get("run_time") or 0.0 for found in figures.values())
@@ -105,14 +103,7 @@ def describe_effort(records: Mapping[int, Record]) -> str:
         worst = {name: max(found[name] for found in judged.values()) for name in ERRORS}
         named = "" if len(judged) == len(figures) else f": {', '.join(map(str, judged))}"
         where = f" at most, estimated at {len(judged)} of {len(figures)} points{named}"
-    lost = [
-        f"point {index} {describe_losses(record)}"
-        for index, record in sorted(records.items())
-        if "lost" in record
-    ]
-    more = f" and {len(lost) - MOST_LOST} more" if len(lost) > MOST_LOST else ""
-    told = f"; {len(lost)} lost the fingertip: {', '.join(lost[:MOST_LOST])}{more}" if lost else ""
-    return f"{len(figures)} runs took {spent:.2g} s; {describe_errors(worst)}{where}{told}"
+    return f"{len(figures)} runs took {spent:.2g} s; {describe_errors(worst)}{where}"
 
 
 def make_bundles(points: Sequence[Point]) -> Bundles:
