@@ -116,7 +116,7 @@ def test_the_table_names_axes_and_metrics_with_their_si_units() -> None:
     main(["sweep", "my.toml", "--quiet", *axes, "--out", "out"])
     assert list(rows("out")[0]) == [
         "layout.pitch (m)", "rfd (N)", "lag_mean (m)", "contact_share (1)", "run_time (s)",
-        "height_error (m)", "force_error (N)", "error",
+        "height_error (m)", "force_error (N)", "lost", "error",
     ]  # fmt: skip
     assert [line["layout.pitch (m)"] for line in rows("out")] == ["0.003", "0.0035"]
 

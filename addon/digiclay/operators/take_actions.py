@@ -72,8 +72,8 @@ def keep_take(operator: Any, context: Any) -> set[str] | None:
         operator.report({"WARNING"}, localize("Nothing was recorded: the session was paused"))
         return {"CANCELLED"}
     entry = takes.add(bed, take, operator.name, session)
-    words = localize("{}: {:.1f} s kept", entry.name, entry.seconds)
-    operator.report({"INFO"}, f"{words}. {effort_message(entry.effort)}")
+    words = localize("{}: {:.1f} s kept. {}", entry.name, entry.seconds, effort_message(entry.effort))
+    operator.report({"INFO"}, words)
     return None
 
 
