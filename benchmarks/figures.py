@@ -22,8 +22,8 @@ from .report import Report, Row, Steps, tabulate
 
 ROOT = Path(__file__).parents[1]
 RESULTS = Path(__file__).with_name("results")
-#: A number of a page, and the blank between its thousands.
-NUMBER, THOUSANDS = re.compile(r"\d+(?:\.\d+)?"), re.compile(r"(?<=\d) (?=\d{3}\b)")
+#: A number of a page, and what is between its thousands.
+NUMBER, THOUSANDS = re.compile(r"\d+(?:\.\d+)?"), re.compile(r"(?<=\d)[ ,](?=\d{3}\b)")
 #: Factors of units that only pages have, beside `FACTORS`.
 UNITS = {**FACTORS, "ms": 1e3, "nm": 1e9, "pm": 1e12, "µN": 1e6, "nN": 1e9, "million": 1e-6}
 #: A figure where its row of the table says nothing else: two digits may be off by 5 %.
