@@ -53,6 +53,7 @@ def assert_figures(found: Any, alone: Result) -> None:
     for name in (*METRICS, "losses", "control_periods", "incomplete"):
         value, unit = alone.metrics[name], alone.metrics["units"].get(name, "1")
         assert found.metrics["units"].get(name, "1") == unit
+        assert unit in ABSOLUTE, f"{name} is in {unit}: ABSOLUTE, above, needs its tolerance"
         expected = value if value is None else pytest.approx(value, rel=RELATIVE, abs=ABSOLUTE[unit])
         assert found.metrics[name] == expected, name
 

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,11 +16,23 @@ LARGEST_EXPONENT = 300.0
 class ExponentialLaw:
     """Base of the contact laws ``T(x) = (b/m) (exp(m (x - x0)) - 1)``, whatever their parameters are."""
 
-    stiffness: float
-    exponent: float
-    offset: float
-    share: float
-    """b, N/m; m, 1/m; x0, m; share f_d of the force that a cell carries. Parameters or properties."""
+    if TYPE_CHECKING:  # parameters or properties of each law
+
+        @property
+        def stiffness(self) -> float:
+            """Stiffness at first touch b, N/m."""
+
+        @property
+        def exponent(self) -> float:
+            """Rate of stiffening m, 1/m."""
+
+        @property
+        def offset(self) -> float:
+            """Indentation x0 at which force begins, m."""
+
+        @property
+        def share(self) -> float:
+            """Share f_d of the force that a cell carries."""
 
     def __init_subclass__(cls, **given: Any) -> None:
         super().__init_subclass__(**given)
