@@ -12,10 +12,12 @@ from pathlib import Path
 from typing import Any
 
 from digiclay.core.base.errors import OutputError
-from digiclay.core.metrics.metric_table import ERRORS, FACTORS, SPEEDS
+from digiclay.core.metrics.metric_table import ERRORS, FACTORS
 from digiclay.core.scene.scene_source import Setting, find, load
 from digiclay.core.session.run_scene import run
-from digiclay.core.studies.speed_limits import Criterion, Drag, Lift, find_largest_speed
+from digiclay.core.studies.speed_limits import Criterion, find_largest_speed
+
+from digiclay_study.method_trials import HIGH, LIMITS
 
 from .kinds import PAPER
 from .report import Report, Row, Steps, tabulate
@@ -31,9 +33,6 @@ USUAL: Row = {
     "number": 1, "scene": PAPER, "set": [], "off": 0.05, "slow": False, "stored": "", "where": {}, "head": "",
     "rows": [],
 }  # fmt: skip
-#: Motion of each speed, and the fastest that is tried, m/s.
-WAYS: dict[str, Drag | Lift] = dict(zip(SPEEDS, (Drag(), Lift()), strict=True))
-FASTEST = 80e-3
 
 
 @cache
@@ -54,17 +53,22 @@ def read_figures(page: str | None = None) -> list[Row]:
             for place, (metric, unit, *own) in enumerate(row["metrics"], row["number"]):
                 if len(numbers) < place:
                     raise OutputError(f"{row['page']} has no number {place} behind {label!r}.")
-                found = {"of": metric, "unit": unit, "behind": label, "text": numbers[place - 1]}
+                found = {
+                    "of": metric,
+                    "unit": unit,
+                    "behind": " ".join(label.split()),
+                    "text": numbers[place - 1],
+                }
                 figures += [{**row, **found, "where": row["where"] | where | dict(*own)}] if metric else []
     return figures
 
 
 @cache
-def measure_scene(name: str, settings: tuple[str, ...], metric: str, *, errors: bool) -> Mapping[str, Any]:
-    """Return a speed by its name in `SPEEDS`, or all metrics of a scene with some settings."""
+def measure_scene(name: str, settings: tuple[str, ...], limit: str, *, errors: bool) -> Mapping[str, Any]:
+    """Return a speed by its name in `LIMITS`, or all metrics of a scene with some settings."""
     scene = load(find(name), [Setting(*setting.split("=", 1)) for setting in settings])
-    if metric in WAYS:
-        return {metric: find_largest_speed(scene, WAYS[metric], Criterion(), high=FASTEST)}
+    if limit in LIMITS:
+        return {limit: find_largest_speed(scene, LIMITS[limit], Criterion(), high=HIGH)}
     done = run(scene)
     return (done.estimate_errors() or done).metrics if errors else done.metrics
 
@@ -79,35 +83,29 @@ def read_stored(name: str) -> tuple[list[Row], str]:
 
 
 def find_stored(figure: Row) -> float:
-    """Return a figure of a stored result, of several columns the nearest; OutputError unless of one row."""
+    """Return a figure of a stored result; OutputError unless of one row."""
     wanted = figure["where"].items()
     rows = [row for row in read_stored(figure["stored"])[0] if wanted <= row.items()]
     if len(rows) != 1:
         raise OutputError(f"{figure['stored']} must have one row of {figure['where']} (got {len(rows)}).")
-    factor = UNITS.get(figure["unit"], 1.0)
-    values = (factor * float(rows[0][name]) for name in figure["of"].split(" or "))
-    return min(values, key=lambda value: abs(value - float(figure["text"])))
+    return float(rows[0][figure["of"]])
 
 
 def find_run(figure: Row) -> float:
-    """Return a figure of a run of now."""
+    """Return a figure of a run of now, NaN where it has none."""
     metric, settings = figure["of"], tuple(figure["set"])
-    of_speed = metric if metric in WAYS else ""
-    found = measure_scene(figure["scene"], settings, of_speed, errors=metric in ERRORS)[metric]
-    return math.nan if found is None else found * UNITS.get(figure["unit"], 1.0)
+    limit = metric if metric in LIMITS else ""
+    return measure_scene(figure["scene"], settings, limit, errors=metric in ERRORS)[metric] or math.nan
 
 
 def judge(figure: Row) -> Row:
     """Return a figure with the numbers of its page and of its source, and whether it is stale."""
     stored, text = figure["stored"], figure["text"]
     there, digits = float(text), len(text.partition(".")[2])
-    now = find_stored(figure) if stored else find_run(figure)
-    off = 0.0 if stored else figure["off"] * there
-    near = abs(now - there) <= off or round(now, digits) == there
+    now = UNITS.get(figure["unit"], 1.0) * (find_stored(figure) if stored else find_run(figure))
+    near = abs(now - there) <= figure["off"] * there or round(now, digits) == there
     source = read_stored(stored)[1] if stored else "run"
-    behind = " ".join(figure["behind"].strip("\n |").split())[-40:]
-    judged = {"behind": behind, "there": there, "now": now, "source": source}
-    return {**figure, **judged, "stale": "" if near else "STALE"}
+    return {**figure, "there": there, "now": now, "source": source, "stale": "" if near else "STALE"}
 
 
 COLUMNS = {

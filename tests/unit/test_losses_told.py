@@ -13,7 +13,6 @@ LIFTS = {"lost once": 24e-3, "": 5e-3}
 FOUR = ["--vary", "control.force_gain=2,2.1,2.2,2.3", "--workers", "1"]
 COMMANDS: dict[str, tuple[list[str], str]] = {
     "run": (["run", "my.toml"], ""),
-    "compare": (["compare", "my.toml"], ""),
     "batch": (["batch", "jobs.toml"], "index.html"),
     "sweep of a batch": (["sweep", "my.toml", *FOUR], "sweep.csv"),
     "sweep one by one": (["sweep", "my.toml", "--vary", "control.force_gain=2,2.1"], "sweep.csv"),

@@ -15,7 +15,7 @@ from ..core.base.errors import OutputError, ParameterError
 from ..core.base.quantity import find_nearest_name
 from ..core.control.methods import list_methods
 from ..core.files.run_folder import MARK, find_name, format_json, write_whole
-from ..core.metrics.metric_table import ERRORS, SPEEDS, describe_errors, describe_losses
+from ..core.metrics.metric_table import ERRORS, SPEEDS, describe_errors
 from ..core.metrics.summary import find_worst_finger, sum_cells
 from ..core.model.control_interface import find_set_point
 from ..core.scene.recorder import Recorder
@@ -180,7 +180,6 @@ def _measure(point: Point, arguments: argparse.Namespace) -> Record:
     asked = np.where(np.isnan(wanted), None, wanted)  # type: ignore[call-overload]  # JSON has no NaN
     return {
         "figures": done.figures | {name: done.metrics.get(name) for name in ERRORS} | speeds,
-        "lost": describe_losses(done.metrics),
         "absent": [*absent, *([describe_errors(done.metrics)] if "height_error" not in done.metrics else [])],
         "forces": [worst["time"].tolist(), worst["total_force"].tolist(), asked.tolist()],
         "beyond_a_finger": done.metrics.get("beyond_a_finger", ""),
@@ -203,8 +202,7 @@ def _write(out: Path, scene: Scene, every: Mapping[str, Record], *, speed: bool)
     forces = {name: tuple(np.array(each["forces"], np.float64)) for name, each in every.items()}
     called = "force of the worst finger" if several else "total force"
     save(comparison(measured, forces, scene.name, called), out / "compare.png")
-    told = [(method, each.get(key)) for key in ("lost", "beyond_a_finger") for method, each in every.items()]
-    notes = [f"{method}: {words}" for method, words in told if words]
+    notes = [f"{method}: {words}" for method, words in beyond.items() if words]
     alone = ", the first of the fingers alone" if several else ""
     if speed:
         ends = f"searched from {LOW * 1e3:g} to {HIGH * 1e3:g} mm/s"

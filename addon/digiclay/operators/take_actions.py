@@ -24,7 +24,6 @@ from ..core.session.take import play as play_take
 from ..device import view
 from ..device.instant import find_ellipsoids
 from ..live import beds, handlers, tick
-from ..overlay.sections import effort_message
 from ..recorded import bake, takes
 from ..recorded.pointer_strokes import play_strokes, read_strokes
 from ..roles import bed_of, fingertips_of
@@ -72,8 +71,7 @@ def keep_take(operator: Any, context: Any) -> set[str] | None:
         operator.report({"WARNING"}, localize("Nothing was recorded: the session was paused"))
         return {"CANCELLED"}
     entry = takes.add(bed, take, operator.name, session)
-    words = localize("{}: {:.1f} s kept. {}", entry.name, entry.seconds, effort_message(entry.effort))
-    operator.report({"INFO"}, words)
+    operator.report({"INFO"}, localize("{}: {:.1f} s kept", entry.name, entry.seconds))
     return None
 
 
@@ -240,8 +238,7 @@ class ReplayTake(TimedAction, bpy.types.Operator):
         )  # fmt: skip
         beds.write(bed, begun[0])
         view.show_state(bed, system, self._state)
-        effort = effort_message(takes.find(bed, self.take).effort)
-        seconds = f"{self._take.duration:.1f} s ({effort})"
+        seconds = f"{self._take.duration:.1f} s"
         if state == self._take.end:
             self.report({"INFO"}, localize("Replayed {}: it ends in the same state, bit for bit", seconds))
             return {"FINISHED"}
