@@ -69,25 +69,24 @@ def draw(name: str) -> Running:
 
 @pytest.mark.parametrize("name", DRAWN)
 def test_strokes_leave_the_same_bits_however_many_periods_are_simulated_at_a_time(name: str) -> None:
-    first, *others = (finish(draw(name), periods) for periods in (1, 7, 64))
-    assert [other.state.period for other in others] == [first.state.period] * 2
-    for other in others:
-        np.testing.assert_array_equal(heights(other), heights(first))
+    few, many = (finish(draw(name), periods) for periods in (7, 64))
+    assert few.state.period == many.state.period
+    np.testing.assert_array_equal(heights(few), heights(many))
 
 
 #: Strokes of a queue by their bed: brush, amount, mm, path, mm, and symmetry.
-WAVE = [(x, 4.0 * np.sin(0.3 * x)) for x in np.linspace(-18.0, 18.0, 40)]
-SHIFTED = 1e3 * lay_ring((5e-3, 3e-3), (17e-3, 3e-3))
+WAVE = [(x, 4.0 * np.sin(0.3 * x)) for x in np.linspace(-12.0, 12.0, 27)]
+SHIFTED = 1e3 * lay_ring((5e-3, 3e-3), (13e-3, 3e-3))
 QUEUES = {
     "a valley across a ridge": [
         (Brush.RAISE, 5.0, WAVE, "NONE"),
-        (Brush.LOWER, 3.0, [(0, -20), (3, 20)], "NONE"),
+        (Brush.LOWER, 3.0, [(0, -13), (2, 13)], "NONE"),
     ],
     "a ring, mirrored": [(Brush.RAISE, 4.0, SHIFTED, "XY")],
     "lines turned about the middle": [(Brush.LOWER, 3.0, [(4, 2), (17, 6)], "RADIAL")],
     "a ridge that is leveled": [
         (Brush.RAISE, 5.0, WAVE, "NONE"),
-        (Brush.LEVEL, 1.0, [(-20, 0), (20, 0)], "NONE"),
+        (Brush.LEVEL, 1.0, [(-14, 0), (14, 0)], "NONE"),
     ],
     "a leaning finger": [(Brush.LOWER, 2.0, WAVE, "X")],
 }
