@@ -28,6 +28,8 @@ extension: ## build the Blender extension and leave its zip in dist/
 	@.venv/bin/python tools/extension.py
 
 BEHAVIOR := tests/unit tests/property tests/scenes tests/regression
+# Modules are compiled once, not again by each process that a test starts.
+test: export PYTHONDONTWRITEBYTECODE =
 test: ## run the tests of behavior and of file formats, in Blender 4.5 too
 	@$(ENVIRONMENT) requirements/test.txt $(IN_311)
 	@rm -f .reports/test.txt; status=0; \
