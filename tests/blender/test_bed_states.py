@@ -1,6 +1,7 @@
 """Every operator on a bed in every state: it does its work, or says in one line why it does not."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -199,10 +200,11 @@ def folder(extension, files, monkeypatch):
 
 def make_files(folder: Path) -> None:
     bed = new_bed(rows=5, columns=5)
-    (folder / "strokes.toml").write_text("[[stroke]]\nmoves = [[0, 0, 0], [0.1, 0.002, 0]]\n")
+    (folder / "strokes.toml").write_text("[[stroke]]\ndepth = 0.001\nmoves = [[0, 0, 0], [0.1, 0.002, 0]]\n")
     np.save(folder / "ramp.npy", np.linspace(0.0, 1.0, 25).reshape(5, 5))
     scene = properties.scene_of(bed)
-    takes.add(bed, takes.simulate(scene), "Press")
+    short = replace(scene, simulation=replace(scene.simulation, duration=0.1))
+    takes.add(bed, takes.simulate(short), "Press")
     bpy.ops.digiclay.take_export(filepath=str(folder / "tap.toml"))
     formed_bed.set_reference(bed)
     bpy.ops.digiclay.shape_sample(sample="wave")

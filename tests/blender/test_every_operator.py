@@ -65,14 +65,22 @@ ODD: dict[str, Callable[[Any], object]] = {
 }  # fmt: skip
 
 
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """The folder of the file."""
+    return tmp_path_factory.mktemp("bed")
+
+
 @pytest.fixture
-def file(extension, tmp_path, monkeypatch):
-    """A file with a small bed, active, beside Blender's cube: it loads quicker than a bed is made."""
+def file(extension, folder, tmp_path, monkeypatch):
+    """A file with a small bed, active, beside Blender's cube, made by the first test that asks."""
     monkeypatch.chdir(tmp_path)  # for what is exported
-    new_bed(rows=5, columns=5)
-    tool.take_up(bpy.context)
-    BPY.wm.save_as_mainfile(filepath=str(tmp_path / "bed.blend"))
-    return bpy.data.filepath
+    path = folder / "bed.blend"
+    if not path.exists():
+        new_bed(rows=5, columns=5)
+        tool.take_up(bpy.context)
+        BPY.wm.save_as_mainfile(filepath=str(path))
+    return str(path)
 
 
 def prepare(file: str, odd: str, live: bool) -> Any:

@@ -79,8 +79,6 @@ def test_a_sample_of_hands_loses_no_finger_and_forms_what_it_is_called(name: str
         (["run", "my.toml", "--plots", "--out", "out", "--quiet"], ("session.png", "history.npz")),
         (["compare", "my.toml", "--methods", "hybrid,cell_states", "--out", "out"], ("compare.png",)),
         ([*SHAPED, "scene"], ("history.npz",)),
-        ([*SHAPED, "press"], ("history.npz",)),
-        ([*GAINS, "--out", "out", "--workers", "2"], ("sweep.csv",)),
         (["sweep", "my.toml", "--vary", "finger.2.contact.share=0.2,0.3", "--out", "out"], ("sweep.csv",)),
         (["run", "my.toml", "--budget", "300um", "--set", "contact.stiffness=300", "--out", "out"], ()),
     ],

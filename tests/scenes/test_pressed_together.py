@@ -108,11 +108,11 @@ def test_stiff_pins_under_several_fingers_agree_with_scipy(fingers, parts, heigh
     system = replaying(fingers, commands, layout=Layout(rows=5, columns=5), **parts)
     ways = [rock(finger) for finger in range(len(fingers))]
     heights, forces, pressed = play(system, at_times(system, ways, 30))
-    for cell in np.argsort(-pressed)[:2].tolist():
-        height, force, _ = integrate(system, cell, commands, ways)
-        # Measured 58 µm, and 2 and 35 mN; such cases are bounded, not accurate (docs/stability.md).
-        np.testing.assert_allclose(heights[:, cell], height, rtol=0, atol=height_error)
-        np.testing.assert_allclose(forces[:, cell], force, rtol=0, atol=force_error)
+    cell = int(pressed.argmax())
+    height, force, _ = integrate(system, cell, commands, ways)
+    # Measured 58 µm, and 2 and 35 mN; such cases are bounded, not accurate (docs/stability.md).
+    np.testing.assert_allclose(heights[:, cell], height, rtol=0, atol=height_error)
+    np.testing.assert_allclose(forces[:, cell], force, rtol=0, atol=force_error)
 
 
 @pytest.mark.parametrize("seed", [0, 3])

@@ -122,8 +122,7 @@ def test_a_fingertip_that_is_added_in_mid_session_forms_too(pair: Any, clock: Cl
     assert clock.tick(3) == []
 
 
-@pytest.mark.parametrize("gone", [1, 2])
-@pytest.mark.parametrize("how", ["deleted", "removed"])
+@pytest.mark.parametrize(("how", "gone"), [("deleted", 1), ("removed", 2)])
 def test_the_session_goes_on_with_the_fingertips_that_are_left(pair, clock, gone, how):
     started(pair)
     press(pair, clock, 1, 2, lift=False)
