@@ -71,11 +71,14 @@ def make_label(
         return []
     scale = float(context.preferences.system.ui_scale)
     left, bottom, right, top = np.add(find_free_room(context.area, context.region), 2 * corner).tolist()
-    width, size = measure(text, LETTERS * scale), LETTERS * scale
+    size = LETTERS * scale
+    width = measure(text, size)
+    # A text that is wider than the room is drawn smaller.
     share = min(1.0, (right - left) / width)
     x, y = place_label(xy, (share * width, size), (left, bottom, right, top), scale)
-    edge = [(x + i, y + j, share * size, DARK, text) for i in (-scale, scale) for j in (-scale, scale)]
-    return [Words(*each) for each in (*edge, (x, y, share * size, LIGHT, text))]
+    size *= share
+    edge = [Words(x + i, y + j, size, DARK, text) for i in (-scale, scale) for j in (-scale, scale)]
+    return [*edge, Words(x, y, size, LIGHT, text)]
 
 
 def close(path: Floats) -> Floats:
@@ -112,7 +115,9 @@ BRUSH, SIZE, AMOUNT, STRENGTH = 4.6, 6.6, 6.6, 5.4
 def draw_header(context: Any, layout: Any, settings: Any) -> None:
     """Draw the tool's settings into the header."""
     width = context.region.width / context.preferences.system.ui_scale
-    wide, row = width >= WIDE, layout.row(align=True)
+    wide = width >= WIDE
+    brush = Brush(settings.brush)
+    row = layout.row(align=True)
     if width >= WIDEST:
         row.prop(settings, "brush", expand=True)
     else:
@@ -123,22 +128,22 @@ def draw_header(context: Any, layout: Any, settings: Any) -> None:
         row = layout.row(align=True)
         _number(row, bed.digiclay, "size", SIZE)
         row.prop(bed.digiclay, "blister_follows", text="", icon="LINKED")
-    if Brush(settings.brush).has_amount:
-        _number(layout, settings, amount_name(Brush(settings.brush)), AMOUNT)
-    if Brush(settings.brush) in LOCKS:
+    if brush.has_amount:
+        _number(layout, settings, amount_name(brush), AMOUNT)
+    if brush in LOCKS:
         row = layout.row(align=True)
         row.operator("digiclay.press_locks_invert", text="Invert")
         row.operator("digiclay.press_locks_clear", text="Clear")
     else:
         _number(layout, settings, "strength", STRENGTH)
-    if Brush(settings.brush) in STAMPS:
+    if brush in STAMPS:
         layout.prop(settings, "stamp", text="")
         if settings.stamp == FILE:
             layout.prop(settings, "stamp_file", text="")
     if bed is not None:
         kind = find_kind(devices.read_finger(devices.find_first(bed)))
-        words = (kind.label if kind else "Finger") if wide else ""
-        layout.menu("DIGICLAY_MT_fingers", text=words, icon="NONE" if wide else "VIEW_PAN")
+        label = kind.label if kind else "Finger"
+        layout.menu("DIGICLAY_MT_fingers", text=label if wide else "", icon="NONE" if wide else "VIEW_PAN")
     layout.popover("DIGICLAY_PT_press_stroke", text="Stroke" if wide else "", icon="CURVE_BEZCURVE")
     layout.popover("DIGICLAY_PT_press_pen", text="Pen" if wide else "", icon="STYLUS_PRESSURE")
     if wide:
@@ -161,18 +166,20 @@ def _number(layout: Any, owner: Any, name: str, units: float) -> None:
     row.prop(owner, name)
 
 
-def touch_outline(bed: Any, layout: Layout, place: Floats, depth: float, kind: Brush = Brush.LOWER) -> Floats:
+def touch_outline(
+    bed: Any, layout: Layout, place: Floats, depth: float, brush: Brush = Brush.LOWER
+) -> Floats:
     """Return the rim of what a brush would form at a place (2,), m, (k, 2), m."""
     tip = fingertip_of(bed)
-    return place + find_outline(bridge.finger_of(tip), bridge.pose(tip)[3:], depth, kind, layout)
+    return place + find_outline(bridge.finger_of(tip), bridge.pose(tip)[3:], depth, brush, layout)
 
 
-def find_outline(finger: Fingertip, turn: Floats, depth: float, kind: Brush, layout: Layout) -> Floats:
+def find_outline(finger: Fingertip, turn: Floats, depth: float, brush: Brush, layout: Layout) -> Floats:
     """Return the rim of what a brush would form about the origin at a depth, m, (k, 2), m."""
-    if kind in STAMPS:
-        return lay_square((0.0, 0.0), (find_radius(finger, layout), 0.0))[:-1]
-    if kind in SWEEPS:
-        radius = find_radius(finger, layout)
+    radius = find_radius(finger, layout)
+    if brush in STAMPS:
+        return lay_square((0.0, 0.0), (radius, 0.0))[:-1]
+    if brush in SWEEPS:
         return find_contact_outline(Fingertip(radius, radius, radius), turn, radius)
     return find_contact_outline(finger, turn, depth)
 
@@ -186,23 +193,23 @@ def _draw_cursor(context: Any, tool: Any, xy: tuple[int, int]) -> None:
         return
     if any(operator.bl_idname in ADJUSTING for operator in context.window.modal_operators):
         return
+    corner = region.x, region.y
     target, hider = aim.look_at(context, (xy[0] - region.x, xy[1] - region.y))
     if hider is not None:
-        words = localize("{} hides the bed", hider.name)
-        cursor([], make_label(context, words, xy, (region.x, region.y)))
+        cursor([], make_label(context, localize("{} hides the bed", hider.name), xy, corner))
         return
     if target is None or fingertip_of(target.bed) is None:
         return
     settings = tool.operator_properties(OPERATOR)
-    kind, amount, _ = find_shown(target.bed, settings)
-    depth = 1e-3 * settings.depth if kind.rises else amount
-    rim = close(touch_outline(target.bed, target.grid.layout, target.point[:2], depth, kind))
+    brush, amount, _ = find_shown(target.bed, settings)
+    depth = 1e-3 * settings.depth if brush.rises else amount
+    rim = close(touch_outline(target.bed, target.grid.layout, target.point[:2], depth, brush))
     rims = [np.column_stack(image.place(*rim.T)) for image in find_images(settings)]
-    text = describe(target.bed, settings) if preferences.get(context).show_cursor_text else ""
-    color = SMOOTHING if kind in SWEEPS else LIGHT
     paths = map_paths(partial(drape, target.grid, target.height), [*rims, *_trail(target)])
     paths += find_axes(target.grid, target.height, settings)
-    draw_on_bed(context, target.bed, paths, text, xy, color, (region.x, region.y))
+    text = describe(target.bed, settings) if preferences.get(context).show_cursor_text else ""
+    color = SMOOTHING if brush in SWEEPS else LIGHT
+    draw_on_bed(context, target.bed, paths, text, xy, color, corner)
 
 
 def describe(bed: Any, settings: Any) -> str:
@@ -211,8 +218,8 @@ def describe(bed: Any, settings: Any) -> str:
     session = running.find(bed)
     if session is None or not session.strokes:
         return words
-    known = not session.paused and session.clock.factor
-    left = estimate_time(session) / session.clock.factor if known else None
+    speed = 0.0 if session.paused else session.clock.factor
+    left = estimate_time(session) / speed if speed else None
     return words + describe_queue(session.strokes[0].brush, len(session.strokes) - 1, left)
 
 
@@ -220,7 +227,8 @@ def find_axes(grid: Grid, height: Floats, settings: Any) -> list[Floats]:
     """Return axes and center of the tool's symmetry, lying on pins at heights (n,), m; (k, 3), m."""
     if settings.symmetry == "NONE":
         return []
-    center, axis = 1e-3 * np.array([settings.center_x, settings.center_y]), float(settings.axis)
+    center = 1e-3 * np.array([settings.center_x, settings.center_y])
+    axis = float(settings.axis)
     lines = [lay_ring(tuple(center), (center[0] + MARK, center[1]))]
     right, up = np.abs(grid.x).max(), np.abs(grid.y).max()
     parts = np.linspace(-2.0, 2.0, PARTS)[:, None] * np.hypot(right, up)
@@ -234,12 +242,13 @@ def find_axes(grid: Grid, height: Floats, settings: Any) -> list[Floats]:
 def find_shown(bed: Any, settings: Any) -> tuple[Brush, float, float]:
     """Return brush, depth or height, m, and strength of the stroke that is drawn, or of a press now."""
     session = running.find(bed)
-    last = session.strokes[-1] if session is not None and session.strokes else None
-    if last is not None and last.held and last.samples[-1].share:
-        sample = last.samples[-1]
-        return last.brush, sample.depth / sample.share, sample.share
-    kind = choose_brush(settings.brush, HELD)
-    return kind, 1e-3 * getattr(settings, amount_name(kind)), settings.strength
+    stroke = session.strokes[-1] if session is not None and session.strokes else None
+    if stroke is not None and stroke.held:
+        sample = stroke.samples[-1]
+        if sample.share:
+            return stroke.brush, sample.depth / sample.share, sample.share
+    brush = choose_brush(settings.brush, HELD)
+    return brush, 1e-3 * getattr(settings, amount_name(brush)), settings.strength
 
 
 def _trail(target: aim.Target) -> list[Floats]:
@@ -247,14 +256,15 @@ def _trail(target: aim.Target) -> list[Floats]:
     session = running.find(target.bed)
     if session is None or not session.strokes:
         return []
-    finger, top, kind = find_ellipsoid(session.scene), float(target.height.max()), session.strokes[0].brush
-    ways = [path for stroke in session.strokes for path in stroke.ahead]
-    if not session.strokes[0].parts:
-        ways[0] = np.concatenate([session.poses[:1, :2], ways[0]])
+    first, finger = session.strokes[0], find_ellipsoid(session.scene)
+    paths = [path for stroke in session.strokes for path in stroke.ahead]
+    if not first.parts:
+        paths[0] = np.concatenate([session.poses[:1, :2], paths[0]])
     for pose in session.poses[list_pressing(session)]:
-        rim = find_outline(finger, pose[3:], top - pose[2], kind, target.grid.layout)
-        ways.append(close(pose[:2] + rim))
-    return [way for way in ways if len(way) > 1]
+        depth = float(target.height.max()) - pose[2]
+        rim = find_outline(finger, pose[3:], depth, first.brush, target.grid.layout)
+        paths.append(close(pose[:2] + rim))
+    return [path for path in paths if len(path) > 1]
 
 
 def _scale_key(key: str, scalar: float) -> tuple[str, dict[str, Any], dict[str, Any]]:
@@ -344,12 +354,13 @@ def drape(cells: Grid, height: Floats, places: Floats) -> Floats:
     """Return places (k, 2) with the mean height of the pins about each, (k, 3), m, weighted normally."""
     # Smoothed, a step between two pins makes no spike in a line.
     plan = cells.layout
-    row, column = np.divmod(cells.at(places[:, 0], places[:, 1]), plan.columns)
+    x, y = places.T[:, :, None, None]
+    row, column = np.divmod(cells.at(x, y), plan.columns)
     step = np.arange(-REACH, REACH + 1)
-    rows, columns = row[:, None, None] + step[:, None], column[:, None, None] + step
+    rows, columns = row + step[:, None], column + step
     on_bed = (rows >= 0) & (rows < plan.rows) & (columns >= 0) & (columns < plan.columns)
     pins = np.where(on_bed, rows * plan.columns + columns, 0)
-    square = (cells.x[pins] - places[:, 0, None, None]) ** 2 + (cells.y[pins] - places[:, 1, None, None]) ** 2
+    square = (cells.x[pins] - x) ** 2 + (cells.y[pins] - y) ** 2
     # Relative to the nearest pin: far beyond the edge all weights would be 0.
     nearest = np.where(on_bed, square, np.inf).min(axis=(1, 2), keepdims=True)
     weight = np.where(on_bed, np.exp((nearest - square) / (2.0 * (SPREAD * plan.pitch) ** 2)), 0.0)

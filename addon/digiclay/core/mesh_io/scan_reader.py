@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import struct
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,7 +17,8 @@ from .mesh_limits import MOST_TRIANGLES, make_refusal, refuse_many_triangles
 WHOLE = "must be whole: the file is cut off"
 #: A head is no longer than this.
 LONGEST_HEAD = 1 << 16
-#: Triangle of a binary STL.
+#: Bytes before the triangles of a binary STL, and a triangle of it.
+HEAD = 84
 TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("color", "<u2")])
 #: Codes of the numbers of a PLY, for numpy and struct.
 NUMBERS = {
@@ -44,28 +46,41 @@ def read(data: bytes, kind: str, name: str) -> tuple[Floats, Indices]:
 
 def _read_stl(data: bytes, name: str) -> tuple[Floats, Indices]:
     """Read an STL, three vertices a triangle; bytes behind its last triangle are not looked at."""
-    count = int.from_bytes(data[80:84], "little") or (len(data) - 84) // 50
+    count = int.from_bytes(data[80:84], "little") or (len(data) - HEAD) // TRIANGLE.itemsize
     head = data[:LONGEST_HEAD].lstrip().lower()
     text = head.startswith(b"solid") and (b"facet" in head or b"endsolid" in head)
-    if text and len(data) != 84 + 50 * count:
-        lower = data.lower()
-        begun, ended = lower.count(b"facet normal"), lower.count(b"endfacet")
-        words = re.findall(rb"vertex\s+(\S+)\s+(\S+)\s+(\S+)", lower)
-        if not begun == ended == len(words) / 3 or not re.search(rb"[\r\n]\s*endsolid[^\r\n]*\s*\Z", lower):
-            content = f"{begun:,} facets begin, {ended:,} end, and the last line no endsolid"
-            raise make_refusal(WHOLE, name, content)
-        refuse_many_triangles(name, ended)
-        places = np.array(words, np.float64).reshape(-1, 3) if words else np.empty((0, 3))
+    if text and len(data) != HEAD + TRIANGLE.itemsize * count:
+        corners = _read_text_stl(data.lower(), name)
     else:
-        there, rest = divmod(max(0, len(data) - 84), 50)
-        if (there < count and (rest or count < 2**32 - 1)) or len(data) < 84:
-            if count > MOST_TRIANGLES:
-                raise ValueError(f"it begins with {data[:8]!r}")
-            raise make_refusal(WHOLE, name, f"{there:,} of its {count:,} triangles")
-        count = min(count, there)  # some programs leave the count at its largest
-        refuse_many_triangles(name, count)
-        places = np.frombuffer(data, TRIANGLE, count, 84)["corners"].reshape(-1, 3).astype(np.float64)
-    return places, np.arange(len(places)).reshape(-1, 3)
+        corners = _read_binary_stl(data, count, name)
+    return corners, np.arange(len(corners)).reshape(-1, 3)
+
+
+def _read_text_stl(text: bytes, name: str) -> Floats:
+    """Return the corners (3 f, 3) of an STL in small letters."""
+    begun, ended = text.count(b"facet normal"), text.count(b"endfacet")
+    corners = re.findall(rb"vertex\s+(\S+)\s+(\S+)\s+(\S+)", text)
+    closed = re.search(rb"[\r\n]\s*endsolid[^\r\n]*\s*\Z", text)
+    if not closed or not begun == ended == len(corners) / 3:
+        content = f"{begun:,} facets begin, {ended:,} end, and the last line no endsolid"
+        raise make_refusal(WHOLE, name, content)
+    refuse_many_triangles(name, ended)
+    return np.array(corners, np.float64).reshape(-1, 3)
+
+
+def _read_binary_stl(data: bytes, count: int, name: str) -> Floats:
+    """Return the corners (3 f, 3) of a binary STL whose head names so many triangles."""
+    whole, rest = divmod(max(0, len(data) - HEAD), TRIANGLE.itemsize)
+    # Some programs leave the count at its largest.
+    counted = rest or count < 2**32 - 1
+    if len(data) < HEAD or (whole < count and counted):
+        if count > MOST_TRIANGLES:
+            raise ValueError(f"it begins with {data[:8]!r}")
+        raise make_refusal(WHOLE, name, f"{whole:,} of its {count:,} triangles")
+    count = min(count, whole)
+    refuse_many_triangles(name, count)
+    triangles = np.frombuffer(data, TRIANGLE, count, HEAD)
+    return triangles["corners"].reshape(-1, 3).astype(np.float64)
 
 
 class _Property(NamedTuple):
@@ -76,108 +91,127 @@ class _Property(NamedTuple):
     length: str = ""
 
 
+@dataclass(frozen=True)
+class _Element:
+    """Element of a PLY: vertices, faces, or others."""
+
+    kind: str
+    count: int
+    properties: list[_Property]
+    #: Of the bytes: ``<`` or ``>``.
+    order: str
+
+    @property
+    def least(self) -> int:
+        """Least number of bytes of a row, whose lists are empty."""
+        return struct.calcsize(self.order + "".join(part.length or part.code for part in self.properties))
+
+    def make_row(self, sizes: tuple[int, ...]) -> np.dtype[Any]:
+        """Return the type of a row whose lists have these lengths; a number has any."""
+        fields: list[Any] = []
+        for part, size in zip(self.properties, sizes, strict=True):
+            if part.length:
+                fields.append((_name_length(part), self.order + part.length))
+            fields.append((part.name, self.order + part.code, (size,) if part.length else ()))
+        return np.dtype(fields)
+
+    def measure(self, body: bytes, place: int) -> tuple[tuple[int, ...], int]:
+        """Return the lengths of a row's lists, 1 for a number, and where the row ends."""
+        sizes = []
+        for part in self.properties:
+            size = 1
+            if part.length:
+                size = int(struct.unpack_from(self.order + part.length, body, place)[0])
+                place += struct.calcsize(part.length)
+            sizes.append(size)
+            place += struct.calcsize(part.code) * size
+        return tuple(sizes), place
+
+    def read(self, body: bytes, start: int) -> tuple[dict[str, list[NDArray[Any]]], int]:
+        """Return the values by property, arrays (rows[, length of a list]), and where they end."""
+        sizes = self.measure(body, start)[0] if self.count else (0,) * len(self.properties)
+        row = self.make_row(sizes)
+        end = start + self.count * row.itemsize
+        groups = [np.frombuffer(body, row, self.count, start)] if end <= len(body) else []
+        lists = [(part, size) for part, size in zip(self.properties, sizes, strict=True) if part.length]
+        if not groups or not all(np.all(groups[0][_name_length(part)] == size) for part, size in lists):
+            groups, end = self._read_unlike(body, start)
+        return {part.name: [group[part.name] for group in groups] for part in self.properties}, end
+
+    def _read_unlike(self, body: bytes, start: int) -> tuple[list[NDArray[Any]], int]:
+        """Return rows whose lists differ in length, an array for each length, and where they end."""
+        starts: dict[tuple[int, ...], list[int]] = {}
+        for _ in range(self.count):
+            sizes, end = self.measure(body, start)
+            starts.setdefault(sizes, []).append(start)
+            start = end
+        if start > len(body):
+            raise ValueError("its lists end behind the file")
+        octets, groups = np.frombuffer(body, np.uint8), []
+        for sizes, places in starts.items():
+            row = self.make_row(sizes)
+            groups.append(octets[np.add.outer(places, np.arange(row.itemsize))].view(row)[:, 0])
+        return groups, start
+
+
+def _name_length(part: _Property) -> str:
+    return f"length of {part.name}"
+
+
 def _read_ply(data: bytes, name: str) -> tuple[Floats, Indices]:
     """Read a PLY; a text is turned into the bytes of a binary one."""
     end = re.search(rb"^end_header[ \t]*\r?$\n?", data[:LONGEST_HEAD], re.MULTILINE)
     if not data.startswith(b"ply") or end is None:
         raise ValueError("no head, or no end of it")
+    text, elements = _read_head(data[: end.start()].decode("ascii", errors="replace"))
+    body = data[end.end() :]
+    if text:
+        body = np.array(body.split(), np.float64).tobytes()
+    start, tables = 0, {}
+    for element in elements:
+        least = element.count * element.least
+        if element.count < 0 or (element.count and not least):
+            raise ValueError(f"{element.count} {element.kind} without properties")
+        if element.kind == "face":
+            refuse_many_triangles(name, element.count)
+        if start + least > len(body):
+            content = f"{len(body) - start:,} bytes where its {element.kind} elements take at least {least:,}"
+            raise make_refusal(WHOLE, name, content)
+        tables[element.kind], start = element.read(body, start)
+    if "face" not in tables:
+        raise make_refusal("must have faces", name, f"only {' and '.join(tables)} elements")
+    vertices, faces = tables["vertex"], tables["face"]
+    places = np.column_stack([np.concatenate(vertices[axis]).astype(np.float64) for axis in "xyz"])
+    return places, _cut(next(faces[word] for word in CORNERS if word in faces), name)
+
+
+def _read_head(head: str) -> tuple[bool, list[_Element]]:
+    """Return whether a PLY is a text, and the elements that its head declares."""
     text, order = False, "<"
     elements: list[tuple[str, int, list[_Property]]] = []
-    for line in data[: end.start()].decode("ascii", errors="replace").splitlines():
-        words = line.split()
+    for line in head.splitlines():
+        keyword, *words = line.split() or [""]
         try:
-            if words[:1] == ["format"]:
-                text, order = words[1] == "ascii", ">" if words[1] == "binary_big_endian" else "<"
-            elif words[:1] == ["element"]:
-                elements.append((words[1], int(words[2]), []))
-            elif words[:1] == ["property"]:
-                kinds = words[2 if words[1] == "list" else 1 : -1]
+            if keyword == "format":
+                text, order = words[0] == "ascii", ">" if words[0] == "binary_big_endian" else "<"
+            elif keyword == "element":
+                elements.append((words[0], int(words[1]), []))
+            elif keyword == "property":
+                kinds = words[1 if words[0] == "list" else 0 : -1]
                 codes = ["d" if text else NUMBERS[word] for word in kinds]
                 elements[-1][2].append(_Property(words[-1], codes[-1], codes[-2] if len(codes) > 1 else ""))
         except (ValueError, IndexError, KeyError):
             raise ValueError(f"{line[:60]!r} in its head") from None
-    body = data[end.end() :]
-    if text:
-        body = np.array(body.split(), np.float64).tobytes()
-    at, tables = 0, {}
-    for kind, count, properties in elements:
-        least = struct.calcsize(order + "".join(one.length or one.code for one in properties))
-        if count < 0 or (count and not least):
-            raise ValueError(f"{count} {kind} without properties")
-        if kind == "face":
-            refuse_many_triangles(name, count)
-        if at + count * least > len(body):
-            content = f"{len(body) - at:,} bytes where its {kind} elements take at least {count * least:,}"
-            raise make_refusal(WHOLE, name, content)
-        tables[kind], at = _read_element(body, at, count, properties, order)
-    if "face" not in tables:
-        raise make_refusal("must have faces", name, f"only {' and '.join(tables)} elements")
-    vertices = tables["vertex"]
-    places = np.column_stack([np.concatenate(vertices[axis]).astype(np.float64) for axis in "xyz"])
-    return places, _cut(next(tables["face"][word] for word in CORNERS if word in tables["face"]), name)
-
-
-def _read_element(
-    body: bytes, at: int, count: int, properties: list[_Property], order: str
-) -> tuple[dict[str, list[NDArray[Any]]], int]:
-    """Return the values of an element by property, arrays (rows[, length of a list]), and where it ends."""
-    measured = [
-        (
-            one.length and struct.Struct(order + one.length),
-            struct.calcsize(one.length),
-            struct.calcsize(one.code),
-        )
-        for one in properties
-    ]
-
-    def measure(place: int) -> tuple[tuple[int, ...], int]:
-        """Return the lengths of a row's lists, 1 for a number, and where the row ends."""
-        sizes = []
-        for length, width, item in measured:
-            sizes.append(int(length.unpack_from(body, place)[0]) if length else 1)
-            place += width + item * sizes[-1]
-        return tuple(sizes), place
-
-    def make_row(sizes: tuple[int, ...]) -> np.dtype[Any]:
-        fields: list[Any] = []
-        for one, size in zip(properties, sizes, strict=True):
-            fields += [(f"length of {one.name}", order + one.length)] if one.length else []
-            fields.append((one.name, order + one.code, (size,) if one.length else ()))
-        return np.dtype(fields)
-
-    sizes, _ = measure(at) if count else ((0,) * len(properties), at)
-    row = make_row(sizes)
-    groups = []
-    if at + count * row.itemsize <= len(body):
-        groups = [np.frombuffer(body, row, count, at)]
-    lists = [
-        (f"length of {one.name}", size) for one, size in zip(properties, sizes, strict=True) if one.length
-    ]
-    if groups and all(np.all(groups[0][length] == size) for length, size in lists):
-        at += count * row.itemsize
-    else:
-        starts: dict[tuple[int, ...], list[int]] = {}
-        for _ in range(count):
-            sizes, end = measure(at)
-            starts.setdefault(sizes, []).append(at)
-            at = end
-        if at > len(body):
-            raise ValueError("its lists end behind the file")
-        octets = np.frombuffer(body, np.uint8)
-        rows = ((make_row(sizes), np.array(places)) for sizes, places in starts.items())
-        groups = [
-            octets[np.add.outer(places, np.arange(row.itemsize))].view(row)[:, 0] for row, places in rows
-        ]
-    return {one.name: [group[one.name] for group in groups] for one in properties}, at
+    return text, [_Element(*element, order) for element in elements]
 
 
 def _cut(polygons: list[NDArray[Any]], name: str) -> Indices:
     """Return the triangles (f, 3) of polygons, arrays (count, corners), as fans."""
-    refuse_many_triangles(name, sum(each.shape[0] * max(0, each.shape[1] - 2) for each in polygons))
+    refuse_many_triangles(name, sum(len(group) * max(0, group.shape[1] - 2) for group in polygons))
     fans = [np.empty((0, 3), np.int64)]
-    for each in polygons:
-        for corner in range(1, each.shape[1] - 1):
-            fans.append(each[:, [0, corner, corner + 1]].astype(np.int64))
+    for group in polygons:
+        for corner in range(1, group.shape[1] - 1):
+            fans.append(group[:, [0, corner, corner + 1]].astype(np.int64))
     return np.concatenate(fans)
 
 
@@ -197,9 +231,11 @@ def _read_off(data: bytes, name: str) -> tuple[Floats, Indices]:
     places = np.array([line[:3] for line in lines[:count]], np.float64).reshape(-1, 3)
     polygons = []
     for line in lines[count : count + faces]:
-        polygons.append(np.array([line[1 : int(line[0]) + 1]], np.int64))
-        if polygons[-1].shape[1] != int(line[0]):
-            raise make_refusal(WHOLE, name, f"a face of {line[0].decode()} corners without them")
+        corners = int(line[0])
+        polygon = np.array([line[1 : corners + 1]], np.int64)
+        if polygon.shape[1] != corners:
+            raise make_refusal(WHOLE, name, f"a face of {corners} corners without them")
+        polygons.append(polygon)
     return places, _cut(polygons, name)
 
 
