@@ -123,8 +123,7 @@ def prepare_map(linear: Floats, rows: Floats, out: Floats) -> Callable[[], Any]:
     if linear.ndim == 3:
         return partial(_by_run, linear, rows, out)
     flat, made = (rows, out) if rows.ndim == 2 else (rows.reshape(len(rows), -1), out.reshape(len(out), -1))
-    # `dot` is the quicker one to call, but copies what does not lie in one piece.
-    return partial(linear.dot if flat.flags.c_contiguous else partial(np.matmul, linear), flat, made)
+    return partial(np.matmul, linear, flat, made)
 
 
 def _by_run(linear: Floats, rows: Floats, out: Floats) -> None:

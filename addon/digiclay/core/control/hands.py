@@ -33,13 +33,6 @@ class Pressed(NamedTuple):
     under: Floats
 
 
-class Shared(NamedTuple):
-    """Pins in several discs: the fingers they belong to, (g,), and the shares of all in them, (f, g)."""
-
-    owner: Cells
-    shares: Floats
-
-
 @dataclass(frozen=True, eq=False)
 class HandControl:
     """Controller of several fingers."""
@@ -74,14 +67,12 @@ class HandControl:
     def command(self, memory: Hands, seen: Measurement) -> tuple[Hands, Commands]:
         """Let each controller command the pins in its disc; a pin in several discs obeys one of them."""
         columns = self.arrange("all", seen)
-        shared = Shared(*self.division.claim(memory, seen, columns.copies.cells))
-        followers, commands = self.command_each(memory.fingers, seen, columns, shared)
+        followers, commands, owner = self.command_each(memory, seen, columns)
         memory = memory._replace(fingers=tuple(followers), pressed=None)
         obeyed = columns.only.copy()
-        if shared.owner.size:
-            obeyed[columns.copies.cells] = self.division.choose(
-                memory, seen, shared.owner, columns, commands.target
-            )
+        if owner.size:
+            shared = columns.copies.cells
+            obeyed[shared] = self.division.choose(memory, seen, owner, columns, commands.target)
         rows = seen.own.reshape(len(followers), self.count, obeyed.size)
         self.division.remember(rows, columns.finger[obeyed])
         return memory, commands.take(obeyed)
@@ -91,9 +82,12 @@ class HandControl:
         raise NotImplementedError
 
     def command_each(
-        self, followers: tuple[Follower, ...], seen: Measurement, columns: Columns, shared: Shared
-    ) -> tuple[list[Follower], Commands]:
-        """Return what each controller remembers, and commands for the entries of all columns, (k,)."""
+        self, memory: Hands, seen: Measurement, columns: Columns
+    ) -> tuple[list[Follower], Commands, Cells]:
+        """Return what each controller remembers, and commands for the entries of all columns, (k,).
+
+        The last result, (g,), is the finger that each pin in several columns belongs to.
+        """
         raise NotImplementedError
 
     def arrange(self, part: str, seen: Measurement) -> Columns:
@@ -133,14 +127,16 @@ class HandTogether(HandControl):
         return list(zip(*located, strict=True))
 
     def command_each(
-        self, followers: tuple[Follower, ...], seen: Measurement, columns: Columns, shared: Shared
-    ) -> tuple[list[Follower], Commands]:
+        self, memory: Hands, seen: Measurement, columns: Columns
+    ) -> tuple[list[Follower], Commands, Cells]:
         """Let each controller command its column, without the forces on pins of other fingers."""
         cells, absent, basis, entries = columns.padded
-        fingers, owner = self.division.fingers.T, np.full(seen.force.size, NOBODY)
-        owner[columns.copies.cells] = shared.owner
-        owner = owner[cells]
-        hidden = absent | ((owner != fingers) & (owner != NOBODY))
+        fingers, owners = self.division.fingers.T, np.full(seen.force.size, NOBODY)
+        shared = columns.copies.cells
+        owner = self.division.find_owner(memory, seen, shared)
+        owners[shared] = owner
+        owners = owners[cells]
+        hidden = absent | ((owners != fingers) & (owners != NOBODY))
         rows = np.arange(self.count)[:, None, None] + self.count * fingers
         padded = Measurement(
             basis,
@@ -151,10 +147,10 @@ class HandTogether(HandControl):
             seen.own[rows, cells],
             seen.cells[cells],
         )
-        after, commands = self.together.command(list(followers), padded)
+        after, commands = self.together.command(list(memory.fingers), padded)
         for row, values in enumerate(padded.own):
             seen.own[row + self.count * columns.finger, columns.cell] = values.ravel()[entries]
-        return after, commands.take(entries)
+        return after, commands.take(entries), owner
 
 
 class Group(NamedTuple):
@@ -207,17 +203,18 @@ class HandInGroups(HandControl):
         return [located[i] for i in range(len(memory.fingers))]
 
     def command_each(
-        self, followers: tuple[Follower, ...], seen: Measurement, columns: Columns, shared: Shared
-    ) -> tuple[list[Follower], Commands]:
+        self, memory: Hands, seen: Measurement, columns: Columns
+    ) -> tuple[list[Follower], Commands, Cells]:
         """Let each controller command its column, with its shares of the forces."""
         cells, copies, parts = columns.cell, columns.copies, np.ones(columns.cell.size)
-        parts[copies.number] = shared.shares[copies.row, copies.which]
+        owner, shares = self.division.claim(memory, seen, copies.cells)
+        parts[copies.number] = shares[copies.row, copies.which]
         force = seen.force[cells] * np.maximum(parts, 0.0)
-        after = list(followers)
+        after = list(memory.fingers)
         commands = Commands(np.empty(cells.size), np.empty(cells.size, np.int8), np.empty(cells.size))
-        for group in self._divide(followers, seen, force, columns.finger, cells):
+        for group in self._divide(memory.fingers, seen, force, columns.finger, cells):
             group.seen.quadratic_basis[:, parts[group.entries] == HIDDEN] = OUTSIDE
-            members = [followers[i] for i in group.fingers]
+            members = [memory.fingers[i] for i in group.fingers]
             if group.controller:
                 members, orders = group.controller.command_all(members, group.seen, group.sections)
                 for number, follower in zip(group.fingers, members, strict=True):
@@ -227,7 +224,7 @@ class HandInGroups(HandControl):
                 after[number], orders = self.controllers[number].command(members[0], group.seen)
             commands.target[group.entries], commands.mode[group.entries] = orders.target, orders.mode
             commands.command[group.entries] = orders.command
-        return after, commands
+        return after, commands, owner
 
     def _divide(
         self, followers: tuple[Follower, ...], seen: Measurement, force: Floats, finger: Cells, cells: Cells

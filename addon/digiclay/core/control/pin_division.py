@@ -176,13 +176,17 @@ class PinDivision:
 
     # Before they command their pins.
 
+    def find_owner(self, memory: Hands, seen: Measurement, shared: Cells) -> Cells:
+        """Return which finger each pin in several discs (g,) was assigned to."""
+        if not memory.pressed:
+            return np.full(shared.size, NOBODY)
+        (pressed, owner), cells = memory.pressed, seen.cells[shared]
+        at = np.minimum(pressed.searchsorted(cells), pressed.size - 1)
+        return np.where(pressed[at] == cells, owner[at], NOBODY)
+
     def claim(self, memory: Hands, seen: Measurement, shared: Cells) -> tuple[Cells, Floats]:
         """Return whose the pins in several discs are, (g,), and the share of each finger in them, (f, g)."""
-        owner = np.full(shared.size, NOBODY)
-        if memory.pressed:
-            (pressed, pressing), cells = memory.pressed, seen.cells[shared]
-            at = np.minimum(pressed.searchsorted(cells), pressed.size - 1)
-            owner = np.where(pressed[at] == cells, pressing[at], NOBODY)
+        owner = self.find_owner(memory, seen, shared)
         return owner, self.share_whole(owner)
 
     def mask(self, seen: Measurement) -> None:
@@ -200,14 +204,17 @@ class PinDivision:
         """
         copies = columns.copies
         finger, (x, y) = copies.row, columns.places
-        blisters = Blisters(*(values[finger] for values in self.find_blisters(memory)))
-        square = (x - blisters.x) ** 2 + (y - blisters.y) ** 2
-        inside = square <= blisters.radius * np.abs(blisters.radius)
+        blisters = self.find_blisters(memory)
+        limits = blisters.radius * np.abs(blisters.radius), (UNDER * self.captures[:, 0]) ** 2
+        limit, near, ground, at_x, at_y = np.array((*limits, blisters.ground, blisters.x, blisters.y)).take(
+            finger, axis=1
+        )
+        square = (x - at_x) ** 2 + (y - at_y) ** 2
         commanded = target[copies.number]
         still = np.abs(commanded - seen.target[columns.cells]) <= TIE
-        rank = np.where(inside, np.abs(commanded - blisters.ground), np.where(still, -1.0, -0.5) - square)
-        under = inside & (square <= (UNDER**2 * self.captures**2)[finger, 0])
-        rank = np.where(under, 1.0 - square, rank)
+        outside = np.where(still, -1.0, -0.5) - square
+        rank = np.where(square <= limit, np.abs(commanded - ground), outside)
+        rank = np.where(square <= np.minimum(limit, near), 1.0 - square, rank)
         rank[owner[copies.which] == finger] = PRESSING
         return columns.pick(rank)
 
@@ -267,7 +274,7 @@ class CellDivision(PinDivision):
         at_x, at_y = self._find_places(memory)[finger].T
         order = (x - at_x) ** 2 + (y - at_y) ** 2
         still = np.abs(target[copies.number] - seen.target[columns.cells]) <= TIE
-        order += still & (order > (UNDER**2 * self.captures**2)[finger, 0])
+        order += still & (order > ((UNDER * self.captures) ** 2)[finger, 0])
         order[owner[copies.which] == finger] = -1.0
         return columns.pick(-order)
 

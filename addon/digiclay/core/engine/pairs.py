@@ -14,9 +14,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..base.arrays import TIE, TINY, Cells, Flags, Floats, any_true, find_copies
+from ..base.arrays import TIE, Cells, Flags, Floats, any_true, find_copies
 from ..model.fingers import HandPeriod, HandTouch, gather_places
-from ..model.fingertip import compute_reach
 from ..model.layout import RELATIVE_TOLERANCE, Discs, join_discs
 from ..model.physics import Cell
 from .active_set import Selection
@@ -55,35 +54,14 @@ class HandSelection(Selection):
         """How far pins may rise while a set serves, m."""
         return max(RISE, 2.0 * float(self.period * self.fastest))
 
-    def update(self, state: State, finger: Any, control: Any) -> State:
-        """Return a state whose active cells are all that can change in a period; see `Selection`."""
-        active, periods = state.active, state.active.known
-        if finger is None or active.reach is None or state.period >= active.until:
-            return super().update(state, finger, control)
-        # How far along its path the set serves is worked out once.
-        path, last = periods.get("path", (None, 0))
-        if path is not finger.path:
-            windows = finger.path.windows[finger.number : finger.number + self.kept]
-            last = finger.number + count_inside(active, windows)
-            periods["path"] = finger.path, last
-        serves = finger.number < last and self.serves(active, state.period, None, self.join(control))
-        return state if serves else super().update(state, finger, control)
-
     def serves(self, active: ActiveSet, period: int, window: Any, control: Discs | None) -> bool:
         """Return whether a set has all cells that can change; orders may ask for a disc more."""
-        kept = active.control
-        if control is not None and (kept is None or len(kept[0]) != len(control[0])):
+        former = active.control
+        if control is not None and (former is None or len(former[0]) != len(control[0])):
             return False
-        return self.stays_low(active, period) and super().serves(active, period, window, control)
-
-    def stays_low(self, active: ActiveSet, period: int) -> bool:
-        """Return whether no pin of a set can rise above its peak in a period; it is noted for how many."""
-        known, stroke = active.known, self.cell.actuator.stroke
-        if active.peak < stroke and period >= known.get("low", 0):
-            top = float(np.maximum.reduce(active.block[0], initial=0.0))
-            known["low"] = period + int((active.peak - top) / max(float(self.period * self.fastest), TINY))
-            return bool(period < known["low"])
-        return True
+        top = float(active.block[0].max(initial=0.0)) + float(self.period * self.fastest)
+        low = top <= active.peak or active.peak >= self.cell.actuator.stroke
+        return low and super().serves(active, period, window, control)
 
     def join(self, control: Any) -> Discs | None:
         """Return the controlled discs as arrays."""
@@ -118,16 +96,6 @@ class HandSelection(Selection):
         return taken
 
 
-def count_inside(active: ActiveSet, windows: Floats) -> int:
-    """Return in how many of t periods, the first, all windows (t, 6, f) stay within the reach of a set."""
-    reach = compute_reach(windows.swapaxes(0, 1), active.peak)
-    assert active.reach is not None
-    assert reach is not None
-    (x, y, radius), (at_x, at_y, limit) = reach, active.reach
-    inside = (np.hypot(x - at_x, y - at_y) + radius <= limit * (1.0 + RELATIVE_TOLERANCE)).all(axis=1)
-    return int(np.argmin([*inside, False]))
-
-
 def find_pairs(active: ActiveSet) -> Flags:
     """Return which near cells each of the fingertips may touch, (f, k)."""
     if active.reach is None:
@@ -155,9 +123,9 @@ class HandSystem(System):
 
     def move(self, active: ActiveSet, finger: Any) -> None:
         """Move active cells through a control period under their queued commands, in place."""
-        if self not in active.known:
-            active.known[self] = HandMovement(self, active)
-        active.known[self](finger)
+        if self not in active.movements:
+            active.movements[self] = HandMovement(self, active)
+        active.movements[self](finger)
 
 
 class Pairs:

@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 from ..base.arrays import Cells, Floats
 from ..base.modes import Mode
 from ..model.control_interface import Commands, Measurement
-from ..model.interfaces import Movement
 from ..model.layout import Discs
 
 
@@ -143,18 +142,13 @@ class ActiveSet:
         )
 
     @cached_property
-    def known(self) -> dict[Any, Any]:
-        """What several fingers have worked out for these cells."""
-        return {}
-
-    @cached_property
     def driven(self) -> Floats:
         """What a stepper works on."""
         return self.block[self.rows.driven]
 
     @cached_property
-    def movements(self) -> dict[Any, Movement]:
-        """Steppers prepared for these cells, by their plans."""
+    def movements(self) -> dict[Any, Any]:
+        """Steppers prepared for these cells, by their plans; of several fingers by their system."""
         return {}
 
     @cached_property

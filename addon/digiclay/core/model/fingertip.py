@@ -9,7 +9,6 @@ by a force that grows, not by one that jumps.
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Any, TypeVar
 
 import numpy as np
@@ -78,15 +77,7 @@ class Fingertip(Parameters):
         Center x, y, z, m; matrix of the squared reduced radius S_xx, S_xy, S_yy, 1/m²; tilt of the mid
         surface t_x, t_y; half thickness over the center, m; smaller eigenvalue of S, 1/m².
         """
-        turns, outline = poses[:, 3:], np.empty((len(poses), 10))
-        still = len(poses) > 0 and (turns == turns[0]).all()
-        outline[:] = _outline_still(self, turns[0].tobytes()) if still else self._outline_turned(turns)
-        outline[:, :3] += poses[:, :3]
-        return outline
-
-    def _outline_turned(self, turns: Floats) -> Floats:
-        """Return the outlines (k, 10) of a fingertip at the origin, turned by unit quaternions (k, 4)."""
-        rotation = make_matrices(turns)
+        rotation = make_matrices(poses[:, 3:])
         axes = np.array([self.length, self.width, self.height])
         inverse = np.einsum("kij,j,klj->kil", rotation, axes**2, rotation)
         form = np.einsum("kij,j,klj->kil", rotation, axes**-2.0, rotation)
@@ -96,13 +87,8 @@ class Fingertip(Parameters):
         a, b, c = schur[:, 0, 0], schur[:, 0, 1], schur[:, 1, 1]
         larger = 0.5 * (a + c) + np.hypot(0.5 * (a - c), b)
         smaller = (a * c - b * b) / larger  # eigenvalue
-        return np.column_stack([lowest, schur[:, 0], c, tilt, form[:, 2, 2] ** -0.5, smaller])
-
-
-@lru_cache(64)
-def _outline_still(fingertip: Fingertip, turn: bytes) -> Floats:
-    """Return the outline (1, 10) of a fingertip at the origin; most do not turn from period to period."""
-    return fingertip._outline_turned(np.frombuffer(turn)[None])
+        center = lowest + poses[:, :3]
+        return np.column_stack([center, schur[:, 0], c, tilt, form[:, 2, 2] ** -0.5, smaller])
 
 
 def compute_reaches(outline: Floats) -> Floats:
