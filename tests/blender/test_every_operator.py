@@ -6,6 +6,7 @@ from typing import Any
 import bpy
 import pytest
 from digiclay import operators
+from digiclay.core.session import live_session
 from digiclay.live import handlers, tick
 from digiclay.press import tool
 from digiclay.roles import fingertip_of
@@ -75,6 +76,7 @@ def folder(tmp_path_factory):
 def file(extension, folder, tmp_path, monkeypatch):
     """A file with a small bed, active, beside Blender's cube, made by the first test that asks."""
     monkeypatch.chdir(tmp_path)  # for what is exported
+    monkeypatch.setattr(live_session, "find_spare", lambda *given: 0.0)  # a tick simulates a period
     path = folder / "bed.blend"
     if not path.exists():
         new_bed(rows=5, columns=5)
