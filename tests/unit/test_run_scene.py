@@ -98,7 +98,7 @@ def test_the_summary_is_one_line_with_times_and_rfd(result: Result) -> None:
         ({"recorder": {"every": 2}}, "recorder.every = 2 leaves out commands"),
         ({"recorder": "absent"}, "recorder = 'absent' keeps no command"),
         (
-            {"simulation": {"physics_step": "5 us", "duration": "5 ms"}},
+            {"simulation": {"physics_step": "8 us", "duration": "5 ms"}},
             "physics_step is too short to be halved",
         ),
     ],
