@@ -16,7 +16,6 @@ MENDERS = (
     [*PYTHON, "ruff", "check", "--quiet", "--fix", "."],
     [*PYTHON, "ruff", "format", "--quiet", "."],
     [sys.executable, "tools/manual.py"],
-    [sys.executable, "tools/tool_icon.py"],
 )
 #: Function shown on a page: file and name in a comment, before the block of code.
 SHOWN = re.compile(r"(<!-- ([\w/]+\.py): (\w+) -->\n\n```python\n)(.*?)(```\n)", re.DOTALL)
