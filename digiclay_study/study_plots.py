@@ -1,15 +1,16 @@
-"""Plots of a study's indices and of a tuning's front."""
+"""Plots of a study's indices, of a tuning's front, and of a league."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from digiclay.core.base.arrays import Floats
 from digiclay.core.metrics.summary import find_weber_fractions
 from digiclay.core.studies.evaluation import FIGURES
-from digiclay.plots.figure import INK, LINES, SHADE, canvas, legend_above
+from digiclay.plots.figure import INK, LINES, SHADE, STYLE, empty
 from digiclay.plots.sweep import read_unit
 from numpy.typing import NDArray
 
@@ -19,7 +20,30 @@ from .league import MEASURES, find_interval, list_values, show_digits
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from .league import Row, Table
+    from .league import Interval, Row, Table
+
+
+#: What is left free around panels, inches.
+PADS = dict.fromkeys(("figure.constrained_layout.w_pad", "figure.constrained_layout.h_pad"), 0.12)
+
+
+@contextmanager
+def panels(title: str, width: float, height: float, rows: int, columns: int) -> Iterator[tuple[Figure, Any]]:
+    """Give a figure, inches, and its panels, row by row."""
+    with empty(width, height, STYLE | PADS, layout="constrained") as figure:
+        figure.suptitle(title, x=0.01, ha="left", fontsize=14, fontweight="bold")
+        yield figure, figure.subplots(rows, columns, squeeze=False).ravel()
+
+
+def name_rows(axes: Any, names: Sequence[str]) -> None:
+    """Give the panel a row for each name, the first one at the top: row k is at -k."""
+    axes.set_yticks(-np.arange(len(names)), names)
+    axes.set_ylim(-len(names) + 0.4, 0.6)
+
+
+def put_legend_above(axes: Any, columns: int = 6) -> None:
+    """Put the legend above the panel."""
+    axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=columns, columnspacing=1.2)
 
 
 #: The largest value shown over the least one from which on an axis is logarithmic.
@@ -35,40 +59,29 @@ def draw_front(
     """Draw the trials over two outputs; the first one upwards, the second one to the right."""
     units = [read_unit(FIGURES[name].unit, values[sound, number]) for number, name in enumerate(names)]
     shown = values * [factor for factor, _ in units]
-    with canvas(9.0, 6.2, title) as (figure, place):
-        axes = place("front", 1.0, 0.8, 7.7, 4.55)
-        trials = np.arange(1, len(shown))
-        kept, lost = trials[sound[1:]], trials[~sound[1:]]
-        lost = lost[np.isfinite(shown[lost]).all(axis=1)]
-        _mark(axes, shown[kept], "o", "#B9C7D3", 22, f"{len(kept)} trials")
-        if lost.size:
-            _mark(axes, shown[lost], "x", "#D9C3B5", 24, f"{len(lost)} without the fingertip")
-        steps: Any = shown[front]
-        axes.plot(steps[:, 1], steps[:, 0], "o-", color=LINES[0], markersize=6, zorder=3, label="front")
-        _mark(axes, shown[[0]], "D", LINES[1], 75, "unchanged scene")
-        _mark(axes, shown[[chosen]], "*", LINES[2], 260, "chosen")
-        axes.set_ylabel(_label(names[0], units[0][1]))
-        axes.set_xlabel(_label(names[1], units[1][1]))
-        outside = _frame(axes, shown, np.concatenate([front, [0]]), trials)
-        if outside:
-            note = f"{outside} trials are outside the axes"
-            axes.text(1.0, -0.155, note, transform=axes.transAxes, ha="right")
-        close = {"borderaxespad": 0.2, "handletextpad": 0.3, "columnspacing": 1.2}
-        axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=5, **close)
+    y_label, x_label = (
+        f"{name} ({unit})" if unit else name for name, (_, unit) in zip(names, units, strict=True)
+    )
+    trials = np.arange(1, len(shown))
+    kept, lost = trials[sound[1:]], trials[~sound[1:]]
+    lost = lost[np.isfinite(shown[lost]).all(axis=1)]
+    edge = {"edgecolors": INK, "linewidths": 0.8, "zorder": 4}
+    marks: list[tuple[Any, dict[str, Any]]] = [
+        (kept, {"marker": "o", "color": "#B9C7D3", "s": 22, "label": f"{len(kept)} trials"}),
+        (lost, {"marker": "x", "color": "#D9C3B5", "s": 24, "label": f"{len(lost)} without the fingertip"}),
+        ([0], {"marker": "D", "color": LINES[1], "s": 75, "label": "unchanged scene", **edge}),
+        ([chosen], {"marker": "*", "color": LINES[2], "s": 260, "label": "chosen", **edge}),
+    ]
+    with panels(title, 9.0, 6.2, 1, 1) as (figure, (axes,)):
+        for rows, look in marks:
+            if len(rows):
+                axes.scatter(shown[rows, 1], shown[rows, 0], **look)
+        axes.plot(shown[front, 1], shown[front, 0], "o-", color=LINES[0], zorder=3, label="front")
+        outside = _frame(axes, shown, np.append(front, 0), trials)
+        note = f"\n{outside} trials are outside the axes" if outside else ""
+        axes.set(xlabel=x_label + note, ylabel=y_label)
+        put_legend_above(axes)
     return figure
-
-
-def _mark(axes: Any, points: Floats, marker: str, color: str, size: float, label: str) -> None:
-    """Draw markers, large ones over small ones."""
-    large = size > 30
-    look: dict[str, Any] = {"marker": marker, "label": label, "zorder": 4 if large else 2}
-    if marker != "x":
-        look |= {"edgecolors": INK if large else "none", "linewidths": 0.8}
-    axes.scatter(points[:, 1], points[:, 0], size, color, **look)
-
-
-def _label(name: str, unit: str) -> str:
-    return f"{name} ({unit})" if unit else name
 
 
 def _frame(axes: Any, shown: Floats, inside: NDArray[np.intp], trials: NDArray[np.intp]) -> int:
@@ -89,63 +102,48 @@ def _frame(axes: Any, shown: Floats, inside: NDArray[np.intp], trials: NDArray[n
     return int(np.count_nonzero(out[trials]))
 
 
-#: Inches: a panel, and what stands around it.
-ACROSS, A_PARAMETER, BESIDE, GAP, ABOVE, BELOW = 3.1, 0.52, 0.35, 0.35, 0.95, 0.65
-#: Inches a letter of a parameter's name takes at most.
-LETTER = 0.105
 #: Height of a bar; parameters are 1 apart.
 BAR = 0.36
 #: The axes reach from 0 to 1 at least, and no farther than this for wide intervals.
 FARTHEST = (-0.4, 1.4)
+#: Bars of a parameter: their order, side, color, hatch and label.
+BARS = (
+    ("first", 0.5, LINES[0], "", "alone (first order)"),
+    ("total", -0.5, LINES[1], "////", f"with interactions (total), {CONFIDENCE:.0%} intervals"),
+)
 
 
 def draw_indices(keys: Sequence[str], found: Mapping[str, Indices | None], title: str) -> Figure:
     """Draw first-order and total indices of each output, those with the largest totals at the top."""
-    varying = [indices for indices in found.values() if indices is not None]
-    low, high = _find_ends(varying)
-    totals = [indices["total"][0] for indices in varying]
-    order = np.argsort(np.max(totals, axis=0)) if totals else np.arange(len(keys))
-    beside = BESIDE + LETTER * max(len(key) for key in keys)
-    width = beside + len(found) * (ACROSS + GAP)
-    up = A_PARAMETER * len(keys) + 0.2
-    height = ABOVE + up + BELOW
-    with canvas(width, height, title) as (figure, place):
-        for number, (name, indices) in enumerate(found.items()):
-            axes = place(name, beside + number * (ACROSS + GAP), BELOW, ACROSS, up)
-            axes.set(xlim=(low, high), ylim=(-0.6, len(keys) - 0.4), title=name)
-            axes.set_xlabel("share of the variance")
-            axes.set_yticks(range(len(keys)), [keys[i] for i in order] if number == 0 else [])
-            axes.tick_params(axis="y", length=0)
-            axes.grid(visible=False, axis="y")
-            axes.axvline(0.0, color=INK, linewidth=0.8)
+    totals = [indices["total"][0] for indices in found.values() if indices is not None]
+    order = np.argsort(-np.max(totals, axis=0)) if totals else np.arange(len(keys))
+    rows, whisker = -np.arange(len(keys)), {"ecolor": INK, "elinewidth": 1.1, "capsize": 2.5}
+    size = 1.5 + 3.4 * len(found), 1.8 + 0.52 * len(keys)
+    with panels(title, *size, 1, len(found)) as (figure, axes):
+        for panel, (name, indices) in zip(axes, found.items(), strict=True):
+            for each, side, color, hatch, label in BARS:
+                values, interval = (part[order] for part in indices[each]) if indices else (rows * 0.0, None)
+                look = {
+                    "color": color,
+                    "hatch": hatch,
+                    "edgecolor": "white",
+                    "linewidth": 0.0,
+                    "label": label,
+                }
+                panel.barh(rows + side * BAR, values, BAR, xerr=interval, error_kw=whisker, **look)
             if indices is None:
-                axes.text(0.5, 0.5, "does not vary", transform=axes.transAxes, ha="center", va="center")
-            else:
-                _draw_bars(axes, indices, order)
-        handles, labels = figure.axes[0].get_legend_handles_labels()
-        if handles:
-            figure.legend(handles, labels, loc="upper right", ncols=2, bbox_to_anchor=(1.0, 1.0))
+                panel.text(0.5, 0.5, "does not vary", transform=panel.transAxes, ha="center", va="center")
+            name_rows(panel, [keys[i] for i in order] if panel is axes[0] else [""] * len(keys))
+            panel.set(title=name, xlabel="share of the variance")
+            panel.tick_params(axis="y", length=0)
+            panel.grid(visible=False, axis="y")
+            panel.axvline(0.0, color=INK, linewidth=0.8)
+        ends = np.array([panel.get_xlim() for panel in axes])
+        low, high = max(min(ends.min(), -0.05), FARTHEST[0]), min(max(ends.max(), 1.05), FARTHEST[1])
+        for panel in axes:
+            panel.set_xlim(low, high)
+        figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower right", ncols=2)
     return figure
-
-
-def _find_ends(found: Sequence[Indices]) -> tuple[float, float]:
-    """Return the ends of the axes that show the bars with their intervals."""
-    bars = [indices[order] for indices in found for order in ("first", "total")]
-    low = min([0.0, *(float(np.min(values - interval)) for values, interval in bars)])
-    high = max([1.0, *(float(np.max(values + interval)) for values, interval in bars)])
-    return max(low - 0.05, FARTHEST[0]), min(high + 0.05, FARTHEST[1])
-
-
-def _draw_bars(axes: Any, indices: Indices, order: Any) -> None:
-    """Draw the bars of an output."""
-    rows, whisker = np.arange(len(order)), {"ecolor": INK, "elinewidth": 1.1, "capsize": 2.5}
-    total = f"with interactions (total), {CONFIDENCE:.0%} intervals"
-    for name, label, side, color, hatch in (
-        ("first", "alone (first order)", 0.5, LINES[0], ""), ("total", total, -0.5, LINES[1], "////"),
-    ):  # fmt: skip
-        values, interval = (part[order] for part in indices[name])
-        look = {"color": color, "hatch": hatch, "edgecolor": "white", "linewidth": 0.0, "label": label}
-        axes.barh(rows + side * BAR, values, BAR, xerr=interval, error_kw=whisker, **look)
 
 
 #: Marks of the methods, which differ without their colors.
@@ -154,75 +152,66 @@ MARKS = "osD^vP*X<>"
 PANELS = ("lag_mean", "ridge_unevenness", "ridge-limit", "lift-limit", "max_total_force", "period_cost")
 
 
+def mark(axes: Any, row: float, mean: Interval, number: int, factor: float, **more: Any) -> dict[str, Any]:
+    """Mark the mean of a method in a row, with its interval; return the look of the method's marks."""
+    look = {"color": LINES[number % len(LINES)], "marker": MARKS[number % len(MARKS)]}
+    half = (mean.half or 0.0) * factor
+    axes.errorbar(mean.mean * factor, row, xerr=half, linestyle="", markersize=8, capsize=4, **look, **more)
+    return look
+
+
 def draw_rfd(table: Table, methods: Sequence[str]) -> Figure:
     """Draw the RFD of every trajectory: a small mark a seed, a large one the mean, with its interval.
 
     The shaded band holds the just noticeable differences of the first method's set point.
     """
-    names = list(dict.fromkeys(name for (_, name, _), found in table.items() if found.get("rfd") is not None))
     from matplotlib.ticker import LogFormatter
 
-    high = 0.27 * max(len(names), 1)
-    with canvas(11.0, high + 1.7, "Reference force deviation by trajectory") as (figure, place):
-        axes = place("rfd", 1.7, 0.75, 8.9, high)
+    names = list(dict.fromkeys(name for (_, name, _), found in table.items() if found.get("rfd") is not None))
+    size = 11.0, 0.27 * max(len(names), 1) + 1.7
+    with panels("Reference force deviation by trajectory", *size, 1, 1) as (figure, (axes,)):
         for number, method in enumerate(methods):
-            _mark_method(axes, table, method, number, names)
+            label: str | None = method
+            for line, name in enumerate(names):
+                values = [rfd for rfd in list_values(table, method, name, "rfd") if rfd]
+                if mean := find_interval(values):
+                    row = -line - 0.18 * (number % 3 - 1)
+                    look = mark(axes, row, mean, number, 1e3, label=label)
+                    small = {"linestyle": "", "markersize": 3, "alpha": 0.6, **look}
+                    axes.plot(1e3 * np.array(values), np.full(len(values), row), **small)
+                    label = None
         points = [found.get("set_point") for (own, _, _), found in table.items() if own == methods[0]]
         set_point = next((value for value in points if value is not None), None)
         if set_point is not None:
             edges = [share * set_point / 1e-3 for share in find_weber_fractions(set_point)]
             axes.axvspan(*edges, color=SHADE, zorder=0, label="one JND of the set point")
-        axes.set_yticks(-np.arange(len(names)), names)
-        axes.set(ylim=(-len(names) + 0.4, 0.6), xlabel="RFD (mN)", xscale="log")
+        name_rows(axes, names)
+        axes.set(xlabel="RFD (mN)", xscale="log")
         axes.xaxis.set_major_formatter("{x:g}")
         axes.xaxis.set_minor_formatter(LogFormatter(minor_thresholds=(1.0, 0.4)))  # 20, not 2 × 10¹
-        legend_above(axes)
+        put_legend_above(axes)
     return figure
-
-
-def _mark_method(axes: Any, table: Table, method: str, number: int, names: Sequence[str]) -> None:
-    """Draw the marks of a method."""
-    style: dict[str, Any] = {"color": LINES[number % len(LINES)], "marker": MARKS[number % len(MARKS)]}
-    shift = 0.18 * (number % 3 - 1)
-    label: str | None = method
-    for line, name in enumerate(names):
-        values = [1e3 * rfd for rfd in list_values(table, method, name, "rfd") if rfd]
-        if mean := find_interval(values):
-            row = -line - shift
-            axes.plot(np.array(values), np.full(len(values), row), ls="", markersize=3, alpha=0.6, **style)
-            whole = {"linestyle": "", "markersize": 7, "capsize": 3, "label": label}
-            axes.errorbar(mean.mean, row, xerr=mean.half, **whole, **style)
-            label = None
 
 
 def draw_measures(league: Sequence[Row], methods: Sequence[str]) -> Figure:
-    """Draw a panel a measure of the league: a mark a method, with its interval."""
-    panels = [name for name in PANELS if any(row.measures.get(name) for row in league)]
-    lines = -(-len(panels) // 2)
-    bar = 0.42 * len(league) + 0.2
-    height = lines * (bar + 1.0) + 0.5
-    with canvas(13.0, height, "League of methods: means and intervals") as (figure, place):
-        for number, measure in enumerate(panels):
-            metric = MEASURES[measure]
-            row, column = divmod(number, 2)
-            axes = place(measure, 1.75 + 6.4 * column, 0.5 + (lines - 1 - row) * (bar + 1.0), 4.3, bar)
-            for line, one in enumerate(league):
-                _mark_interval(axes, one, measure, -line, methods.index(one.method), metric.factor)
-            axes.set_yticks(-np.arange(len(league)), [one.method for one in league])
-            axes.set(ylim=(-len(league) + 0.4, 0.6), title=metric.title)
-            low, far = axes.get_xlim()
-            axes.set_xlim(0.0, 1.3 * max(far, low, 1e-9))
+    """Draw a panel a measure of the league: a mark a method, with its interval and the mean beside it."""
+    names = [name for name in PANELS if any(row.measures.get(name) for row in league)]
+    lines = -(-len(names) // 2)
+    size = 13.0, lines * (0.42 * len(league) + 1.2) + 0.5
+    with panels("League of methods: means and intervals", *size, lines, 2) as (figure, axes):
+        for panel in axes[len(names) :]:
+            panel.set_axis_off()
+        for panel, name in zip(axes, names, strict=False):
+            factor = MEASURES[name].factor
+            for line, row in enumerate(league):
+                mean = row.measures.get(name)
+                if mean is None:
+                    panel.text(0.0, -line, " –", va="center", color=INK)
+                    continue
+                mark(panel, -line, mean, methods.index(row.method), factor)
+                right = (mean.mean + (mean.half or 0.0)) * factor, -line
+                beside = {"xytext": (8, 0), "textcoords": "offset points", "va": "center", "fontsize": 11}
+                panel.annotate(show_digits(mean.mean * factor), right, **beside)
+            name_rows(panel, [row.method for row in league])
+            panel.set(title=MEASURES[name].title, xlim=(0.0, 1.3 * max(panel.get_xlim()[1], 1e-9)))
     return figure
-
-
-def _mark_interval(axes: Any, row: Row, measure: str, line: int, number: int, factor: float) -> None:
-    """Draw the mark of a method with its interval, and the mean beside it."""
-    interval = row.measures.get(measure)
-    if interval is None:
-        axes.text(0.0, line, " –", va="center", fontsize=11, color=INK)
-        return
-    mean, half = interval.mean * factor, (interval.half or 0.0) * factor
-    style = {"color": LINES[number % len(LINES)], "marker": MARKS[number % len(MARKS)]}
-    axes.errorbar(mean, line, xerr=half, markersize=8, capsize=4, **style)
-    beside = {"xytext": (8, 0), "textcoords": "offset points", "va": "center", "fontsize": 11}
-    axes.annotate(show_digits(mean), (mean + half, line), **beside)
