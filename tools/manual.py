@@ -7,12 +7,9 @@ not shipped.
 import re
 from pathlib import Path
 from string import Template
-from xml.etree.ElementTree import Element
 
 from markdown import Markdown
-from markdown.extensions import Extension
 from markdown.extensions.toc import TocExtension
-from markdown.treeprocessors import Treeprocessor
 
 ROOT = Path(__file__).resolve().parents[1]
 GUIDE = ROOT / "docs" / "guide.md"
@@ -21,25 +18,8 @@ PAGE = ROOT / "addon" / "digiclay" / "manual" / "guide.html"
 TEMPLATE = Path(__file__).with_suffix(".html")
 
 
-class OnePage(Treeprocessor):
-    """Removal of what leads out of the page: pictures with their paragraphs, targets of links."""
-
-    def run(self, root: Element) -> None:
-        """Change the tree of the page."""
-        for parent in list(root.iter()):
-            for child in [part for part in parent if part.tag == "p" and part.find("img") is not None]:
-                parent.remove(child)
-        for link in root.iter("a"):
-            if not link.get("href", "").startswith("#"):
-                link.tag, link.attrib = "span", {}
-
-
-class OnePageExtension(Extension):
-    """`OnePage` as the Markdown package takes it: after links and pictures are known."""
-
-    def extendMarkdown(self, md: Markdown) -> None:
-        """Add the change of the tree."""
-        md.treeprocessors.register(OnePage(md), "one_page", 10)
+#: A picture with its paragraph, and a link to another page.
+PICTURE, LINK = re.compile(r"<p><img [^>]*></p>\n?"), re.compile(r'<a href="(?!#)[^"]*">(.*?)</a>', re.DOTALL)
 
 
 def make_anchor(heading: str, separator: str) -> str:
@@ -50,8 +30,8 @@ def make_anchor(heading: str, separator: str) -> str:
 def render(guide: str) -> str:
     """Return the page of a guide; its contents stand below its title."""
     contents = TocExtension(toc_depth="2-3", slugify=make_anchor)
-    reader = Markdown(extensions=["tables", contents, OnePageExtension()])
-    body = reader.convert(guide)
+    reader = Markdown(extensions=["tables", contents])
+    body = LINK.sub(r"<span>\1</span>", PICTURE.sub("", reader.convert(guide)))
     nav = re.sub(r"</?div[^>]*>\s*", "", reader.toc).strip()
     title, heading, rest = re.match(r"(<h1[^>]*>(.*?)</h1>)(.*)", body, re.DOTALL).group(2, 1, 3)
     body = f'{heading}\n<nav aria-label="Contents">\n{nav}\n</nav>{rest}'
