@@ -1,15 +1,12 @@
 """Benchmark ``kernels``: sessions on other kernels of numpy's library, or with another numpy."""
 
 import argparse
-import os
-import subprocess
 import sys
 import tempfile
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from digiclay.core.base.errors import DigiclayError
 from digiclay.core.engine.simulation import begin, periods
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.scene_source import find, list_samples, make_scene, read_table
@@ -17,6 +14,7 @@ from digiclay.core.scene.schema import Scene
 
 from digiclay_study.method_trials import GROUPS, LIMITS, RANDOM, list_trajectories, place_trial
 
+from .processes import ROOT, run_python
 from .report import Report, Row, Steps, tabulate
 
 #: Methods that carry a blister, and behaviors.
@@ -32,10 +30,9 @@ KERNELS = {
     },
 }
 REFERENCE = "Haswell"
-ROOT = Path(__file__).parents[1]
 SESSION, DRAGS = "ridge_mound_valley", 8
-#: With --quick one run of so many; every so many control periods are compared; longest of a kernel, s.
-QUICK, EVERY, LONGEST = 12, 10, 7200.0
+#: With --quick one run of so many; every so many control periods are compared.
+QUICK, EVERY = 12, 10
 
 
 def list_scenes() -> dict[str, Scene]:
@@ -83,7 +80,10 @@ def measure(arguments: argparse.Namespace, steps: Steps) -> Report:
     with tempfile.TemporaryDirectory() as scratch:
         folders = {name: Path(scratch) / str(number) for number, name in enumerate(kernels)}
         for name in steps.through(list(kernels)):
-            _run(name, *kernels[name], folders[name], step)
+            python, change = kernels[name]
+            folders[name].mkdir()
+            words = "-m", "benchmarks.kernels", str(folders[name]), str(step)
+            run_python(ROOT, f"kernels: {name}", *words, python=python, **change)
             files = sorted(folders[name].iterdir(), key=lambda file: int(file.stem))
             for file in files if name != REFERENCE else ():
                 found = _compare(file, folders[REFERENCE] / file.name)
@@ -109,25 +109,7 @@ def measure(arguments: argparse.Namespace, steps: Steps) -> Report:
 def _find_numpy(python: str) -> str:
     """Return the name and version of the numpy of a Python."""
     script = "import numpy; print('numpy', numpy.__version__)"
-    found = subprocess.run(
-        [python, "-c", script], capture_output=True, text=True, timeout=LONGEST, check=False
-    )
-    if found.returncode:
-        raise DigiclayError(f"kernels: {python} has no numpy that can be imported.")
-    return found.stdout.strip()
-
-
-def _run(name: str, python: str, change: dict[str, str], folder: Path, step: int) -> None:
-    """Record runs in a process with a changed environment, in files of a folder."""
-    folder.mkdir()
-    paths = {"PYTHONPATH": os.pathsep.join([str(ROOT / "addon"), str(ROOT)]), "OPENBLAS_NUM_THREADS": "1"}
-    words = [python, "-m", "benchmarks.kernels", str(folder), str(step)]
-    environment = {**os.environ, **paths, **change}
-    done = subprocess.run(
-        words, cwd=ROOT, env=environment, capture_output=True, text=True, timeout=LONGEST, check=False
-    )
-    if done.returncode:
-        raise DigiclayError(f"kernels: {name} failed: {done.stderr.strip().splitlines()[-1][:200]}.")
+    return run_python(ROOT, f"kernels: {python}", "-c", script, python=python).strip()
 
 
 def _compare(file: Path, other: Path) -> Row:

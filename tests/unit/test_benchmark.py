@@ -141,7 +141,7 @@ def test_two_commits_are_timed_by_their_own_code(tmp_path):
     (tree / "addon" / "digiclay" / "core" / "engine" / "simulation.py").write_text(
         "1 / 0\n", encoding="utf-8"
     )
-    with pytest.raises(DigiclayError, match=r"^commits: HEAD cannot be timed: ZeroDivisionError: division"):
+    with pytest.raises(DigiclayError, match=r"^commits: HEAD failed: ZeroDivisionError: division"):
         processes.run_commit(tree, "HEAD", 2)
 
 
