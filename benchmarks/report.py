@@ -13,7 +13,7 @@ from typing import Any, TextIO, TypeVar
 import numpy as np
 from digiclay.commands.progress import Line, draw_share, table
 from digiclay.core.base.errors import explain_os_error
-from digiclay.plots.figure import LINES, empty, save
+from digiclay.plots.figure import LINES, STYLE, empty, save
 
 from digiclay_study.suite_page import describe_machine
 
@@ -23,10 +23,8 @@ Row = Mapping[str, Any]
 
 #: Okabe and Ito's palette: of the first and second line.
 BLUE, RED = LINES[:2]
-STYLE: dict[str, Any] = {
-    "font.family": "DejaVu Sans", "font.size": 10, "axes.titlelocation": "left", "axes.titlesize": 11,
-    "axes.spines.top": False, "axes.spines.right": False, "axes.grid": True, "grid.color": "#E0DED8",
-    "grid.linewidth": 0.7, "axes.axisbelow": True, "legend.frameon": False, "figure.dpi": 150,
+LOOK = STYLE | {
+    "font.size": 10, "axes.titlesize": 11, "figure.dpi": 150,
     "axes.prop_cycle": f"cycler(linestyle=['-', '--', ':']) * "
     f"cycler(color={[*LINES]}, marker={[*'os^DvX']})",
 }  # fmt: skip
@@ -133,7 +131,7 @@ class Report:
             (out / f"{name}.csv").write_text(figures.getvalue(), encoding="utf-8")
         if self.draw:
             size = self.draw.size if isinstance(self.draw, Curves) else self.size
-            with empty(*size, STYLE, layout="constrained") as figure:
+            with empty(*size, LOOK, layout="constrained") as figure:
                 self.draw(figure)
                 save(figure, out / f"{name}.png")
 
