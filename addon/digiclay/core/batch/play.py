@@ -13,6 +13,7 @@ from ..base.errors import DivergenceError
 from ..engine.simulation import CHUNK, find_divergence, simulate_period
 from ..engine.state import State
 from ..engine.system import System
+from ..model.control_interface import count_losses
 from ..model.fingertip import require_one
 from ..model.touch import FingerPath, FingerPeriod, join_paths, trace_finger
 from ..model.trajectory import Trajectory
@@ -140,7 +141,7 @@ class Instant:
     def ended(self, index: int) -> Ended:
         """Return how far the run at an index of the last axis has come."""
         state = self.play.state
-        return Ended(state.period, self.share, getattr(state.memory[index], "losses", None))
+        return Ended(state.period, self.share, count_losses(state.memory[index]))
 
 
 def play_all(play: Play, ends: Mapping[int, int], stopped: Callable[[], bool] | None) -> Iterator[Instant]:

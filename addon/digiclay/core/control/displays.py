@@ -17,7 +17,7 @@ from ..base.modes import Mode
 from ..base.quantity import quantity
 from ..files.formats import map_array
 from ..model.actuator import Actuator
-from ..model.control_interface import Commands, Controller, Measurement
+from ..model.control_interface import Commands, Controller, Measurement, count_losses
 from ..model.layout import Disc, Grid
 from ..shapes.request import Shape
 from .device_info import DeviceInfo, check_floor
@@ -29,7 +29,7 @@ from .drive import (
     check_damping,
     make_drive,
     raise_felt_force,
-)  # fmt: skip
+)
 from .servo import declare_again, take_cells
 
 #: How the name of a file of values ends.
@@ -189,9 +189,13 @@ class ShapeDisplay(DriveParameters):
 
     shape: str = quantity("dome", "displayed shape: its name, or a file .npy of heights, m")
     amplitude: float = quantity(
-        10e-3, "height of a named shape over the bed at rest", unit="m", symbol="h_s",
-        at_least=-100.0, at_most=100.0,
-    )  # fmt: skip
+        10e-3,
+        "height of a named shape over the bed at rest",
+        unit="m",
+        symbol="h_s",
+        at_least=-100.0,
+        at_most=100.0,
+    )
     refresh: str = quantity(
         "one_time",
         "method of refresh",
@@ -313,7 +317,7 @@ class Handed(NamedTuple):
     @property
     def losses(self) -> int | None:
         """Number of losses of the method, where it counts them."""
-        return getattr(self.method, "losses", None)
+        return count_losses(self.method)
 
 
 @dataclass(frozen=True, eq=False)

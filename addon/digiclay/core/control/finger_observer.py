@@ -176,19 +176,18 @@ class FingerObserver:
         rows = np.vstack((basis[:3], under, touched.height.take(here)))
         total, x, y, z, height = rows.dot(force).tolist()
         x, y, height = x / total, y / total, height / total
-        memory = Follower(
-            SHAPING,
-            memory.period,
-            self.finger.begin(x, y, z / total),
-            height,
-            height,
-            Heading(x, y),
+        follower = Follower(
+            phase=SHAPING,
+            period=memory.period,
+            estimate=self.finger.begin(x, y, z / total),
+            top=height,
+            edge=height,
+            heading=Heading(x, y),
             felt=height,
             losses=memory.losses,
             due=self.unknown,
         )
-        (memory,) = self._fit([memory], touched, here, WHOLE)
-        return memory
+        return self._fit([follower], touched, here, WHOLE)[0]
 
     def _fit(
         self, memories: list[Follower], touched: Measurement, here: Cells, sections: Whole
@@ -208,7 +207,7 @@ class FingerObserver:
             x, y, *_ = estimate.mean.tolist()
             if math.dist((x, y), memory.estimate.mean.tolist()[:2]) <= self.farthest:
                 heading = update_heading(memory.heading, x, y, self.travel)
-                after.append(memory.fit(estimate, heading))
+                after.append(memory._replace(estimate=estimate, heading=heading, alone=0))
             else:
                 # No fingertip is that quick: these undersides are not its own.
                 left[part] = 0.0

@@ -134,9 +134,18 @@ def make_flow_servo(cell: Cell, period: float, dead_time: float, dead_band: floa
     ahead = 2.0 * period + math.floor(delay / period + 1e-9) * period
     exact = bool(np.allclose(2.0 * half, up, rtol=1e-6, atol=1e-12))
     return FlowServo(
-        cell, ratios, openings, float(down[-1]), float(up[-1]), -supply.low * area, supply.high * area,
-        ahead, left or (0.0,), dead_band, exact,
-    )  # fmt: skip
+        cell,
+        ratios,
+        openings,
+        float(down[-1]),
+        float(up[-1]),
+        -supply.low * area,
+        supply.high * area,
+        ahead,
+        left or (0.0,),
+        dead_band,
+        exact,
+    )
 
 
 def _measure_lag(cell: Cell, period: float) -> float:

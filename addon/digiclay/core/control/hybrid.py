@@ -223,10 +223,10 @@ class HybridControl:
         if memories[0].master.phase is not IDLE:
             memory, disc = self._substitute(memories[0], touched)
             return [memory], [disc]
-        predict = self.finger.predict
-        memories = [
-            own.move_on(own.estimate if own.phase is IDLE else predict(own.estimate)) for own in memories
-        ]
+        memories = [memory._replace(period=memory.period + 1) for memory in memories]
+        if memories[0].phase is not IDLE:
+            predict = self.finger.predict
+            memories = [memory._replace(estimate=predict(memory.estimate)) for memory in memories]
         if touched.force.size:
             memories = self._observer.observe(memories, touched, sections)
         else:
@@ -318,46 +318,54 @@ class HybridControl:
     def _move_blister(
         self,
         memory: Follower,
-        found: tuple[float, float] | None,
+        solved: tuple[float, float] | None,
         force: float,
         cells: int,
         edge: float,
         aim: Aim,
         speed: float,
     ) -> Follower:
-        """Return the memory with the top moved to where it was found, with a total force predicted, m, N.
+        """Return the memory with the top where it is solved to be, m, with the predicted total force, N.
 
         `force` of so many cells, N; surface, m; lowest point of the fingertip, m, and its speed, m/s.
         """
-        top, felt, trim, due, doubt = memory.felt, memory.felt, memory.trim, self._unknown, memory.doubt
-        master = memory.master
+        asked, top, due = self.parameters.force_setpoint, memory.felt, self._unknown
         if not memory.alone:
-            (top, coming), asked = found or (felt, 0.0), self.parameters.force_setpoint
+            top, coming = solved or (top, 0.0)
             goes, beyond = self._leaves(memory)
             carried = memory.trim != 0.0  # one that has just landed does not leave, wherever it is estimated
             if carried and (goes or beyond) and top > (along := self._move_top(memory)):
                 top, coming = along, -1.0  # fewer cells carry the fingertip, and none is to rise for it
             top = min(max(top, 0.0), self.device.cell.actuator.stroke)
             # The trim belongs to a force that pins reach.
-            coming -= trim * (coming == asked + trim)
-            due, doubt = (*memory.due[1:], coming), self._doubt(memory, force, cells)
+            coming -= memory.trim * (coming == asked + memory.trim)
+            due, doubt, losses = (*memory.due[1:], coming), self._doubt(memory, force, cells), memory.losses
             if beyond and not (carried and goes) and force < LEARNED * asked:
                 phase = SHAPING if carried else SPRINGING
-                master = Master(phase, height=math.nan, losses=memory.losses)
+                memory = memory._replace(master=Master(phase, height=math.nan, losses=losses))
             elif doubt > (DOUBTED * asked) ** 2:
                 (x, y, *_), due, doubt = memory.estimate.mean.tolist(), memory.due, 0.0
-                shaping, heading, losses = SHAPING, memory.heading, memory.losses
-                master = Master(shaping, x, y, top, 0.0, top, edge, heading, top, 0, losses)
+                master = Master(
+                    phase=SHAPING,
+                    x=x,
+                    y=y,
+                    height=top,
+                    reference=top,
+                    edge=edge,
+                    heading=memory.heading,
+                    felt=top,
+                    losses=losses,
+                )
+                memory = memory._replace(master=master)
             if abs(asked - force) <= LEARNED * asked:
                 learned = (asked - force) * self.device.period / self.parameters.trim_time
-                trim += learned * (coming >= 0.0)
-                felt, trim = top, min(max(trim, -LEARNED * asked), LEARNED * asked)
+                trim = memory.trim + learned * (coming >= 0.0)
+                most = LEARNED * asked
+                memory = memory._replace(felt=top, trim=min(max(trim, -most), most))
+            memory = memory._replace(doubt=doubt)
         x, y, _ = aim
         reach = self.profile.find_reach(top - edge, speed)
-        first, heading, (alone, losses) = memory[:3], memory.heading, memory[8:10]
-        return Follower(
-            *first, top, edge, heading, trim, felt, alone, losses, x, y, reach, due, doubt, master
-        )
+        return memory._replace(top=top, edge=edge, led_x=x, led_y=y, led_radius=reach, due=due)
 
     def _leaves(self, memory: Follower) -> tuple[bool, bool]:
         """Tell whether the fingertip goes off the bed, and whether it is beyond, where few pins carry it."""

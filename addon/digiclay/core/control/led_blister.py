@@ -57,7 +57,7 @@ class LeadProfile:
 
 
 class Follower(NamedTuple):
-    """Memory of the controller."""
+    """What Method III remembers of the fingertip that it follows, see `following.Follower`."""
 
     phase: Phase = IDLE
     period: int = 0
@@ -83,17 +83,6 @@ class Follower(NamedTuple):
     of the last periods were off, N²."""
     master: Master = Master()
     """Memory of Method I while it takes over; IDLE: it does not."""
-
-    # What changes every period is written out: `_replace` takes twice as long.
-
-    def move_on(self, estimate: Estimate) -> Follower:
-        """Return the memory a period later, with a predicted fingertip."""
-        return Follower(self.phase, self.period + 1, estimate, *self[3:])
-
-    def fit(self, estimate: Estimate, heading: Heading) -> Follower:
-        """Return the memory with a fingertip that has been felt."""
-        phase, period, _, top, edge, _, trim, felt, *_ = self
-        return Follower(phase, period, estimate, top, edge, heading, trim, felt, 0, *self[9:])
 
     @property
     def ground(self) -> float:

@@ -3,7 +3,6 @@
 What a scene, a panel or a comparison has to know of a method it finds here, by `find_method`.
 """
 
-import importlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -12,6 +11,7 @@ from ..base.errors import ParameterError
 from ..base.quantity import Parameters, find_nearest_name
 from ..files.tables import show_value
 from ..model.control_interface import SetPoint
+from ..model.laws import import_part
 
 
 class Pace(NamedTuple):
@@ -69,22 +69,18 @@ class Method:
 
     def import_parameters(self) -> type[ControlParameters]:
         """Import the class of its parameters."""
-        kind: type[ControlParameters] = getattr(self._import(), self.parameters)
+        kind: type[ControlParameters] = import_part(self.module, self.parameters)
         return kind
 
     def build(self, parameters: Any, device: Any) -> Any:
         """Return its controller for a `DeviceInfo`, or raise a ParameterError that says what does not fit."""
-        return self._import().build(parameters, device)
+        return import_part(self.module, "build")(parameters, device)
 
     def describe(self) -> str:
         """Return what it does, in the first line of its class, where it has one of its own."""
         kind = self.import_parameters()
         line = (kind.__doc__ or "").strip().partition("\n")[0].removesuffix(".")
         return "" if line.startswith(f"{kind.__name__}(") else line
-
-    def _import(self) -> Any:
-        """Import its module."""
-        return importlib.import_module(f"..{self.module}", __package__)
 
 
 #: A .blend keeps a method's place in this table: new ones are added at its end.

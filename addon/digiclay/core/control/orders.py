@@ -292,9 +292,16 @@ class LockingControl(Around):
 
 
 def order_periods(
-    method: Controller, grid: Grid, cell: Cell, period: float, orders: Orders,
-    latency: float = 0.0, floor: float = 0.0, *, locked: bool = False,
-) -> Iterator[Controller]:  # fmt: skip
+    method: Controller,
+    grid: Grid,
+    cell: Cell,
+    period: float,
+    orders: Orders,
+    latency: float = 0.0,
+    floor: float = 0.0,
+    *,
+    locked: bool = False,
+) -> Iterator[Controller]:
     """Yield the controller of each control period, s.
 
     `latency`: from a command to what is measured of it, s; `floor`: distance from which on a height that is

@@ -310,7 +310,7 @@ def guard(build: Any, origin: str, file: str, period: float) -> Guarded:
     try:
         inner = build()
         for function in ("begin", "locate", "command"):
-            if not callable(getattr(inner, function, None)):
+            if function not in dir(inner):
                 raise TypeError(f"must return a controller with {function} (got {type(inner).__name__})")
         rows = inner.rows
         if not isinstance(rows, int) or isinstance(rows, bool) or not 0 <= rows <= MOST_ROWS:

@@ -55,6 +55,12 @@ class Commands(NamedTuple):
         return Commands(self.target.take(entries), self.mode.take(entries), self.command.take(entries))
 
 
+def count_losses(memory: Memory) -> int | None:
+    """Return how often the fingertip was lost; None: the method does not count it."""
+    losses: int | None = getattr(memory, "losses", None)
+    return losses
+
+
 class Controller(Protocol):
     """Control method with its parameters; its memory is an argument and a result."""
 

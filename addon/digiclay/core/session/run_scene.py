@@ -20,6 +20,7 @@ from ..engine.simulation import begin, periods
 from ..engine.system import System
 from ..metrics.metric_table import ERRORS, METRICS, RUN, describe_errors, describe_losses, describe_time
 from ..metrics.summary import compute_metrics, find_losses, split_fingers, take_worst
+from ..model.control_interface import count_losses
 from ..model.touch import describe_excess, find_indentations, is_beyond
 from ..model.trajectory import sample_poses
 from ..scene.assembly import assemble
@@ -231,7 +232,7 @@ def run(
             progress(state.period, scene.periods)
         if stopped and stopped():
             break
-    took, losses = time.perf_counter() - started, getattr(state.memory, "losses", None)
+    took, losses = time.perf_counter() - started, count_losses(state.memory)
     rows = recording.finish(state.period) if recording else {}
     return evaluate(scene, system, rows, Ended(state.period, took, losses), versions or {})
 
