@@ -113,8 +113,10 @@ def test_a_take_of_another_layout_is_refused_though_it_may_have_as_many_pins(cla
         setattr(clay.digiclay.layout, name, value)
     assert bpy.ops.digiclay.rebuild() == {"FINISHED"}
     places = bridge.read_cells(clay.data)["position"].tolist()
-    with pytest.raises(RuntimeError, match="must have the layout of the bed"):
-        bpy.ops.digiclay.take_replay(take=number)
+    for use in (bpy.ops.digiclay.take_replay, functools.partial(bpy.ops.digiclay.bake, source="TAKE")):
+        with pytest.raises(RuntimeError, match="must have the layout of the bed"):
+            use(take=number)
+    assert not bake.is_baked(clay)
     assert bridge.read_cells(clay.data)["position"].tolist() == places
 
 

@@ -136,6 +136,18 @@ def play(operator: Any, context: Any) -> None:
     operator.report({"INFO"}, localize("{}: {} strokes", recorded.name, len(recorded.strokes)))
 
 
+def read_fitting_take(bed: Any, number: str) -> Take:
+    """Return a take of a bed; DigiclayError for one of another layout."""
+    take = takes.read(bed, number)
+    plan = take.scene.layout
+    if properties.find_layout_mismatch(bed, plan):
+        raise DigiclayError(
+            f"The take must have the layout of the bed (got {plan.rows} x {plan.columns} pins, "
+            f"{1e3 * plan.pitch:g} mm apart, {plan.arrangement})."
+        )
+    return take
+
+
 class ReplayTake(TimedAction, bpy.types.Operator):
     """Replay a take at its recorded speed. Esc stops and restores the bed"""
 
@@ -208,16 +220,10 @@ class ReplayTake(TimedAction, bpy.types.Operator):
         self._uid = bed.session_uid
         # The poses of the fingertips now: they may have been moved since the last session.
         self._stood = bridge.poses(bed)
-        self._take: Take = takes.read(bed, self.take)
+        self._take = read_fitting_take(bed, self.take)
         self._numbers = takes.list_fingers(bed, self.take, len(self._take.scene.fingers))
         self._states = play_take(self._take, refine(self._take.scene, self.parts))
         self._system, self._state = next(self._states)
-        plan = self._take.scene.layout
-        if properties.find_layout_mismatch(bed, plan):
-            raise DigiclayError(
-                f"The take must have the layout of the bed (got {plan.rows} x {plan.columns} pins, "
-                f"{1e3 * plan.pitch:g} mm apart, {plan.arrangement})."
-            )
         self._clock, self._at = Clock(), 0
 
     def _place(self, bed: Any) -> None:
@@ -340,7 +346,7 @@ class Bake(TimedAction, bpy.types.Operator):
         bed, scene = bed_of(context), context.scene
         recorded = self.source == "TAKE"
         if recorded:
-            take = takes.read(bed, self.take)
+            take = read_fitting_take(bed, self.take)
         else:
             made = properties.scene_of(bed)
             period = made.simulation.control_period
