@@ -19,9 +19,9 @@ KINDS: dict[str, str] = {
     "pins": "the stepped bed as one printable body, watertight",
     "features": "each boss as a body, each crease as the body that fills it",
 }
-#: Points a pitch of a skin that is not straight between the pins, by default.
+#: Default points per pitch of a skin that is not straight between the pins.
 CURVED = 4
-#: More points than this no program takes in; it is also a few GB of memory.
+#: Most points of a skin: a few GB of memory, and more than other programs read.
 MOST_POINTS = 50_000_000
 
 
@@ -32,7 +32,10 @@ class Model(Parameters):
     kind: str = quantity("solid", "kind of mesh", choices=tuple(KINDS))
     skin: str = quantity("bilinear", "skin between the pins; pins have none", choices=tuple(SKINS))
     resolution: int = quantity(
-        0, f"points a pitch; 0 is 1 for the bilinear skin and {CURVED} for the others", at_least=0, at_most=64
+        0,
+        f"points a pitch; 0 is 1 for the bilinear skin and {CURVED} for the others",
+        at_least=0,
+        at_most=64,
     )
     base_thickness: float = quantity(
         BASE_THICKNESS, "material under the lowest point of solid and pins", unit="m", above=0.0, at_most=1.0
@@ -43,7 +46,7 @@ class Model(Parameters):
 
     @property
     def parts(self) -> int:
-        """Points a pitch."""
+        """Points per pitch."""
         return self.resolution or (1 if self.skin == "bilinear" else CURVED)
 
 
@@ -74,10 +77,12 @@ def make_bodies(formed: Formed, model: Model, finding: Finding | None = None) ->
                 f"There is no feature of {wanted} off the former surface: lower the threshold or the "
                 "smallest number of pins."
             )
-        return [
-            replace(body, values=_of_pins(formed, body.vertices, formed.nearest(body.vertices[:, :2])))
-            for body in map(make_feature_solid, features)
-        ]
+        bodies = []
+        for feature in features:
+            body = make_feature_solid(feature)
+            nearest = formed.nearest(body.vertices[:, :2])
+            bodies.append(replace(body, values=_of_pins(formed, body.vertices, nearest)))
+        return bodies
     features = find(skin, finding) if finding else []
     names = tuple(feature.name for feature in features)
     label = np.zeros(len(formed.height), np.int32)
@@ -89,8 +94,9 @@ def make_bodies(formed: Formed, model: Model, finding: Finding | None = None) ->
 
 
 def _skin(grid: SurfaceGrid, model: Model, names: tuple[str, ...], label: Faces) -> Body:
-    """Return the skin, or the solid under it; a triangle is in the feature any of its corners is in."""
-    if model.kind == "surface":
+    """Return the skin, or the solid under it; a triangle belongs to the feature of any of its corners."""
+    closed = model.kind != "surface"
+    if not closed:
         vertices, faces = np.column_stack([grid.position, grid.height]), grid.faces
         values = grid.values()
     else:
@@ -103,15 +109,15 @@ def _skin(grid: SurfaceGrid, model: Model, names: tuple[str, ...], label: Faces)
         over = faces[: 2 * (grid.rows - 1) * (grid.columns - 1)]
         vertex_group[: len(grid.height)] = grid.nearest(label)
         group[: len(over)] = vertex_group[over].max(axis=1)
-    closed = model.kind != "surface"
     return Body("clay", vertices, faces, values, names, group, vertex_group, closed)
 
 
 def _pins(formed: Formed, model: Model, names: tuple[str, ...], label: Faces) -> Body:
-    """Return the stepped bed; walls and undersides are in the feature of their pin."""
+    """Return the stepped bed; walls and undersides belong to the feature of their pin."""
     vertices, faces, pin = make_pins_solid(formed, model.base_thickness)
     owner = np.full(len(vertices), NO_PIN)
-    # Every vertex above the base is a corner, or the middle, of some pin's top; these have the middle first.
+    # Every vertex above the base is a corner or the middle of a pin's top, whose triangles begin with the
+    # middle.
     tops = faces[:, 0] < len(formed.height)
     owner[faces[tops]] = pin[tops, None]
     group, vertex_group = np.empty((2, 0), np.int32)
@@ -121,7 +127,7 @@ def _pins(formed: Formed, model: Model, names: tuple[str, ...], label: Faces) ->
 
 
 def _of_pins(formed: Formed, vertices: Floats, owner: Indices) -> dict[str, Floats]:
-    """Return height, force and mode at vertices that belong to a pin each, or to none."""
+    """Return height, force and mode at vertices, each of one pin or none."""
     pinned = owner >= 0
     return {
         "height": vertices[:, 2].copy(),
@@ -131,13 +137,13 @@ def _of_pins(formed: Formed, vertices: Floats, owner: Indices) -> dict[str, Floa
 
 
 def make_feature_solid(feature: Feature) -> Body:
-    """Return the closed body between the surface now and before: a boss, or what fills a crease."""
+    """Return the closed body between the surface now and before: a boss, or the filling of a crease."""
     region = feature.apart
     count = len(region.position)
     now = region.former + (region.off if feature.kind == "boss" else -region.off)
     over, under = np.maximum(now, region.former), np.minimum(now, region.former)
-    vertices = np.concatenate([np.column_stack([region.position, one]) for one in (over, under)])
-    # Walls are as high as the threshold: an edge that thins out makes booleans of other programs fail.
+    vertices = np.column_stack([np.tile(region.position, (2, 1)), np.append(over, under)])
+    # Walls are as high as the threshold: booleans of other programs fail at an edge without height.
     start, end = region.outline().T
     walls = [[start, start + count, end + count], [start, end + count, end]]
     sides = [np.stack(corners, axis=1) for corners in walls]

@@ -30,30 +30,30 @@ from .mesh_limits import (
 )
 
 INSIDE = "must have its vertices in the file, or in a file in its own folder"
-#: Kinds of numbers, and how many of them an item has.
+#: Types of numbers, and the count of numbers in an item.
 NUMBERS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 ITEMS = {"SCALAR": 1, "VEC3": 3}
 TRIANGLES, STRIP, FAN = 4, 5, 6
 #: Extensions that change no vertex, or that are read.
 HARMLESS = re.compile(r"KHR_(materials|texture|lights|xmp|animation|mesh_quantization)\w*|EXT_texture\w*")
-#: Those that add copies or hide nodes where a reader is free not to know of them.
+#: Extensions that add copies or hide nodes, which a reader may ignore unless they are required.
 OPTIONAL = ("EXT_mesh_gpu_instancing", "KHR_node_visibility")
 
 
 def read(path: Path, data: bytes) -> tuple[Floats, Indices]:
-    """Return vertices (v, 3), m, and triangles (f, 3) of a file's bytes; `path` is where they lie."""
+    """Return vertices (v, 3), m, and triangles (f, 3) of a file's bytes; `path`: the file."""
     try:
         tree, binary = _chunks(data, path.name) if data[:4] == b"glTF" else (json.loads(data), None)
         if not str(tree["asset"]["version"]).startswith("2."):
-            raise ValueError(f"its version is {str(tree['asset']['version'])[:20]}")
-        needed = [one for one in tree.get("extensionsRequired", []) if not HARMLESS.fullmatch(one)]
-        needed += [one for one in OPTIONAL if one in tree.get("extensionsUsed", [])]
+            raise ValueError(f"its version is {tree['asset']['version']}")
+        needed = [name for name in tree.get("extensionsRequired", []) if not HARMLESS.fullmatch(name)]
+        needed += [name for name in OPTIONAL if name in tree.get("extensionsUsed", [])]
         if needed:
             raise make_refusal("must not need an extension that changes its vertices", path.name, needed[0])
         file = _File(path, tree, binary)
         parts = list(file.surfaces())
         refuse_many_triangles(path.name, sum(file.triangles(part) for part, _ in parts))
-        # Vertices that no triangle uses are copied as well.
+        # Unused vertices are copied as well.
         vertices = sum(file.size(part["attributes"]["POSITION"]) for part, _ in parts)
         refuse_many_triangles(path.name, vertices // 3)
         return join_meshes(((*file.mesh(part), placement) for part, placement in parts), path.name)
@@ -64,7 +64,7 @@ def read(path: Path, data: bytes) -> tuple[Floats, Indices]:
     except KeyError as error:
         content = f"{error} is missing"
     except (ValueError, TypeError, IndexError, AttributeError, OverflowError, struct.error) as error:
-        content = " ".join(str(error).split())[:100]
+        content = str(error)
     raise make_refusal("must be a glTF 2.0 file that can be read", path.name, content)
 
 
@@ -103,7 +103,7 @@ class _File:
         return entries[index]
 
     def surfaces(self) -> Iterator[tuple[Any, Floats]]:
-        """Give the parts of the nodes' meshes that are triangles, and their placements."""
+        """Yield the parts of the nodes' meshes that are triangles, and their placements."""
         nodes = self._tree.get("nodes", [])
         if self._tree.get("scenes"):
             roots = self._entry("scenes", self._tree.get("scene", 0)).get("nodes", [])
@@ -147,12 +147,12 @@ class _File:
                 raise ValueError(f"{corners.size} corners are no triangles")
             return vertices, corners.reshape(-1, 3)
         number = np.arange(self.triangles(primitive))
-        # Every other triangle of a strip runs the other way round; those of a fan have the first corner.
+        # Every other triangle of a strip has the opposite orientation; those of a fan share the first corner.
         first, odd = (0 * number, 0) if mode == FAN else (number, number % 2)
         return vertices, corners[np.column_stack([first, number + 1 + odd, number + 2 - odd])]
 
     def _numbers(self, accessor: Any, kind: str) -> NDArray[Any]:
-        """Return the items of an accessor, (count, numbers an item)."""
+        """Return the items of an accessor, (count, numbers per item)."""
         entry = self._entry("accessors", accessor)
         if "bufferView" not in entry or "sparse" in entry:
             rule = "must not hold compressed or sparse vertices"
@@ -170,8 +170,8 @@ class _File:
         if start + length > len(buffer):
             content = f"{len(buffer):,} bytes of {start + length:,}"
             raise make_refusal("must be whole", self._path.name, content)
-        places = (stride, number.itemsize)
-        items: NDArray[Any] = np.ndarray((count, width), number, buffer, start + offset, places)
+        strides = (stride, number.itemsize)
+        items: NDArray[Any] = np.ndarray((count, width), number, buffer, start + offset, strides)
         if number.kind != "f" and entry.get("normalized", False):
             return np.maximum(items / float(np.iinfo(number).max), -1.0)
         return items
@@ -189,14 +189,14 @@ class _File:
 
     def _beside(self, uri: str) -> bytes:
         """Return the bytes of a file in the folder of this one."""
-        # What begins with a drive or a scheme, an absolute path and a share are no names of files beside.
+        # A drive, a scheme, an absolute path and a share are outside the folder.
         name, folder = unquote(uri), self._path.parent.resolve()
         outside = ":" in name or "\\" in name or "\0" in name or name.startswith("/")
         file = folder if outside else (folder / name).resolve()
         if outside or not file.is_relative_to(folder):
-            raise make_refusal(INSIDE, self._path.name, f"{uri[:60]!r}")
+            raise make_refusal(INSIDE, self._path.name, f"{uri!r}")
         if not file.is_file():
-            raise make_refusal("must have its files beside it", self._path.name, f"no {uri[:60]!r}")
+            raise make_refusal("must have its files beside it", self._path.name, f"no {uri!r}")
         self._bytes += file.stat().st_size
         refuse_size(self._path.name, self._bytes)
         return file.read_bytes()
@@ -214,8 +214,8 @@ def _inline(uri: str) -> bytes:
 
 
 def _placement(node: Any) -> Floats:
-    """Return how a node places what is in it, (4, 3)."""
-    if "matrix" in node:  # its columns one after another
+    """Return the placement, (4, 3), of a node's content."""
+    if "matrix" in node:  # column by column
         return np.array(node["matrix"], np.float64).reshape(4, 4)[:, :3]
     x, y, z, w = map(float, node.get("rotation", (0.0, 0.0, 0.0, 1.0)))
     length = math.sqrt(x * x + y * y + z * z + w * w) or 1.0

@@ -1,4 +1,4 @@
-"""Mesh input: all meshes of a file as one; oversized, truncated and external files are refused first."""
+"""Mesh input: all meshes of a file as one; oversized, truncated and external files are refused."""
 
 from pathlib import Path
 from typing import NamedTuple
@@ -10,14 +10,14 @@ from .obj_reader import find_axes, make_axes
 
 #: Meshes by extension.
 MESHES = (".stl", ".obj", ".ply", ".glb", ".gltf", ".off", ".3mf")
-#: Formats whose standard says meters, and y upwards.
+#: Formats in meters with y upwards, by their standard.
 GLTF = (".glb", ".gltf")
-#: What a text in UTF-8 may begin with.
+#: Byte order mark that a UTF-8 text may begin with.
 BOM = b"\xef\xbb\xbf"
 
 
 class Read(NamedTuple):
-    """Mesh in the form of its file: (v, 3), (f, 3), meters in its unit or None, direction that is up."""
+    """Mesh as its file has it: vertices (v, 3), triangles (f, 3), unit in m or None, upward direction."""
 
     vertices: Floats
     faces: Indices
@@ -38,6 +38,6 @@ def read(path: Path) -> Read:
     if kind == ".obj":
         vertices, faces = obj_reader.read(data, path.name)
         up, forward = find_axes(data)
-        # Turned about the upward axis to the usual forward one.
+        # Turned about the upward axis, so that the forward axis is the usual one.
         return Read(vertices @ make_axes(up, forward).T @ make_axes(up), faces, None, up)
     return Read(*scan_reader.read(data, kind, path.name), None, "z")

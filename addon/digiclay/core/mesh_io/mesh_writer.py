@@ -24,7 +24,7 @@ TEXT = "facet normal %.6e %.6e %.6e\nouter loop\n" + 3 * "vertex %.9g %.9g %.9g\
 
 def write_binary(file: BinaryIO, bodies: Sequence[Body], factor: float) -> None:
     """Write all bodies as one list of triangles, lengths in 1 / `factor` m."""
-    # The first word must not be "solid": by it readers know the text form.
+    # The first word must not be "solid", by which readers recognize the text form.
     file.write(f"binary STL, {'mm' if factor > 1.0 else 'm'}, digiclay".encode().ljust(80))
     file.write(np.uint32(sum(len(body.faces) for body in bodies)).astype("<u4").tobytes())
     for body in bodies:
@@ -35,7 +35,7 @@ def write_binary(file: BinaryIO, bodies: Sequence[Body], factor: float) -> None:
 
 
 def write_ascii(file: BinaryIO, bodies: Sequence[Body], factor: float) -> None:
-    """Write one ``solid`` a body, with the nine digits a float32 needs to be read back as it was."""
+    """Write one ``solid`` per body, with nine digits, which reproduce each float32 exactly."""
     for body in bodies:
         file.write(f"solid {body.name}\n".encode())
         triangles = _triangles(body, factor)
@@ -44,7 +44,7 @@ def write_ascii(file: BinaryIO, bodies: Sequence[Body], factor: float) -> None:
 
 
 def _triangles(body: Body, factor: float) -> Iterator[tuple[NDArray[np.float32], NDArray[np.float32]]]:
-    """Give corners (k, 3, 3), as they are written, and unit normals (k, 3) of some triangles at a time."""
+    """Yield corners (k, 3, 3), as they are written, and unit normals (k, 3), piece by piece."""
     for faces in split_pieces(body.faces):
         corners = (body.vertices[faces] * factor).astype(np.float32)
         exact = corners.astype(np.float64)
@@ -53,14 +53,14 @@ def _triangles(body: Body, factor: float) -> Iterator[tuple[NDArray[np.float32],
         yield corners, (normal / np.where(length > 0.0, length, 1.0)).astype(np.float32)
 
 
-#: Numbers of a vertex in a PLY. Modes have the common size, because some readers accept no smaller one.
+#: Numbers of a vertex in a PLY. Modes have 32 bits, because some readers accept no smaller type.
 NUMBERS = {"x": "<f4", "y": "<f4", "z": "<f4", "height": "<f4", "force": "<f4", "mode": "<i4"}
 VERTEX = np.dtype(list(NUMBERS.items()))
 FACE = np.dtype([("count", "u1"), ("vertices", "<i4", 3)])
 
 
 def write_ply(file: BinaryIO, bodies: Sequence[Body], factor: float) -> None:
-    """Write the bodies one after the other, lengths in 1 / `factor` m, forces in N."""
+    """Write the bodies in sequence, lengths in 1 / `factor` m, forces in N."""
     lines = [
         "ply",
         "format binary_little_endian 1.0",
@@ -75,12 +75,12 @@ def write_ply(file: BinaryIO, bodies: Sequence[Body], factor: float) -> None:
     ]
     file.write("\n".join(lines).encode())
     for body in bodies:
-        # Without values the vertices are of no pin and bear no force.
+        # Vertices without values belong to no pin and bear no force.
         force, mode = (np.broadcast_to(value, len(body.vertices)) for value in (0.0, NO_PIN))
         values = body.values or {"height": body.vertices[:, 2], "force": force, "mode": mode}
         columns = body.vertices, values["height"], values["force"], values["mode"]
-        for place, height, force, mode in zip(*map(split_pieces, columns), strict=True):
-            columns_in_file = [*(place * factor).T, height * factor, force, mode]
+        for vertices, height, force, mode in zip(*map(split_pieces, columns), strict=True):
+            columns_in_file = [*(vertices * factor).T, height * factor, force, mode]
             file.write(np.rec.fromarrays(columns_in_file, VERTEX).tobytes())
     first = 0
     for body in bodies:
@@ -112,7 +112,7 @@ def write_obj(file: BinaryIO, bodies: Sequence[Body], factor: float, up: str = U
 
 
 def _write_rows(file: BinaryIO | IO[bytes], line: str, pieces: Iterable[NDArray[Any]]) -> None:
-    """Write each row of some tables as a line of text."""
+    """Write each row of the pieces of a table as a line of text."""
     for rows in pieces:
         file.write(((line * len(rows)) % tuple(rows.ravel().tolist())).encode())
 
@@ -124,7 +124,7 @@ LARGEST = 2**32 - 1
 
 
 def write_glb(file: BinaryIO, bodies: Sequence[Body], factor: float) -> None:
-    """Write the bodies in meters, whatever the factor; OutputError when they are too large for the format."""
+    """Write the bodies in meters, whatever the factor; OutputError if they are too large for the format."""
     tree = _describe(bodies)
     size = tree["buffers"][0]["byteLength"]
     text = json.dumps(tree, separators=(",", ":")).encode()
@@ -142,7 +142,7 @@ def write_glb(file: BinaryIO, bodies: Sequence[Body], factor: float) -> None:
 
 
 def _describe(bodies: Sequence[Body]) -> dict[str, Any]:
-    """Return the JSON part: where in the binary part the vertices and faces of each body are."""
+    """Return the JSON part: the layout of the bodies' vertices and faces in the binary part."""
     views: list[dict[str, int]] = []
     accessors: list[dict[str, Any]] = []
     meshes: list[dict[str, Any]] = []
@@ -151,13 +151,13 @@ def _describe(bodies: Sequence[Body]) -> dict[str, Any]:
         for count, target in ((len(body.vertices), VERTICES), (len(body.faces), INDICES)):
             views.append({"buffer": 0, "byteOffset": start, "byteLength": 12 * count, "target": target})
             start += 12 * count
-        # The bounds must be those of the numbers as they are stored.
+        # The bounds must be those of the stored numbers.
         low, high = body.vertices.min(axis=0), body.vertices.max(axis=0)
         low, high = _upright(np.array([[low[0], high[1], low[2]], [high[0], low[1], high[2]]]))
         bounds = {"min": low.astype("<f4").tolist(), "max": high.astype("<f4").tolist()}
-        place = {"bufferView": 2 * number, "componentType": FLOAT, "count": len(body.vertices)}
-        corner = {"bufferView": 2 * number + 1, "componentType": UNSIGNED, "count": 3 * len(body.faces)}
-        accessors += [{**place, "type": "VEC3", **bounds}, {**corner, "type": "SCALAR"}]
+        vertices = {"bufferView": 2 * number, "componentType": FLOAT, "count": len(body.vertices)}
+        indices = {"bufferView": 2 * number + 1, "componentType": UNSIGNED, "count": 3 * len(body.faces)}
+        accessors += [{**vertices, "type": "VEC3", **bounds}, {**indices, "type": "SCALAR"}]
         part = {"attributes": {"POSITION": 2 * number}, "indices": 2 * number + 1, "material": 0}
         meshes.append({"name": body.name, "primitives": [part]})
     return {
@@ -173,9 +173,9 @@ def _describe(bodies: Sequence[Body]) -> dict[str, Any]:
     }
 
 
-def _upright(place: Floats) -> NDArray[np.float64]:
-    """Return places with y up: x stays, and the bed's y runs away from who looks along minus z."""
-    return np.stack([place[:, 0], place[:, 2], -place[:, 1]], axis=1)
+def _upright(vertices: Floats) -> Floats:
+    """Return vertices (v, 3) with y up: x stays, and the bed's y becomes -z."""
+    return np.stack([vertices[:, 0], vertices[:, 2], -vertices[:, 1]], axis=1)
 
 
 CORE = "http://schemas.microsoft.com/3dmanufacturing/core/2015/02"
@@ -192,7 +192,7 @@ RELATIONS = (
     '<Relationship Id="model" Target="/3D/3dmodel.model" '
     'Type="http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel"/></Relationships>\n'
 )
-#: The same in every file, so that the same mesh gives the same bytes.
+#: Time of all entries, so that the same mesh gives the same bytes.
 MOMENT = (1980, 1, 1, 0, 0, 0)
 
 
@@ -208,7 +208,7 @@ def write_3mf(file: BinaryIO, bodies: Sequence[Body], factor: float) -> None:
         with archive.open(model, "w", force_zip64=True) as part:
             part.write(f'{HEAD}<model unit="{unit}" xml:lang="en-US" xmlns="{CORE}">\n<resources>\n'.encode())
             for number, body in enumerate(bodies, 1):
-                # Only what encloses a volume may be a "model".
+                # Only a closed body may be a "model".
                 kind = "model" if body.closed else "surface"
                 part.write(f'<object id="{number}" type="{kind}" name="{body.name}"><mesh>\n'.encode())
                 part.write(b"<vertices>\n")
@@ -238,7 +238,7 @@ WRITERS: dict[str, Callable[[BinaryIO, Sequence[Body], float], None]] = {
     "3mf": write_3mf,
 }
 
-#: Lengths a file can be written in: how many of them make a meter.
+#: Units of length of a file, per meter.
 UNITS: dict[str, float] = {"mm": 1e3, "m": 1.0}
 
 
@@ -251,7 +251,7 @@ def find_format(name: str) -> str:
 
 
 def find_suffix(kind: str) -> str:
-    """Return how the name of a file of a format ends; text and binary STL do not share a name."""
+    """Return the extension of a format; text and binary STL have different ones."""
     return ".ascii.stl" if kind == "stl_ascii" else f".{kind}"
 
 
@@ -263,11 +263,11 @@ def write(
     up: str = UP,
     forward: str = "",
 ) -> Path:
-    """Write bodies into one file in a unit of `UNITS`; return it. An older one stays until it is complete."""
+    """Write bodies to a file in a unit of `UNITS`, and return it; it replaces an older one when complete."""
     target = Path(path)
     format_name = find_format(target.suffix if kind is None else kind)
     writer = partial(write_obj, up=up, forward=forward) if format_name == "obj" else WRITERS[format_name]
-    make_axes(up, forward)  # an error before the file is opened
+    make_axes(up, forward)  # refuses axes before the file is opened
     if unit not in UNITS:
         raise ParameterError("Export", "unit", f"must be one of {', '.join(UNITS)}", repr(unit))
     if not any(len(body.faces) for body in bodies):

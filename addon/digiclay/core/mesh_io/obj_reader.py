@@ -13,12 +13,12 @@ from ..base.errors import ParameterError
 from .mesh_limits import CORNERS, make_refusal, refuse_many_triangles
 
 AXES = ("x", "y", "z", "-x", "-y", "-z")
-#: Upward axis of Blender's exporter and importer; the forward one to it is -z.
+#: Upward axis of Blender's exporter and importer; its forward axis is -z.
 UP = "y"
-#: Forward axes, the bed's y, where they are not y: x stays x if it can.
+#: Forward axes, the bed's y, by upward axis, unless y; x stays x if possible.
 FORWARD = {"y": "-z", "-y": "z", "-z": "-y"}
 COMMENT = re.compile(rb"^#[^\n]*?(?<![\w-])(-?[xyz]) up\b(?:, (-?[xyz]) forward)?", re.MULTILINE)
-#: Comments are looked for in so many bytes.
+#: Bytes that are searched for comments.
 HEAD = 4096
 
 
@@ -28,7 +28,7 @@ def find_forward(up: str) -> str:
 
 
 def make_axes(up: str, forward: str = "") -> Floats:
-    """Return the bed's x, y and z in a file's axes, (3, 3): its vertices times it are those of the file."""
+    """Return the bed's x, y and z in a file's axes, (3, 3): vertices @ axes are those of the file."""
     forward = forward or find_forward(up)
     for name, value in (("up", up), ("forward", forward)):
         if value not in AXES:
@@ -40,13 +40,13 @@ def make_axes(up: str, forward: str = "") -> Floats:
 
 
 def find_axes(data: bytes) -> tuple[str, str]:
-    """Return the upward and the forward axis that a comment of an OBJ file names, such as ``# z up``."""
+    """Return the upward and the forward axis of an OBJ file by a comment such as ``# z up``."""
     comment = COMMENT.search(data[:HEAD])
     return (comment[1].decode(), (comment[2] or b"").decode()) if comment else (UP, "")
 
 
 CUT = "must end with a whole line: the file is cut off"
-#: Bytes that are worked on at a time.
+#: Bytes that are processed at a time.
 BLOCK = 1 << 22
 
 
@@ -60,20 +60,20 @@ def read(data: bytes, name: str) -> tuple[Floats, Indices]:
     first, at = 1, 0
     while at < len(data):
         end = data.find(b"\n", at + BLOCK) + 1 or len(data)
-        # A file of the old Macintosh has other ends of lines.
+        # Files of the old Macintosh end lines with a carriage return.
         block = data[at:end].replace(b"\r\n", b"\n").replace(b"\r", b"\n")
         lines = block.split(b"\n")
         _add_lines(lines, first, name, vertices, corners)
         refuse_many_triangles(name, max(len(vertices), len(corners)) // 3)
         first, at = first + len(lines) - 1, end
-    places, faces = np.array(vertices).reshape(-1, 3), np.array(corners, np.int64).reshape(-1, 3)
-    if faces.size and (faces.min() < 0 or faces.max() >= len(places)):
-        content = f"vertex {faces.max() + 1} of {len(places)}"
+    points, faces = np.array(vertices).reshape(-1, 3), np.array(corners, np.int64).reshape(-1, 3)
+    if faces.size and (faces.min() < 0 or faces.max() >= len(points)):
+        content = f"vertex {faces.max() + 1} of {len(points)}"
         raise make_refusal(CORNERS, name, content, "Is the file cut off?")
-    if not ended and len(faces) and (unused := len(places) - np.unique(faces).size):
-        content = f"no end of line, and {unused:,} of {len(places):,} vertices without a face"
+    if not ended and len(faces) and (unused := len(points) - np.unique(faces).size):
+        content = f"no end of line, and {unused:,} of {len(points):,} vertices without a face"
         raise make_refusal(CUT, name, content)
-    return places, faces
+    return points, faces
 
 
 def _add_lines(
@@ -89,25 +89,25 @@ def _add_lines(
             elif kind == b"f":
                 count = len(vertices) // 3
                 face = [_find_vertex(word, count) for word in words]
-                for one, other in pairwise(face[1:]):
-                    corners.extend((face[0], one, other))
+                for second, third in pairwise(face[1:]):
+                    corners.extend((face[0], second, third))
         except (ValueError, OverflowError) as error:
-            content = f"line {number}: {' '.join(str(error).split())[:80]}"
+            content = f"line {number}: {error}"
             raise make_refusal("must be an OBJ file that can be read", name, content) from None
 
 
 def _find_vertex(word: bytes, count: int) -> int:
-    """Return the vertex a word of a face names, from 0 on; `count` vertices stand before the face."""
-    place = int(word.partition(b"/")[0])
-    if place == 0 or place < -count:
-        raise ValueError(f"there is no vertex {place}")
-    return place - 1 if place > 0 else count + place
+    """Return the vertex that a word of a face names, from 0 on; `count` vertices precede the face."""
+    number = int(word.partition(b"/")[0])
+    if number == 0 or number < -count:
+        raise ValueError(f"there is no vertex {number}")
+    return number - 1 if number > 0 else count + number
 
 
 def _refuse_cut_line(data: bytes, name: str) -> None:
     """Refuse a file that ends within its last line, which has no end."""
     last = data[max(data.rfind(b"\n"), data.rfind(b"\r")) + 1 :].partition(b"#")[0].split()
-    # All corners of a face are given alike, with or without texture and normal.
+    # All corners of a face have the same form, with or without texture and normal.
     forms = {tuple(map(bool, word.split(b"/"))) for word in last[1:]} if last[:1] == [b"f"] else set()
     if last == [b"v"] or (last[:1] == [b"f"] and (len(last) < 4 or len(forms) > 1)):
-        raise make_refusal(CUT, name, f"{b' '.join(last)[:40].decode(errors='replace')!r}")
+        raise make_refusal(CUT, name, repr(b" ".join(last).decode(errors="replace")))

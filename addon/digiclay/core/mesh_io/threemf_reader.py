@@ -1,7 +1,7 @@
-"""Reader of 3MF files: a zip of XML parts; the build's items, each an object or components of others.
+"""Reader of 3MF files: a zip of XML parts, with objects, their components, and the items of a build.
 
-Read as a stream by the standard library: trimesh would need lxml and networkx. A document type, where XML
-defines its replacements, is refused: 3MF forbids it.
+The standard library reads the XML as a stream: trimesh would need lxml and networkx. A document type, which
+can define entities, is refused, as 3MF forbids it.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ Start = Callable[[str, dict[str, str]], None]
 CORE = "http://schemas.microsoft.com/3dmanufacturing/core/2015/02 "
 PATH = "http://schemas.microsoft.com/3dmanufacturing/production/2015/06 path"
 RELATION = "http://schemas.openxmlformats.org/package/2006/relationships Relationship"
-#: Namespaces of extensions that add nothing to a shape, or that are read.
+#: Namespaces of extensions that do not change a shape, or that are read.
 KNOWN = (
     CORE.strip(),
     PATH.partition(" ")[0],
@@ -47,14 +47,19 @@ KNOWN = (
 MODEL = "http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel"
 #: Meters in a model's unit.
 UNITS = {
-    "micron": 1e-6, "millimeter": 1e-3, "centimeter": 1e-2, "inch": 25.4e-3, "foot": 0.3048, "meter": 1.0,
-}  # fmt: skip
-#: Objects that hold others up while they are printed are no part of the shape.
+    "micron": 1e-6,
+    "millimeter": 1e-3,
+    "centimeter": 1e-2,
+    "inch": 25.4e-3,
+    "foot": 0.3048,
+    "meter": 1.0,
+}
+#: Types of objects that support others during printing, and do not belong to the shape.
 SUPPORTS = ("support", "solidsupport")
-#: Bytes handed to the parser at a time, and most of them it may keep waiting for a tag's end.
+#: Bytes per call of the parser, and most bytes of a tag.
 PIECE, LONGEST_TAG = 1 << 16, 1 << 22
 UNREADABLE = "must be a 3MF file that can be read"
-#: Most objects, components and items, and how deep components may stand in components.
+#: Most objects, components and items, and deepest nesting of components.
 MOST_PARTS, DEEPEST = 1_000_000, 64
 
 
@@ -100,13 +105,13 @@ def read(path: Path) -> tuple[Floats, Indices, float]:
                 waiting += sorted(parts)
                 seen |= parts
     except (*BROKEN_ZIP, EOFError, KeyError) as error:
-        content = " ".join(str(error).strip("'\"").split())[:100] or type(error).__name__
+        content = str(error).strip("'\"") or type(error).__name__
         raise make_refusal(UNREADABLE, name, content) from None
     return *_placed(model, name), model.unit
 
 
 def _find_root(archive: zipfile.ZipFile, name: str, model: _Model) -> str:
-    """Return the part that holds the model, as the package's relations name it."""
+    """Return the part that contains the model, by the package's relations."""
     targets: list[str] = []
 
     def start(tag: str, given: dict[str, str]) -> None:
@@ -120,14 +125,14 @@ def _find_root(archive: zipfile.ZipFile, name: str, model: _Model) -> str:
 
 
 def _inside(part: str, target: str) -> str:
-    """Return the place of a part in the zip that another one names."""
+    """Return the path in the zip of a part that another one names."""
     return posixpath.normpath(posixpath.join("/", posixpath.dirname(part), target)).lstrip("/")
 
 
 def _parse(archive: zipfile.ZipFile, part: str, name: str, model: _Model, start: Start) -> None:
     """Read a part of the zip; call `start` with name and attributes of each element."""
     entry = archive.getinfo(part)
-    model.unpacked += entry.file_size  # no more than that is unpacked, whatever there is
+    model.unpacked += entry.file_size  # no more is unpacked
     refuse_size(name, model.unpacked, part)
     if entry.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
         raise make_refusal("must be stored or deflated, as 3MF has it", name, part)
@@ -193,7 +198,7 @@ def _add_part(archive: zipfile.ZipFile, part: str, name: str, model: _Model, roo
         except KeyError as error:
             raise make_refusal(UNREADABLE, name, f"{part}, a {kind} without {error}") from None
         except (ValueError, OverflowError, IndexError) as error:
-            raise make_refusal(UNREADABLE, name, f"{part}, {f'{kind}: {error}'[:100]}") from None
+            raise make_refusal(UNREADABLE, name, f"{part}, {kind}: {error}") from None
 
     _parse(archive, part, name, model, start)
     refuse_many_triangles(name, sum(len(shape.triangles) // 3 for shape in model.objects.values()))
@@ -201,19 +206,19 @@ def _add_part(archive: zipfile.ZipFile, part: str, name: str, model: _Model, roo
 
 
 def _reference(part: str, given: dict[str, str]) -> Placed:
-    """Return what a component or an item places, and how."""
-    place = _inside("", given[PATH]) if PATH in given else part
+    """Return the object of a component or an item, and its placement."""
+    path = _inside("", given[PATH]) if PATH in given else part
     placement = IDENTITY
     if "transform" in given:
         numbers = [float(word) for word in given["transform"].split()]
         if len(numbers) != 12:
             raise ValueError(f"a transform of {len(numbers)} numbers")
         placement = np.array(numbers).reshape(4, 3)
-    return (place, given["objectid"]), placement
+    return (path, given["objectid"]), placement
 
 
 def _placed(model: _Model, name: str) -> tuple[Floats, Indices]:
-    """Return all items' vertices and triangles, where the build puts them."""
+    """Return the vertices and triangles of all items as the build places them."""
     extents: dict[Key, _Extent] = {}
     items = [_measure(model, key, name, extents, 0) for key, _ in model.items]
     refuse_many_triangles(name, sum(extent.triangles for extent in items))
@@ -224,20 +229,21 @@ def _placed(model: _Model, name: str) -> tuple[Floats, Indices]:
 
 
 def _meshes(model: _Model, extents: dict[Key, _Extent]) -> Iterator[tuple[Floats, Indices, Floats]]:
-    """Give the mesh of each placed object that has one, and its placement."""
+    """Yield the mesh of each placed object that has one, and its placement."""
     waiting = list(reversed(model.items))
     while waiting:
         key, placement = waiting.pop()
         if extents[key].meshes:
             shape = model.objects[key]
-            waiting += [(inner, nest_placement(own, placement)) for inner, own in reversed(shape.components)]
+            for inner, inside in reversed(shape.components):
+                waiting.append((inner, nest_placement(inside, placement)))
             if shape.triangles:
                 corners = np.array(shape.triangles, np.int64).reshape(-1, 3)
                 yield np.array(shape.vertices).reshape(-1, 3), corners, placement
 
 
 def _measure(model: _Model, key: Key, name: str, extents: dict[Key, _Extent], depth: int) -> _Extent:
-    """Return the extent of an object with its components; that of a support is nothing."""
+    """Return the extent of an object with its components; that of a support is empty."""
     if key not in extents:
         shape = model.objects.get(key)
         if shape is None:
@@ -248,8 +254,8 @@ def _measure(model: _Model, key: Key, name: str, extents: dict[Key, _Extent], de
         if max(depth, below) > DEEPEST:
             rule = f"must have components at most {DEEPEST} deep, and none in itself"
             raise make_refusal(rule, name, f"object {key[1]}")
-        own = len(shape.triangles) // 3
-        triangles = own + sum(extent.triangles for extent in inside)
-        meshes = (own > 0) + sum(extent.meshes for extent in inside)
+        triangles_here = len(shape.triangles) // 3
+        triangles = triangles_here + sum(extent.triangles for extent in inside)
+        meshes = (triangles_here > 0) + sum(extent.meshes for extent in inside)
         extents[key] = _Extent(0, 0, below) if shape.support else _Extent(triangles, meshes, below)
     return extents[key]

@@ -1,6 +1,6 @@
 """Shapes from files, placed on a bed: reading, fit of the plan, scale of the relief, clipping; packing.
 
-A shape is a sample by its name, a mesh, a picture, or a numpy array.
+A shape is a sample shape, given by its name, a mesh, a picture, or a numpy array.
 """
 
 import base64
@@ -27,13 +27,13 @@ from .heightmap import GRIDS, PICTURES, HeightMap, make_height_map, read_grid, r
 from .mesh_relief import ShapeMesh, make_shape_mesh
 from .request import AUTO, LENGTHS, Placement, Shape, Tops
 
-#: A shape from a file, in the unit of that.
+#: A shape from a file, in the file's unit.
 Relief = HeightMap | ShapeMesh
-#: Where the sample shapes are.
+#: Folder of the sample shapes.
 SAMPLES = Path(__file__).parents[2] / "sample_shapes" / "shapes"
 ARRAY = ".npy"
 UNREADABLE = "must be a file that can be read"
-#: What a file of this kind of shape may end with.
+#: Extensions of a shape's file.
 KINDS = (*MESHES, *PICTURES, ARRAY, *GRIDS)
 
 
@@ -51,12 +51,12 @@ HINT = "Take the shape in again."
 
 
 def pack(heights: Floats) -> str:
-    """Pack heights, shape (n,), m, as letters and digits; to 4 nm, as 32-bit numbers are."""
+    """Pack heights (n,), m, as letters and digits, with the resolution of 32-bit numbers, 4 nm."""
     return base64.b64encode(zlib.compress(heights.astype("<f4").tobytes(), 9)).decode("ascii")
 
 
 def unpack(text: str, grid: Grid) -> Floats:
-    """Return the heights of the cells of a bed, shape (n,), m, from a text that `pack` made for this bed."""
+    """Return the heights (n,), m, of the cells of a bed from a text that `pack` made for this bed."""
     wanted = 4 * grid.count
     try:
         opened = zlib.decompressobj()
@@ -79,7 +79,7 @@ def unpack(text: str, grid: Grid) -> Floats:
     return heights
 
 
-#: A plan narrower than this share of its length is a line or a point: there is nothing to fit.
+#: A plan narrower than this share of its length is a line or a point, which cannot be fitted.
 THIN = 1e-9
 
 
@@ -91,14 +91,14 @@ class Fitted:
     heights: Floats
     """(n,): m, from 0 to the stroke."""
     covered: int
-    """Cells the shape covers; the others stand at its foot."""
+    """Cells that the shape covers; the others are at its foot."""
     overhanging: int
-    """Cells over which more of the shape lies below its top surface; only the top is displayed."""
+    """Cells over which the shape has parts below its top surface; only the top is displayed."""
     too_low: int
     too_high: int
     """Cells clipped at the bed's floor, at the end of the stroke."""
     filled: int = 0
-    """Cells under small holes of the shape, whose heights are taken from around."""
+    """Cells under small holes of the shape, whose heights are interpolated from around."""
 
     def describe(self) -> str:
         """Return the fit in one line."""
@@ -137,38 +137,37 @@ def fit_relief(shape: Shape, relief: Relief, grid: Grid, actuator: Actuator) -> 
     at = _placement(shape, relief, grid)
     tops = relief.tops(grid, at)
     if not tops.covered.any():
-        raise ParameterError(
-            "shape", "x, y", "must leave the shape over the bed", f"{relief.name}: no pin lies under it",
-            "Set shape.fit to contain, or move it with shape.x and shape.y.",
-        )  # fmt: skip
+        hint = "Set shape.fit to contain, or move it with shape.x and shape.y."
+        content = f"{relief.name}: no pin lies under it"
+        raise ParameterError("shape", "x, y", "must leave the shape over the bed", content, hint)
     return _clipped(relief.name, _heights(shape, relief, at, tops, actuator), tops, actuator)
 
 
 def _placement(shape: Shape, relief: Relief, grid: Grid) -> Placement:
-    """Return how the shape's plan lies on the bed."""
+    """Return the placement of the shape's plan on the bed."""
     left, front, right, back = relief.box
     wide, deep = right - left, back - front
     if not min(wide, deep) > THIN * max(wide, deep):
         rule = "must be wider than a line or a point, seen from above"
-        raise ParameterError("shape", "file", rule, f"{relief.name}: {wide:g} x {deep:g}")
+        raise make_refusal(rule, relief.name, f"{wide:g} x {deep:g}")
     placed = shape.fit == "placed" and isinstance(relief, HeightMap)
     if placed or (shape.fit == "actual" and relief.length is None):
         rule = "must be contain, cover or stretch for a picture or a map: its pixels have no length"
         rule = rule.replace("length", "place") if relief.length else rule
         raise ParameterError("shape", "fit", rule, f"{shape.fit!r} for {relief.name}")
-    own = relief.length or 1.0
+    unit = relief.length or 1.0
     if shape.fit == "placed":
-        return Placement(own, own, shape.x, shape.y)
+        return Placement(unit, unit, shape.x, shape.y)
     plan = grid.layout
-    # The bed is as large as its cells: half a pitch more on every side than the outermost pins.
+    # The bed extends half a pitch beyond the outermost pins on every side.
     across, along = float(np.ptp(grid.x)) + plan.pitch, float(np.ptp(grid.y)) + plan.row_spacing
-    ways = {
+    factors = {
         "contain": (min(across / wide, along / deep),) * 2,
         "cover": (max(across / wide, along / deep),) * 2,
         "stretch": (across / wide, along / deep),
-        "actual": (own, own),
+        "actual": (unit, unit),
     }
-    factor_x, factor_y = (factor * shape.scale for factor in ways[shape.fit])
+    factor_x, factor_y = (factor * shape.scale for factor in factors[shape.fit])
     middle_x, middle_y = left + wide / 2, front + deep / 2
     return Placement(factor_x, factor_y, shape.x - middle_x * factor_x, shape.y - middle_y * factor_y)
 
@@ -177,18 +176,18 @@ def _heights(shape: Shape, relief: Relief, at: Placement, tops: Tops, actuator: 
     """Return the heights of all cells, m, before they are clipped."""
     foot = actuator.rest_height + shape.foot
     if shape.fit == "placed":
-        assert relief.value_length is not None  # what has a length in plan has one upwards
+        assert relief.value_length is not None  # a length in plan implies one of the heights
         return np.where(tops.covered, tops.value * relief.value_length, foot)
     seen = tops.value[tops.covered]
     low, high = float(seen.min()), float(seen.max())
-    # A bed covered all over shows the top surface alone; a shape that stands on the bed shows its sides.
+    # A fully covered bed displays only the top surface; a shape that stands on the bed also shows its sides.
     if relief.underside is not None and not tops.covered.all():
         low = relief.underside
     if shape.relief == "true":
         if relief.value_length is None:
             rule = "must be rise or stroke for a picture: its values are no lengths"
             raise ParameterError("shape", "relief", rule, f"'true' for {relief.name}")
-        # What has a length in plan keeps its proportions; other heights are lengths by themselves.
+        # A shape with a length in plan keeps its proportions; other heights are lengths of their own.
         factor = relief.value_length
         if relief.length is not None:
             factor *= math.sqrt(at.factor_x * at.factor_y) / relief.length
@@ -200,8 +199,8 @@ def _heights(shape: Shape, relief: Relief, at: Placement, tops: Tops, actuator: 
 
 
 def _clipped(name: str, heights: Floats, tops: Tops, actuator: Actuator) -> Fitted:
-    """Keep heights within the stroke, and count the clipped cells."""
-    # Less than a nanometer beyond an end is rounding.
+    """Limit heights to the stroke, and count the clipped cells."""
+    # A nanometer beyond an end is rounding.
     low, high = heights < -1e-9, heights > actuator.stroke + 1e-9
     counts = [int(np.count_nonzero(flags)) for flags in (tops.covered, tops.overhang, low, high)]
     counts += [tops.filled]
@@ -209,14 +208,14 @@ def _clipped(name: str, heights: Floats, tops: Tops, actuator: Actuator) -> Fitt
 
 
 def fit_shape(shape: Shape, grid: Grid, actuator: Actuator) -> Fitted:
-    """Return the shape of a scene, placed on its bed; errors as `read` and `fitting.fit_relief`."""
+    """Return the shape of a scene, placed on its bed; raises as `read` and `fit_relief`."""
     if shape.heights:
         return fit_given(shape, grid, actuator)
     return fit_relief(shape, read(shape), grid, actuator)
 
 
 def read(shape: Shape) -> Relief:
-    """Read the shape a scene names; SceneError without such a file, ParameterError when it holds no shape."""
+    """Read the shape of a scene; SceneError without such a file, ParameterError if it contains no shape."""
     try:
         path = find_shape(shape.file)
     except SceneError as error:
@@ -233,7 +232,7 @@ def read(shape: Shape) -> Relief:
 
 
 def import_reader(path: Path) -> None:
-    """Import the library that reads a file before it can be interrupted; a missing one is refused later."""
+    """Import the library that reads a file while nothing can interrupt that; `read` refuses a missing one."""
     if path.suffix.lower() in PICTURES:
         with suppress(ImportError):
             importlib.import_module("PIL.Image")

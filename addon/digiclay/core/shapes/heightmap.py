@@ -20,9 +20,9 @@ from ..mesh_io.mesh_limits import LARGEST, make_refusal
 from ..model.layout import RELATIVE_TOLERANCE, Grid
 from .request import Placement, Tops
 
-#: Bytes of a file in which its size is looked for; a JPEG's may stand behind a small picture of it.
+#: Bytes of a file that are searched for its size; in a JPEG it may follow a thumbnail.
 HEAD = 1 << 20
-#: Segments of a JPEG that tell its size.
+#: Segments of a JPEG that contain its size.
 FRAMES = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
 #: Numbers of tags, of a TIFF file or of the EXIF data in another one.
 WIDTH, HEIGHT, BITS, PHOTOMETRIC, ORIENTATION, CHANNELS, PLANES = 256, 257, 258, 262, 274, 277, 284
@@ -33,25 +33,27 @@ ITEMS = {2: 1, 3: 2, 4: 4, 16: 8}
 MOST_TAGS = 0xFFFF
 #: First bytes of a TIFF, of which BigTIFF has 43; its order of bytes; its offsets, count of tags, and tag.
 TIFFS = {
-    b"II\x2a\0": ("<", "I", "H", "HHI4s"), b"MM\0\x2a": (">", "I", "H", "HHI4s"),
-    b"II\x2b\0": ("<", "Q", "Q", "HHQ8s"), b"MM\0\x2b": (">", "Q", "Q", "HHQ8s"),
-}  # fmt: skip
-#: All that is raised over a head that makes no sense.
+    b"II\x2a\0": ("<", "I", "H", "HHI4s"),
+    b"MM\0\x2a": (">", "I", "H", "HHI4s"),
+    b"II\x2b\0": ("<", "Q", "Q", "HHQ8s"),
+    b"MM\0\x2b": (">", "Q", "Q", "HHQ8s"),
+}
+#: Errors that a malformed head raises.
 UNKNOWN = (struct.error, IndexError, KeyError, ValueError)
 
 
 class Head(NamedTuple):
-    """Statements of a picture's file beside its pixels."""
+    """Size and tags of a picture's file."""
 
     size: tuple[int, int] | None
-    """Width and height, pixels; None where they are not known."""
+    """Width and height, pixels; None if unknown."""
     tags: dict[int, Any]
-    """Texts and whole numbers by the numbers of their tags; of a list its first item; those of EXIF data are
-    the orientation alone."""
+    """Texts and whole numbers by the numbers of their tags, of a list its first item; of EXIF data only the
+    orientation."""
 
 
 def read_head(path: Path) -> Head:
-    """Return what a picture's file says beside its pixels."""
+    """Return the size and the tags of a picture's file."""
     size, tags = None, {}
     with path.open("rb") as file:
         head = file.read(HEAD)
@@ -140,18 +142,18 @@ Pixels = NDArray[Any]
 
 #: Pictures by extension.
 PICTURES = (".png", ".tif", ".tiff", ".jpg", ".jpeg", ".bmp", ".pgm", ".exr", ".hdr")
-#: Pillow's names of those it reads here: by others a file with such an ending could have programs started.
+#: The formats that Pillow may read here, by its names: others can start programs.
 FORMATS = ("PNG", "TIFF", "JPEG", "BMP", "DIB", "PPM")
 #: Those that Pillow cannot read.
 BLENDER_ONLY = (".exr", ".hdr")
-#: Pillow's names for pictures of one channel, and for those with colors or alpha that are taken as they are.
+#: Pillow's modes of one channel, and those with colors or alpha that need no conversion.
 GRAY, COLORED = ("1", "L", "I", "I;16", "I;16B", "I;16L", "F"), ("LA", "RGB", "RGBA")
-#: How bright red, green and blue are, as the television standard BT.601 has it.
+#: Brightness of red, green and blue by the television standard BT.601.
 BRIGHTNESS = np.array([0.299, 0.587, 0.114], np.float32)
-#: Most pixels of a picture: 16 000 x 8 000. Some memory is needed for each, see docs/shapes.md.
+#: Most pixels of a picture: 16 000 x 8 000. docs/shapes.md has the memory that each needs.
 MOST = 128_000_000
-#: Readers of pictures in place of Pillow, the last one first: channels of the pixels as the file has them,
-#: (rows, columns, channels), the lowest row first.
+#: Readers of pictures in place of Pillow; the last one is used. They return the channels of the pixels as in
+#: the file, (rows, columns, channels), the lowest row first.
 READERS: list[Callable[[Path], Pixels]] = []
 
 
@@ -189,15 +191,15 @@ def read_pixels(path: Path) -> Pixels:
 
 
 def _mask(values: Pixels, absent: float) -> Pixels:
-    """Return values of which those that stand for no data are masked."""
-    # Writers round the number, to the 24 bits of a float32 or to some digits.
+    """Return values, those equal to the number for absent data masked."""
+    # Writers round that number to the 24 bits of a float32, or to a few digits.
     bare = np.isclose(values, absent, rtol=1e-6, atol=0.0, equal_nan=True)
     masked: Pixels = np.ma.array(values, mask=bare)  # type: ignore[no-untyped-call]
     return masked
 
 
 def _turn_upright(pixels: Pixels, orientation: int) -> Pixels:
-    """Return pixels, the upper row first, as the EXIF orientation of their file says they are to be seen."""
+    """Return pixels, the upper row first, turned by the EXIF orientation of their file."""
     pixels = pixels.T if orientation in (5, 6, 7, 8) else pixels
     pixels = pixels[:, ::-1] if orientation in (2, 3, 6, 7) else pixels
     return pixels[::-1] if orientation in (3, 4, 7, 8) else pixels
@@ -215,8 +217,8 @@ def _read_by_pillow(path: Path, tags: Mapping[int, Any]) -> Pixels:
         rule = "must be a mesh or an array where Pillow is not installed"
         hint = "Run 'pip install digiclay[images]'."
         raise ParameterError("shape", "file", rule, str(path), hint) from None
-    image.init()  # formats that are named are not looked for
-    for order, raw in ((b"II", "F;64F"), (b"MM", "F;64BF")):  # which Pillow can unpack, and does not know of
+    image.init()  # else the named formats would not be registered
+    for order, raw in ((b"II", "F;64F"), (b"MM", "F;64BF")):  # Pillow can unpack them, but does not list them
         tiff.OPEN_INFO[order, 1, (3,), 1, (64,), ()] = "F", raw
     several = tags.get(PLANES) == 2 and tags.get(CHANNELS, 1) > 1
     if tags.get(BITS, 8) > 8 and (several or tags.get(PHOTOMETRIC) == 0):
@@ -225,12 +227,11 @@ def _read_by_pillow(path: Path, tags: Mapping[int, Any]) -> Pixels:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         try:
-            data = (
-                path.read_bytes()
-            )  # of a file that it maps into memory Pillow takes turned pixels apart wrong
+            # From memory: Pillow unpacks turned pixels of a file that it maps wrongly.
+            data = path.read_bytes()
             levels = _read_levels(lambda: image.open(io.BytesIO(data), formats=FORMATS), path)
             if tags.get(BITS) == 32 and tags.get(FORMAT, 1) == 1:
-                return levels.view(np.uint32)  # Pillow takes all 32 bits for numbers with a sign
+                return levels.view(np.uint32)  # Pillow reads them as signed
             return levels
         except image.DecompressionBombError:
             raise _make_size_error(path, "too many pixels to open") from None
@@ -240,16 +241,16 @@ def _read_by_pillow(path: Path, tags: Mapping[int, Any]) -> Pixels:
         except OSError as error:
             reason = error.strerror or "not a picture, or cut off"
         except (ValueError, SyntaxError, EOFError) as error:
-            reason = " ".join(str(error).split())[:100]
-    raise ParameterError("shape", "file", "must be a picture that can be read", f"{path}: {reason}")
+            reason = str(error)
+    raise make_refusal("must be a picture that can be read", str(path), reason)
 
 
 def _read_levels(open_picture: Callable[[], Any], path: Path) -> Pixels:
-    """Return the numbers of a picture, (rows, columns[, channels]), in all of their bits."""
+    """Return the numbers of a picture, (rows, columns[, channels]), with all their bits."""
     with open_picture() as opened:
         refuse_too_many(path, *opened.size)
         raw = _set_raw(opened, lambda raw: raw.replace("a;", "A;"))
-        if raw == "LA;16B":  # four bytes a pixel
+        if raw == "LA;16B":  # four bytes per pixel
             _set_raw(opened, lambda raw: "RGBA")
             return np.asarray(opened).view(">u2")
         keyed = "transparency" in opened.info and opened.mode in ("1", "L", "RGB")
@@ -262,15 +263,15 @@ def _read_levels(open_picture: Callable[[], Any], path: Path) -> Pixels:
         high: Pixels = np.asarray(opened)
     if high.ndim == 2 or ";16" not in raw:
         return high
-    # Pillow keeps the higher byte of a color; in the other order of bytes that is the lower one.
+    # Pillow keeps the higher byte of a color; read in the other byte order, that is the lower one.
     with open_picture() as opened:
         _set_raw(opened, lambda raw: raw.replace("a;", "A;")[:-1] + ("L" if raw[-1] == "B" else "B"))
         levels: Pixels = high.astype(np.uint16) << 8 | np.asarray(opened)
-    return levels[..., :3] if "a;" in raw else levels  # of colors that are multiplied by the alpha already
+    return levels[..., :3] if "a;" in raw else levels  # colors multiplied by alpha need no alpha
 
 
 def _set_raw(opened: Any, change: Callable[[str], str]) -> str:
-    """Change how Pillow unpacks the bytes of a picture; return its word for how it did."""
+    """Change how Pillow unpacks the bytes of a picture; return the name of the former format."""
     former: list[str] = [args if isinstance(args, str) else args[0] for *_, args in opened.tile]
     opened.tile = [
         tile._replace(args=change(raw) if isinstance(tile.args, str) else (change(raw), *tile.args[1:]))
@@ -304,9 +305,9 @@ def _make_size_error(path: Path, size: str) -> ParameterError:
     return ParameterError("shape", "file", rule, f"{path}: {size}", "Make it smaller first.")
 
 
-#: Values a map keeps; more, and its pixels are averaged in squares when it is read.
-KEPT = 4_000_000
-#: Pixels averaged at a time, so that memory is bounded by the picture itself.
+#: Most values of a map; the pixels of a larger picture are averaged in squares.
+MOST_VALUES = 4_000_000
+#: Pixels averaged at a time, so that the picture itself bounds the memory.
 CHUNK = 4_000_000
 
 
@@ -316,17 +317,17 @@ class HeightMap:
 
     name: str
     values: Floats
-    """(r, c): The first row lies at the lowest y. Each is the mean of up to `block` x `block` pixels, where
-    those without data count as 0."""
+    """(r, c): The first row has the lowest y. Means of up to `block` x `block` pixels, where those without
+    data count as 0."""
     pixels: tuple[int, int]
     """Rows and columns of pixels."""
     block: int = 1
     value_length: float | None = None
-    """Meters in the unit of the values; None where they are no lengths."""
+    """Meters per unit of the values; None if they are not lengths."""
     length: float | None = None
-    """Meters a pixel is wide; None where that is not known."""
+    """Width of a pixel, m; None if unknown."""
     share: Floats | None = None
-    """(r, c): Share of the pixels that have data; None where all have."""
+    """(r, c): Share of the pixels that have data; None if all have."""
 
     underside = None
 
@@ -336,7 +337,7 @@ class HeightMap:
         return 0.0, 0.0, float(self.pixels[1]), float(self.pixels[0])
 
     def tops(self, grid: Grid, at: Placement) -> Tops:
-        """Return the heights at the pins: bilinear, of the means over a pin's own square of pixels."""
+        """Return the heights at the pins: bilinear between means over squares of pixels as large as a pin."""
         across, along = (grid.x - at.x) / at.factor_x, (grid.y - at.y) / at.factor_y
         covered = _within(across, self.pixels[1]) & _within(along, self.pixels[0])
         under_a_pin = min(grid.layout.pitch / at.factor_x, grid.layout.row_spacing / at.factor_y)
@@ -344,8 +345,8 @@ class HeightMap:
 
         def interpolate(table: Floats) -> Floats:
             means = average_blocks(table, block)
-            rows = _places(along, self.pixels[0], block * self.block, means.shape[0])
-            columns = _places(across, self.pixels[1], block * self.block, means.shape[1])
+            rows = _scale(along, self.pixels[0], block * self.block, means.shape[0])
+            columns = _scale(across, self.pixels[1], block * self.block, means.shape[1])
             return _bilinear(means, rows, columns)
 
         share = np.ones(grid.count) if self.share is None else interpolate(self.share)
@@ -357,30 +358,28 @@ class HeightMap:
 def make_height_map(
     name: str, values: Pixels, value_length: float | None = None, length: float | None = None
 ) -> HeightMap:
-    """Make a map of numbers (r, c), the first row at the lowest y; lengths: meters in their unit, a pixel.
+    """Make a map of numbers (r, c), the first row at the lowest y; lengths: meters per unit, per pixel.
 
     Masked numbers have no data.
     """
     shown = " x ".join(map(str, values.shape)) or "a single number"
     if values.ndim != 2 or min(values.shape) < 2:
-        raise ParameterError("shape", "file", "must hold at least 2 x 2 heights", f"{name}: {shown}")
+        raise make_refusal("must hold at least 2 x 2 heights", name, shown)
     if values.size > MOST:
-        rule = f"must hold at most {MOST // 1_000_000} million heights"
-        raise ParameterError("shape", "file", rule, f"{name}: {shown}")
+        raise make_refusal(f"must hold at most {MOST // 1_000_000} million heights", name, shown)
     if values.dtype.kind not in "biuf":
-        raise ParameterError("shape", "file", "must hold numbers", f"{name}: {values.dtype}")
-    block = int(np.ceil(np.sqrt(values.size / KEPT)))
+        raise make_refusal("must hold numbers", name, str(values.dtype))
+    block = int(np.ceil(np.sqrt(values.size / MOST_VALUES)))
     bare = np.ma.getmask(values)  # type: ignore[no-untyped-call]
     share = None if bare is np.ma.nomask else average_blocks(~bare, block)
     with np.errstate(over="ignore", invalid="ignore"):
-        kept = average_blocks(np.ma.filled(values, 0), block)  # type: ignore[no-untyped-call]
-    bad = np.argwhere(~(np.abs(kept) <= LARGEST))
+        means = average_blocks(np.ma.filled(values, 0), block)  # type: ignore[no-untyped-call]
+    bad = np.argwhere(~(np.abs(means) <= LARGEST))
     if bad.size:
         row, column = (bad[0] * block).tolist()
-        content = f"{name}: {kept[tuple(bad[0])]} at {row}, {column}"
         rule = f"must hold finite numbers only, of at most {LARGEST:g}"
-        raise ParameterError("shape", "file", rule, content)
-    return HeightMap(name, kept, (values.shape[0], values.shape[1]), block, value_length, length, share)
+        raise make_refusal(rule, name, f"{means[tuple(bad[0])]} at {row}, {column}")
+    return HeightMap(name, means, (values.shape[0], values.shape[1]), block, value_length, length, share)
 
 
 #: Grids of numbers as texts, by extension.
@@ -409,7 +408,7 @@ def read_grid(path: Path) -> HeightMap:
     except KeyError as error:
         reason = f"no {error} in its head, as an Esri ASCII grid has it"
     except (ValueError, OverflowError, Warning) as error:
-        reason = " ".join(str(error).partition(";")[0].split())[:150]
+        reason = str(error).partition(";")[0]
     else:
         if not head and values.shape[1] == 3 and len(values) > 99:
             rule = "must be a grid of heights, not a list of points"
@@ -419,7 +418,7 @@ def read_grid(path: Path) -> HeightMap:
 
 
 def average_blocks(values: NDArray[np.generic], block: int) -> Floats:
-    """Return the means over squares of `block` x `block` values (r, c); those at the end may be smaller."""
+    """Return the means over squares of `block` x `block` values (r, c); the last squares may be smaller."""
     if block == 1:
         return np.asarray(values, np.float64)
     rows, columns = values.shape
@@ -436,17 +435,17 @@ def average_blocks(values: NDArray[np.generic], block: int) -> Floats:
     return np.concatenate(parts)
 
 
-def _within(places: Floats, pixels: int) -> NDArray[np.bool_]:
-    """Return the positions that lie on the pixels, those on the edge included."""
+def _within(position: Floats, pixels: int) -> NDArray[np.bool_]:
+    """Return which positions lie on the pixels, the edge included."""
     slack = RELATIVE_TOLERANCE * pixels
-    return np.asarray((places >= -slack) & (places <= pixels + slack))
+    return np.asarray((position >= -slack) & (position <= pixels + slack))
 
 
-def _places(places: Floats, pixels: int, block: int, count: int) -> Floats:
-    """Return places in pixels as places between `count` means, whose middles have the numbers 0, 1, ..."""
+def _scale(position: Floats, pixels: int, block: int, count: int) -> Floats:
+    """Return positions in pixels as positions among `count` means, whose middles are at 0, 1, ..."""
     starts = np.arange(count) * block
     middles = (starts + np.minimum(starts + block, pixels)) / 2
-    return np.interp(places, middles, np.arange(count, dtype=np.float64))
+    return np.interp(position, middles, np.arange(count, dtype=np.float64))
 
 
 def _bilinear(values: Floats, rows: Floats, columns: Floats) -> Floats:

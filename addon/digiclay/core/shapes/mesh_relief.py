@@ -15,17 +15,17 @@ from .request import UPWARDS, Placement, Tops
 
 #: A hole is small if no more than this share of the covered pins stands under it.
 SMALL = 0.05
-#: How often the heights over holes are evened out, after they have been reached from all sides.
+#: Rounds of averaging the heights over holes, after these are filled from all sides.
 ROUNDS = 300
 
 
 def fill_holes(grid: Grid, value: Floats, missing: Flags) -> tuple[Floats, Flags]:
-    """Return the values (n,) with those over small holes taken from around, and which pins these are."""
-    # A hole is a group of neighboring pins that the surface misses, with pins under the surface all around: a
-    # group that reaches the rim of the bed is what lies beside the shape.
+    """Return the values (n,), those over small holes interpolated from around, and which pins these are."""
+    # A hole is a group of neighboring pins that the surface misses, surrounded by pins under the surface: a
+    # group that reaches the rim of the bed is beside the shape.
     beside = grid.layout.find_neighbors(corners=False)
     number = np.flatnonzero(missing)
-    position = np.full(grid.count + 1, -1)  # the last one, at -1, stands for what is beyond the rim
+    position = np.full(grid.count + 1, -1)  # the last one, at -1, is beyond the rim
     position[number] = np.arange(number.size)
     joined = position[beside[number]]
     start = np.repeat(np.arange(number.size), joined.shape[1])
@@ -41,7 +41,7 @@ def fill_holes(grid: Grid, value: Floats, missing: Flags) -> tuple[Floats, Flags
 
 
 def _evened(value: Floats, hole: Flags, beside: Cells) -> Floats:
-    """Return the values with those in holes between those around: first ring by ring, then evened out."""
+    """Return the values, those in holes filled from around: ring by ring, then averaged."""
     filled, waiting = value.copy(), hole.copy()
     while waiting.any():
         cells = np.flatnonzero(waiting)
@@ -56,14 +56,14 @@ def _evened(value: Floats, hole: Flags, beside: Cells) -> Floats:
     return filled
 
 
-#: Pairs of a ray and a triangle that are worked on at a time.
+#: Pairs of a ray and a triangle that are computed at a time.
 CHUNK = 2_000_000
-#: A pin that is over no triangle is over one it is beside by this share of a pitch at most: files round to
-#: float32 or to six digits, which moves the rim by up to a micrometer, and no pin is placed as exactly.
+#: A pin over no triangle belongs to one that is at most this share of a pitch away: files round to float32 or
+#: to six digits, which moves the rim by up to a micrometer, and no pin is positioned so exactly.
 EDGE = 1e-3
-#: Faces of a mesh are turned outwards if more than this share of the pins sees an upper side.
+#: Faces of a mesh count as oriented outwards if more than this share of the pins sees an upper side.
 UPPER = 0.8
-#: Two hits of a ray are one when they are closer than this share of the mesh's height.
+#: Hits of a ray closer than this share of the mesh's height count as one.
 SAME = 1e-5
 
 
@@ -105,7 +105,7 @@ class ShapeMesh:
         """Whether every edge belongs to two triangles: the mesh has an inside."""
         corners = _merged(self.vertices)[self.faces]
         start, end = corners.ravel(), np.roll(corners, -1, axis=1).ravel()
-        # One number an edge, whichever way it runs.
+        # One number per edge, in either direction.
         edges = np.minimum(start, end) * len(self.vertices) + np.maximum(start, end)
         _, count = np.unique(edges[start != end], return_counts=True)
         return bool(np.all(count == 2))
@@ -117,7 +117,7 @@ class ShapeMesh:
         cell, z, over, up = (np.concatenate(parts) for parts in zip(*hits, strict=True))
         hit = np.zeros(grid.count, np.bool_)
         hit[cell[over]] = True
-        used = over | ~hit[cell]  # what a ray closely passes counts where it hits nothing
+        used = over | ~hit[cell]  # a triangle that a ray narrowly misses counts if it hits none
         cell, z, up = cell[used], z[used], up[used]
         order = np.lexsort((up, z, cell))
         cell, z, up = cell[order], z[order], up[order]
@@ -127,19 +127,19 @@ class ShapeMesh:
         same = SAME * float(np.ptp(self.used[:, 2]))
         new = np.append(True, (cell[1:] != cell[:-1]) | (np.diff(z) > same))[: cell.size]
         layers = np.bincount(cell[new], minlength=grid.count)
-        # A closed mesh is passed through once, from its top to its underside; an open one is hit once.
+        # A ray enters a closed mesh at its top and leaves it at its underside; it hits an open one once.
         overhang = layers > (2 if self.closed else 1)
         if self.closed:
             return Tops(value, covered, overhang)
         missing = ~covered
         if np.count_nonzero(up[last]) > UPPER * np.count_nonzero(last):
-            # Seen from below: through a hole, on the inside of what lies under it.
+            # A hit from below: the ray passed a hole and hit the inside of the surface under it.
             missing[cell[last]] |= ~up[last]
         value, hole = fill_holes(grid, value, missing)
         return Tops(value, covered | hole, overhang & ~hole, int(np.count_nonzero(hole)))
 
     def _hits(self, grid: Grid, at: Placement) -> Iterator[tuple[NDArray[np.intp], Floats, Flags, Flags]]:
-        """Give cells whose rays hit or closely pass a triangle: height, whether it is hit, and from above."""
+        """Yield cells whose rays hit or narrowly miss a triangle: height, whether hit, whether from above."""
         plan = self.vertices[:, :2] * (at.factor_x, at.factor_y) + (at.x, at.y)
         corners, z = plan[self.faces], self.vertices[self.faces, 2]
         sides = corners[:, 1:] - corners[:, :1]
@@ -149,7 +149,7 @@ class ShapeMesh:
         low, high = corners.min(axis=1) - slack, corners.max(axis=1) + slack
         first_row, last_row, first, last = _window(grid, low, high)
         rows, columns = np.maximum(last_row - first_row + 1, 0), np.maximum(last - first + 1, 0)
-        # A triangle on edge covers no pin; its neighbors have the same edges.
+        # A vertical triangle covers no pin; its neighbors have the same edges.
         candidates = np.where(np.abs(area) > 1e-12 * size * size, rows * columns, 0)
         flat = np.flatnonzero(candidates)
         cuts = np.cumsum(candidates[flat]) // CHUNK
@@ -161,21 +161,21 @@ class ShapeMesh:
             cell = (row * grid.layout.columns + column).astype(np.intp)
             dx, dy = grid.x[cell] - corners[face, 0, 0], grid.y[cell] - corners[face, 0, 1]
             (ax, ay), (bx, by) = sides[face, 0].T, sides[face, 1].T
-            one, two = (dx * by - dy * bx) / area[face], (ax * dy - ay * dx) / area[face]
-            over = (np.minimum(one, two) >= -RELATIVE_TOLERANCE) & (one + two <= 1.0 + RELATIVE_TOLERANCE)
-            # Beside an edge the triangle is as high as on it, however steep it is.
-            one, two = np.maximum(one, 0.0), np.maximum(two, 0.0)
-            whole = np.maximum(one + two, 1.0)
-            one, two = one / whole, two / whole
-            near = np.hypot(dx - one * ax - two * bx, dy - one * ay - two * by) <= slack
-            cell, over, face, one, two = (part[near] for part in (cell, over, face, one, two))
+            u, v = (dx * by - dy * bx) / area[face], (ax * dy - ay * dx) / area[face]
+            over = (np.minimum(u, v) >= -RELATIVE_TOLERANCE) & (u + v <= 1.0 + RELATIVE_TOLERANCE)
+            # Beside an edge the height is that on the edge, however steep the triangle is.
+            u, v = np.maximum(u, 0.0), np.maximum(v, 0.0)
+            whole = np.maximum(u + v, 1.0)
+            u, v = u / whole, v / whole
+            near = np.hypot(dx - u * ax - v * bx, dy - u * ay - v * by) <= slack
+            cell, over, face, u, v = (part[near] for part in (cell, over, face, u, v))
             z0, z1, z2 = z[face].T
-            height = z0 + one * (z1 - z0) + two * (z2 - z0)
+            height = z0 + u * (z1 - z0) + v * (z2 - z0)
             yield cell, height, over, area[face] > 0.0
 
 
 def _merged(vertices: Floats) -> Indices:
-    """Return a number for each vertex, the same for those at the same place, as in an STL."""
+    """Return a number for each vertex; those at the same position, as in an STL, have the same."""
     order = np.lexsort(vertices.T)
     placed = vertices[order]
     number = np.empty(len(vertices), np.int64)
@@ -184,9 +184,8 @@ def _merged(vertices: Floats) -> Indices:
 
 
 def _window(grid: Grid, low: Floats, high: Floats) -> tuple[Indices, Indices, Indices, Indices]:
-    """Return the first and last rows and columns of the pins that lie in boxes (f, 2), m."""
+    """Return the first and last rows and columns of the pins in boxes (f, 2), m."""
     plan, (left, bottom) = grid.layout, grid.corner
-
     first_row = np.ceil((low[:, 1] - bottom) / plan.row_spacing).clip(0, plan.rows)
     last_row = np.floor((high[:, 1] - bottom) / plan.row_spacing).clip(-1, plan.rows - 1)
     first = np.ceil((low[:, 0] - left - plan.shift) / plan.pitch).clip(0, plan.columns)
@@ -196,16 +195,16 @@ def _window(grid: Grid, low: Floats, high: Floats) -> tuple[Indices, Indices, In
 
 
 def make_shape_mesh(name: str, vertices: Floats, faces: Indices, up: str, length: float) -> ShapeMesh:
-    """Make a shape of vertices (v, 3), `length` meters a unit, and faces (f, 3); `up`: a key of UPWARDS."""
-    place, corners = np.asarray(vertices, np.float64), np.asarray(faces, np.int64)
-    if place.ndim != 2 or place.shape[1:] != (3,) or corners.ndim != 2 or not corners.size:
+    """Make a shape of vertices (v, 3), `length` meters per unit, and faces (f, 3); `up`: a key of UPWARDS."""
+    points, corners = np.asarray(vertices, np.float64), np.asarray(faces, np.int64)
+    if points.ndim != 2 or points.shape[1:] != (3,) or corners.ndim != 2 or not corners.size:
         raise make_refusal("must hold a surface made of faces", name, "no face")
-    if corners.min() < 0 or corners.max() >= len(place):
-        raise make_refusal(CORNERS, name, f"corner {corners.max()} of {len(place)}")
-    bad = np.flatnonzero(~(np.abs(place) <= LARGEST).all(axis=1))
+    if corners.min() < 0 or corners.max() >= len(points):
+        raise make_refusal(CORNERS, name, f"corner {corners.max()} of {len(points)}")
+    bad = np.flatnonzero(~(np.abs(points) <= LARGEST).all(axis=1))
     if bad.size:
-        shown = ", ".join(f"{value:g}" for value in place[bad[0]])
+        shown = ", ".join(f"{value:g}" for value in points[bad[0]])
         rule = f"must have vertices that are finite numbers, of at most {LARGEST:g}"
         raise make_refusal(rule, name, f"vertex {bad[0]} at {shown}")
     axes, signs = UPWARDS[up]
-    return ShapeMesh(name, place[:, axes] * signs, corners, length)
+    return ShapeMesh(name, points[:, axes] * signs, corners, length)

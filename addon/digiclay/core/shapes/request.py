@@ -7,9 +7,9 @@ from ..base.arrays import Flags, Floats
 from ..base.errors import ParameterError
 from ..base.quantity import Parameters, quantity
 
-#: Lengths a file can be in: meters in one of them.
+#: Units of length of a file, in meters.
 LENGTHS = {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "inch": 25.4e-3}
-#: Directions of a file that can point upwards: which of its axes become x, y, z, and their signs.
+#: Upward directions of a file: its axes that become x, y, z, and their signs.
 UPWARDS: dict[str, tuple[tuple[int, int, int], tuple[int, int, int]]] = {
     "z": ((0, 1, 2), (1, 1, 1)),
     "y": ((0, 2, 1), (1, -1, 1)),
@@ -54,20 +54,23 @@ class Shape(Parameters):
         choices=("one_time", "gradual", "approximate_gradual"),
     )
     surfaces: int = quantity(
-        5, "number of intermediate surfaces of a gradual refresh, including the last", symbol="n_s",
-        at_least=1, at_most=1000,
-    )  # fmt: skip
+        5,
+        "number of intermediate surfaces of a gradual refresh, including the last",
+        symbol="n_s",
+        at_least=1,
+        at_most=1000,
+    )
     patience: float = quantity(2.0, "time limit of a move", unit="s", symbol="t_p", above=0.0)
 
     def check(self) -> None:
-        """A shape comes from somewhere."""
+        """Refuse a shape without a source."""
         if not self.file and not self.heights:
             rule = "must be a sample shape's name, a mesh, a picture or a file .npy"
             raise ParameterError("Shape", "file", rule, "nothing")
 
 
 class Placement(NamedTuple):
-    """Transformation of a shape's plan: bed = file * factor + offset; m, and m per file's unit."""
+    """Transformation of a shape's plan: bed = file * factor + offset, in m, and m per unit of the file."""
 
     factor_x: float
     factor_y: float
@@ -85,4 +88,4 @@ class Tops(NamedTuple):
     overhang: Flags
     """(n,): Pins over which another part of the shape lies below the top: it cannot be displayed."""
     filled: int = 0
-    """Pins under small holes, whose values are taken from around."""
+    """Pins under small holes, whose values are interpolated from around."""
