@@ -1,8 +1,8 @@
 """Error estimate of a session: second, finer integration under the same commands.
 
-The commands are those the session gave, so what differs is the integration alone. The closed form cannot blow
-up: a method that did does not judge itself, and what is more accurate does. A whole run is evaluated from its
-history; a live session has an `ErrorMonitor`, which follows it for a short stretch now and then.
+The commands are those of the session, so that only the integration differs. The reference uses the closed
+form, which cannot diverge, or a more accurate stepper. A whole run is evaluated from its history; a live
+session has an `ErrorMonitor`, which follows it for a short stretch at intervals.
 """
 
 from __future__ import annotations
@@ -30,28 +30,28 @@ from ..scene.schema import MOST_CUT, MOST_STEPS, Scene, Simulation
 #: Control periods of a session: the state after each, and the fingertip at both ends of it, (2, f, 7).
 Noted = tuple[tuple[State, Floats], ...]
 
-#: The reference's own error is taken to be a quarter of that of the run: a quarter of the step leaves so much
-#: of an error of first order, as across a kink. What comes out covers the truth in 95 of 100 runs: it is an
-#: estimate, no bound, and is printed as "about".
+#: Error of a run per difference from its reference. The reference's own error is taken as a quarter of that
+#: of the run: with a quarter of the step, that remains of an error of first order, as across a kink. The
+#: estimate covers the true error in 95 of 100 runs: it is no bound, and is printed as "about".
 SHARE = 4.0 / 3.0
 #: Parts of a step in the reference of steppers that are more accurate than the closed form at a quarter of
-#: it; what the adaptive one cuts is not known beforehand.
+#: the step; the steps of the adaptive one are not known beforehand.
 FINER = {"richardson": 4, "adaptive": 8}
-#: Longest physics step of a reference, s: with longer ones the shortest time constants are not resolved.
+#: Longest physics step of a reference, s: longer ones do not resolve the shortest time constants.
 LONGEST = 1.25e-3
-#: Control periods of a live session's stretch, and from the end of one to the start of the next. A period of
-#: the reference takes twice one of the session: one is done in so many, so that no tick is slow.
+#: Control periods of a live session's stretch, of the pause between two stretches, and per period of the
+#: reference, which takes twice as long: so no tick is slow.
 STRETCH, PAUSE, SPREAD = 20, 180, 4
-#: How far the fingertip may leave the straight way within a step before the error estimate is in doubt, m.
+#: Largest deviation of the fingertip from a straight path within a step at which the estimate holds, m.
 BENT = 0.1e-3
-#: Heights that are compared together: those of some control periods.
+#: Heights that are compared together, those of several control periods.
 TOGETHER = 20_000
-#: Parts of a physics step in which a path is looked at, and steps looked at together.
+#: Points of a path per physics step, and steps that are evaluated together.
 PARTS, BLOCK = 16, 4096
 
 
 class Errors(NamedTuple):
-    """Largest errors of height, m, force of a cell, N, and total, N: of a run, or a live session so far."""
+    """Largest errors of height, m, force on a cell, N, and total force, N: of a run, or so far."""
 
     height: float
     force: float
@@ -59,7 +59,7 @@ class Errors(NamedTuple):
 
     @classmethod
     def estimate(cls, largest: Floats) -> Errors:
-        """Return the errors that go with the largest differences from a reference, (3,)."""
+        """Return the errors for the largest differences from a reference, (3,)."""
         return cls(*(SHARE * largest).tolist())
 
 
@@ -77,24 +77,24 @@ class ErrorMonitor(NamedTuple):
     before: int = 0
     """Control periods of the session in the tick before."""
     waiting: Noted = ()
-    """Periods of the stretch that the reference has still to do: the session after each, of
-    which only the active cells are as they were then, and the fingertip at both ends of it."""
+    """Periods of the stretch still to be integrated: the session's state after each, of which only the active
+    cells are as of then, and the fingertip at both ends of it."""
     reached: Floats | None = None
     """(n,): Heights of the session at the end of the stretch, m."""
     carried: Floats | None = None
-    """(n,): The reference's heights less the session's there, m: with them the next stretch begins."""
+    """(n,): Heights of the reference less those of the session there, m, for the next stretch."""
     largest: Floats | None = None
     """(3,): From `compare`, in the stretches so far."""
 
 
 class Replay:
-    """Replay of recorded valve commands, (t, n), a row a control period; none afterwards."""
+    """Replay of recorded valve commands, (t, n), one row per control period; zero afterwards."""
 
     rows = 0
 
     def __init__(self, grid: Grid, commands: Floats) -> None:
         self.commands = commands
-        # The disc that holds every cell that is ever commanded: x, y, radius, m.
+        # The disc around all cells that are ever commanded: x, y, radius, m.
         self.disc: Disc | None = grid.enclose(np.flatnonzero(commands.any(axis=0)))
 
     def begin(self) -> int:
@@ -102,7 +102,7 @@ class Replay:
         return 0
 
     def locate(self, memory: int, touched: Measurement) -> tuple[int, Disc | None]:
-        """Take every commanded cell along."""
+        """Return the disc around every commanded cell."""
         return memory, self.disc
 
     def command(self, memory: int, seen: Measurement) -> tuple[int, Commands]:
@@ -126,7 +126,7 @@ def explain_absence(scene: Scene) -> str:
 
 
 def reference_settings(simulation: Simulation) -> Simulation:
-    """Return how a reference is integrated: in closed form, in at least 4 parts of a step; or see `FINER`."""
+    """Return the integration of a reference: closed form, at least 4 parts per step; or see `FINER`."""
     if simulation.stepper in FINER:
         parts = max(2, min(FINER[simulation.stepper], MOST_CUT["richardson"] // simulation.steps))
         return replace(simulation, stepper="richardson").refined(parts)
@@ -136,16 +136,15 @@ def reference_settings(simulation: Simulation) -> Simulation:
 
 
 def make_reference(scene: Scene) -> Scene:
-    """Return the reference of a run: its parts and `reference_settings`, without a controller of its own."""
+    """Return the reference of a run: its parts and `reference_settings`, without a controller."""
     return replace(scene, control=None, shape=None, simulation=reference_settings(scene.simulation))
 
 
 def compare(height: Floats, force: Floats, other_height: Floats, other_force: Floats) -> Floats:
     """Return the largest differences (3[, b]) of heights (n[, b]), m, forces (k[, b]) and total forces, N."""
-    apart, pushed = np.abs(height - other_height), force - other_force
-    total = np.abs(np.add.reduce(pushed))
-    largest = (np.maximum.reduce(part, initial=0.0) for part in (apart, np.abs(pushed)))
-    return np.stack([*largest, total])
+    heights, forces = np.abs(height - other_height), force - other_force
+    largest = (np.maximum.reduce(part, initial=0.0) for part in (heights, np.abs(forces)))
+    return np.stack([*largest, np.abs(np.add.reduce(forces))])
 
 
 def estimate_errors(
@@ -160,15 +159,15 @@ def estimate_errors(
     system = replace(system, controller=Replay(system.grid, history["command"]))
     done, largest = len(history["time"]) - 1, np.zeros(3)
     most = max(1, TOGETHER // system.grid.count)
-    seen = np.empty((2, most, system.grid.count))
+    reference = np.empty((2, most, system.grid.count))
     for row, state in enumerate(periods(system, scene.trajectories(), begin(system), done), 1):
         last = (row - 1) % most
-        seen[:, last] = state.row(0), state.row(system.rows.force)
+        reference[:, last] = state.row(0), state.row(system.rows.force)
         if last == most - 1 or row == done:
             rows = slice(row - last, row + 1)
-            own = (history[name][rows].T for name in ("height", "force"))
-            apart = compare(*seen[:, : last + 1].transpose(0, 2, 1), *own)
-            largest = np.maximum(largest, apart.max(axis=1))
+            height, force = reference[:, : last + 1].transpose(0, 2, 1)
+            differences = compare(height, force, history["height"][rows].T, history["force"][rows].T)
+            largest = np.maximum(largest, differences.max(axis=1))
         if progress:
             progress(row, done)
         if stopped and stopped():
@@ -177,9 +176,9 @@ def estimate_errors(
 
 
 def describe_bends(scene: Scene) -> str:
-    """Return what makes the estimated errors of a run doubtful, or ``""``.
+    """Return the reason to doubt the estimated errors of a run, or ``""``.
 
-    A contact that begins and ends within a step is seen neither by the run nor, in full, by its reference.
+    The run misses a contact that begins and ends within a step, and its reference resolves it only in part.
     """
     paths, simulation = tuple(finger.trajectory for finger in scene.fingers), scene.simulation
     bend = _measure_bends(paths, simulation.physics_step, simulation.duration)
@@ -189,44 +188,44 @@ def describe_bends(scene: Scene) -> str:
 
 @lru_cache(maxsize=1)  # points of a sweep have one path
 def _measure_bends(paths: tuple[Path, ...], step: float, duration: float) -> float:
-    """Return how far fingertips leave the straight way within a physics step, m."""
+    """Return the largest deviation of fingertips from a straight path within a physics step, m."""
     trajectories, largest = [path.trajectory() for path in paths], 0.0
-    # After its last waypoint a fingertip stays, however long the session is.
+    # A fingertip rests after its last waypoint, however long the session is.
     moved = min(duration, max((trajectory.duration for trajectory in trajectories), default=0.0))
     count = math.ceil(moved / step)
     for first in range(0, count, BLOCK):
         steps = min(BLOCK, count - first)
         times = (first + np.arange(steps * PARTS + 1) / PARTS) * step
-        place = sample_poses(trajectories, times)[..., :3]
-        ways = np.stack([place[part : part + steps * PARTS : PARTS] for part in range(PARTS)])
+        position = sample_poses(trajectories, times)[..., :3]
+        inside = np.stack([position[part : part + steps * PARTS : PARTS] for part in range(PARTS)])
         part = np.arange(PARTS)[:, None, None, None] / PARTS
-        straight = ways[0] + part * (place[PARTS::PARTS] - ways[0])
-        largest = max(largest, float(np.linalg.norm(ways - straight, axis=-1).max()))
+        straight = inside[0] + part * (position[PARTS::PARTS] - inside[0])
+        largest = max(largest, float(np.linalg.norm(inside - straight, axis=-1).max()))
     return largest
 
 
 def start(scene: Scene) -> ErrorMonitor | None:
-    """Return the monitor of a live session's beginning; None where the step cannot be halved."""
+    """Return the monitor of a live session that begins; None if the step cannot be halved."""
     try:
-        # The state of a session, of which a stretch begins with a copy, has the rows of its controller.
+        # With the controller: a stretch begins with a copy of the session's state, which has its rows.
         return ErrorMonitor(assemble(replace(scene, simulation=reference_settings(scene.simulation))))
     except DigiclayError:
         return None
 
 
 def restart(monitor: ErrorMonitor | None, scene: Scene) -> ErrorMonitor | None:
-    """Return the monitor of a session whose fingertips have changed; a stretch that this ends begins anew."""
+    """Return the monitor of a session whose fingertips have changed, which interrupts a stretch."""
     begun = start(scene) if monitor else None
     return begun._replace(age=monitor.age) if monitor and begun and monitor.state is None else begun
 
 
 def reset(monitor: ErrorMonitor) -> ErrorMonitor:
-    """Return the monitor of a session that has just become another one."""
+    """Return the monitor of a session that continues from another state."""
     return ErrorMonitor(monitor.system)
 
 
 def begin_stretch(monitor: ErrorMonitor, state: State, pause: int = PAUSE) -> ErrorMonitor:
-    """Return the monitor with a copy of a session's state, where a stretch is due; else as it is."""
+    """Return the monitor with a copy of a session's state if a stretch is due, else unchanged."""
     if monitor.state is not None or 0 < monitor.age < STRETCH + pause:
         return monitor
     begun = state.copy()
@@ -239,34 +238,33 @@ def begin_stretch(monitor: ErrorMonitor, state: State, pause: int = PAUSE) -> Er
 
 
 def note(monitor: ErrorMonitor, after: State, path: Floats, pause: int = PAUSE) -> ErrorMonitor:
-    """Return the monitor with the period that a session has just done; `path` (2, f, 7): its fingertips."""
+    """Return the monitor with the session's last period; `path` (2, f, 7): its fingertips."""
     monitor = monitor._replace(age=monitor.age + 1)
     if monitor.state is None:
         return begin_stretch(monitor, after, pause)
     if monitor.age > STRETCH:
         return monitor
-    kept = after._replace(active=replace(after.active, block=after.active.block.copy()))
-    ended = monitor.age == STRETCH
-    reached = after.row(0) if ended else None
-    return monitor._replace(waiting=(*monitor.waiting, (kept, path)), reached=reached)
+    state = after._replace(active=replace(after.active, block=after.active.block.copy()))
+    reached = after.row(0) if monitor.age == STRETCH else None
+    return monitor._replace(waiting=(*monitor.waiting, (state, path)), reached=reached)
 
 
 def catch_up(monitor: ErrorMonitor, after: State, count: int) -> tuple[ErrorMonitor, Errors | None]:
-    """Integrate noted periods after a tick of `count`; return the errors so far where a stretch has ended."""
-    # Ticks of more periods than the one before take the longest already.
+    """Integrate noted periods after a tick of `count`; return the errors so far if a stretch has ended."""
+    # A tick of more periods than the one before is already slow.
     longer, monitor = count > monitor.before, monitor._replace(before=count)
     due = 0 if longer else min(monitor.age // SPREAD - monitor.done, max(1, count // SPREAD))
     state, system = monitor.state, monitor.system
     while state is not None and due > 0:
         due -= 1
         with np.errstate(over="ignore", invalid="ignore"):
-            (leader, way), *waiting = monitor.waiting
-            poses = interpolate_poses(way, system.instants / system.period)
+            (leader, path), *waiting = monitor.waiting
+            poses = interpolate_poses(path, system.instants / system.period)
             state = repeat_period(system, state, trace_fingers(system, poses)[0], leader)
         if not np.isfinite(state.active.block).all():
             return begin_stretch(reset(monitor), after), None
-        own, other = (each.active.block[[0, system.rows.force]] for each in (state, leader))
-        largest = compare(*own, *other)
+        compared = [0, system.rows.force]
+        largest = compare(*state.active.block[compared], *leader.active.block[compared])
         if monitor.largest is not None:
             largest = np.maximum(largest, monitor.largest)
         if not waiting and monitor.reached is not None:

@@ -20,17 +20,19 @@ from .memory_limit import measure_available_memory
 
 #: The file of the arrays.
 HISTORY = "history.npz"
-#: No number of a run is as large: sums of squares are finite.
+#: Largest number of a run, so that sums of squares are finite.
 LARGEST = 1e100
 #: Shape of each array of a history, t rows of n cells under f fingers; of one finger without that axis.
 SHAPES: dict[str, tuple[str | int, ...]] = {
-    "time": ("t",), "height": ("t", "n"), "force": ("t", "n"), "command": ("t", "n"), "mode": ("t", "n"),
-    "fingertip": ("t", "f", 7), "total_force": ("t",), "position": ("n", 2),
-    "finger_force": ("t", "f"), "beyond_a_finger": ("t",),
-}  # fmt: skip
+    **dict.fromkeys(("time", "total_force", "beyond_a_finger"), ("t",)),
+    **dict.fromkeys(("height", "force", "command", "mode"), ("t", "n")),
+    "fingertip": ("t", "f", 7),
+    "finger_force": ("t", "f"),
+    "position": ("n", 2),
+}
 #: Arrays that not every run has.
 LATER = ("finger_force", "beyond_a_finger")
-#: Types of an array that does not hold numbers: their kinds, and what they are called.
+#: Types of the arrays that are not plain numbers, and their names in messages.
 KINDS = {"mode": ("i", "whole numbers"), "beyond_a_finger": ("b", "truth values")}
 
 
@@ -43,7 +45,7 @@ class Run:
 
 
 def read_run(folder: Path, *names: str) -> Run:
-    """Read a run, and of its history the arrays named, keys of `SHAPES`; OutputError if unsound."""
+    """Read a run and the named arrays of its history, keys of `SHAPES`; OutputError if unsound."""
     path = folder / HISTORY
     if not (folder / "scene.toml").is_file():
         raise OutputError(f"{folder} is no run's folder: it has no scene.toml.")
@@ -52,10 +54,9 @@ def read_run(folder: Path, *names: str) -> Run:
     scene = load_recorded(folder / "scene.toml")
     try:
         with zipfile.ZipFile(path) as archive:
-            kept = {Path(name).stem for name in archive.namelist()}
-            heads = read_heads(
-                archive, [name for name in ("time", *names) if name in kept or name not in LATER]
-            )
+            stored = {Path(name).stem for name in archive.namelist()}
+            wanted = [name for name in ("time", *names) if name in stored or name not in LATER]
+            heads = read_heads(archive, wanted)
             _refuse(path, scene, heads)
             history = {name: read_array(archive, name) for name in heads}
     except (OSError, ValueError, KeyError, EOFError, *BROKEN_ZIP) as error:
@@ -70,7 +71,7 @@ def read_run(folder: Path, *names: str) -> Run:
 
 
 def _refuse(path: Path, scene: Scene, heads: Mapping[str, Head]) -> None:
-    """Refuse arrays that a run of this scene does not leave, before they are unpacked."""
+    """Refuse arrays that no run of this scene writes, before they are unpacked."""
     rows = heads["time"].shape[0] if heads["time"].shape else 0
     most = (scene.recorder or Recorder()).rows(scene.periods)
     if not 0 < rows <= most:
@@ -92,7 +93,7 @@ def _refuse(path: Path, scene: Scene, heads: Mapping[str, Head]) -> None:
 
 
 def has_files(folder: Path, sizes: Mapping[str, int]) -> bool:
-    """Return whether a run's folder has all files in their sizes, bytes: copies break off half way."""
+    """Return whether a run's folder has all files with their sizes, bytes: copies may be incomplete."""
     try:
         return bool(sizes) and all((folder / name).stat().st_size == size for name, size in sizes.items())
     except OSError:
@@ -100,14 +101,14 @@ def has_files(folder: Path, sizes: Mapping[str, int]) -> bool:
 
 
 def is_whole(folder: Path, scene: Scene) -> bool:
-    """Return whether a run's folder has what belongs into each, where no sizes were noted."""
+    """Return whether a run's folder is complete, by its files alone, without noted sizes."""
     whole = read_json(folder / MARK) is not None
-    # The names of an archive's parts stand at its end.
+    # The directory of an archive is at its end.
     return whole and (scene.recorder is None or zipfile.is_zipfile(folder / HISTORY))
 
 
 def find_row(history: Mapping[str, NDArray[Any]], time: float, called: str) -> int:
-    """Return the row nearest to a time within the session, s, which messages call `called`."""
+    """Return the row nearest to a time within the session, s; `called`: its name in messages."""
     moments = history["time"]
     if not moments[0] <= time <= moments[-1]:
         raise OutputError(
@@ -117,6 +118,6 @@ def find_row(history: Mapping[str, NDArray[Any]], time: float, called: str) -> i
 
 
 def find_last_touch(history: Mapping[str, NDArray[Any]]) -> int:
-    """Return the last row in which the fingertip touches, or the last one: there is most to be seen."""
+    """Return the last row with contact, or else the last one: it shows most."""
     touching = np.flatnonzero(history["total_force"] > 0.0)
     return int(touching[-1]) if touching.size else len(history["time"]) - 1

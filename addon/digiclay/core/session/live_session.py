@@ -20,24 +20,24 @@ from ..model.trajectory import interpolate_poses
 from ..scene.schema import Scene
 from . import accuracy, snapshot
 
-#: Over how much of the wall's time the real-time factor is taken, s.
+#: Wall time over which the real-time factor is averaged, s.
 WINDOW = 1.0
-#: Longest time the periods of one tick may take, as a share of the time between two ticks: the rest
-#: is for drawing, and for the person at the window.
+#: Longest time for the periods of a tick, as a share of the interval of ticks: the rest is for drawing and
+#: for the user.
 SHARE = 0.7
-#: Least time of those of a queue, as a share of what Blender draws for, while a hand draws, and once it has
-#: let go and waits: software draws for half a second. What draws 30 pictures a second still shows 15 then.
+#: Least time for the periods of a queue, as a share of Blender's drawing time, while a stroke is drawn, and
+#: after its end: software drawing takes half a second. At 30 frames per second, 15 are still displayed then.
 LEAST, RELEASED = 0.5, 1.0
-#: Share of the time beside the periods that is drawing for certain: Blender also waits for the next tick.
+#: Share of the time between the periods that is drawing for certain: Blender also waits for the next tick.
 DRAWN = 0.9
-#: Shortest time between two ticks that is counted with, s: ticks may come in a burst.
+#: Shortest interval of ticks that is assumed, s: ticks may come in a burst.
 SHORTEST = 1e-2
-#: An animation whose frame does not change for so long is another scene's, s: software draws one a second.
+#: An animation whose frame has not changed for this time is another scene's, s: software draws 1 frame per s.
 STANDS = 2.0
-#: Rounding errors of times count as whole periods when they are below this share of one.
+#: Rounding error up to which times count as whole periods, in periods.
 SLACK = 1e-6
 
-#: Where a fingertip of a recording stands that is not there, (7,): one that a stroke has for its images.
+#: Pose of a recorded fingertip that is absent, (7,): a stroke adds fingertips for its images.
 AWAY = np.array([0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0])
 
 Ticks = tuple[tuple[float, float], ...]
@@ -48,35 +48,35 @@ class Clock:
     """Wall clock of a live session."""
 
     seen: float | None = None
-    """When the clock was last looked at, s; None: it starts with the next look."""
+    """Wall time at which the clock was last read, s; None: it starts at the next reading."""
     moment: tuple[float, float] | None = None
-    """Time of an animation that played then, and when it came to that, s; None: none did."""
+    """Time of an animation that played then, and wall time at which it got there, s; None: none played."""
     left: float = 0.0
-    """Time gone by that is not simulated yet, less than a control period, s."""
+    """Elapsed time that is not simulated yet, less than a control period, s."""
     cost: float = 0.0
-    """Wall time one control period takes, s, as measured of late; 0: not known."""
+    """Wall time per control period, s, a running average; 0: unknown."""
     spent: float = 0.0
-    """Wall time that the periods of a queue took in the last tick, s; 0: there were none."""
+    """Wall time that the periods of a queue took in the last tick, s; 0: none."""
     ticks: Ticks = ()
-    """Wall time between looks within the last second, and what was simulated then, s."""
+    """Wall time between readings within the last second, and the time simulated in it, s."""
 
     @property
     def factor(self) -> float:
-        """Simulated time over the wall's, in the last second; 1 keeps up, 0 before anything is known."""
+        """Simulated time over wall time in the last second; 1 is real time, 0 is unknown."""
         gone = sum(time for time, _ in self.ticks)
         return sum(done for _, done in self.ticks) / gone if gone > 0.0 else 0.0
 
     def stopped(self) -> Clock:
-        """Return the clock of a session that pauses: the time of the pause will not count."""
+        """Return the clock of a session that pauses, so that the pause does not count."""
         return replace(self, seen=None, moment=None, left=0.0, spent=0.0, ticks=())
 
 
 def periods_due(
     clock: Clock, now: float, period: float, most: int, moment: float | None = None
 ) -> tuple[int, Clock]:
-    """Return how many control periods, s, to simulate now, s, at `most`, and the clock after them.
+    """Return the number of control periods, s, to simulate now, s, at `most`, and the clock after them.
 
-    `moment`: time of an animation that plays, s, which counts instead: what is keyed moves as fast as keyed.
+    `moment`: time of an animation that plays, s, which counts instead, so that keyed motion has its speed.
     """
     last, shown = clock.moment, None if moment is None else (moment, now)
     shown = last if last and last[0] == moment else shown
@@ -95,7 +95,7 @@ def periods_due(
 
 
 def _extend_window(ticks: Ticks, gone: float, done: float) -> Ticks:
-    """Return the ticks within the last second and one more; wall time and simulated time, s."""
+    """Return the ticks within the last second, with one added; wall time and simulated time, s."""
     ticks = (*ticks, (gone, done))
     while len(ticks) > 1 and sum(time for time, _ in ticks[1:]) >= WINDOW:
         ticks = ticks[1:]
@@ -103,14 +103,14 @@ def _extend_window(ticks: Ticks, gone: float, done: float) -> Ticks:
 
 
 def find_spare(clock: Clock, now: float, interval: float, least: float = LEAST) -> float:
-    """Return how long the periods of a queue may take in a tick at `now`, of ticks an `interval` apart, s."""
-    # Drawing is not seen from here, only all the time between two ticks that the periods did not take.
+    """Return the time for the periods of a queue in a tick at `now`, of ticks an `interval` apart, s."""
+    # Drawing cannot be measured here, only the whole time between two ticks without the periods.
     beside = interval if clock.seen is None else max(0.0, now - clock.seen - clock.spent)
     return max(min(SHARE * interval, interval - DRAWN * beside), least * beside)
 
 
 def count_queue(clock: Clock, now: float, done: float, spent: float) -> Clock:
-    """Return the clock after a queue's periods: simulated, and by the wall, s; a wait does not count."""
+    """Return the clock after a queue's periods: simulated and wall time, s; waiting does not count."""
     clock = replace(clock, moment=None, left=0.0, spent=spent)
     if done > 0.0:
         gone = spent if clock.seen is None else max(spent, now - clock.seen)
@@ -119,7 +119,7 @@ def count_queue(clock: Clock, now: float, done: float, spent: float) -> Clock:
 
 
 def update_cost(clock: Clock, count: int, took: float) -> Clock:
-    """Return the clock after a number of control periods that took a measured time, s."""
+    """Return the clock after a number of control periods and the wall time they took, s."""
     if count < 1 or took <= 0.0:
         return clock
     each = took / count
@@ -127,15 +127,15 @@ def update_cost(clock: Clock, count: int, took: float) -> Clock:
 
 
 def interpolate_path(start: Floats, end: Floats, count: int) -> Floats:
-    """Return the fingers' poses (count + 1, f, 7) between periods, from poses (f, 7) to poses."""
+    """Return the fingers' poses (count + 1, f, 7) at the ends of periods between two poses (f, 7)."""
     path: Floats = interpolate_poses(np.array([start, end]), np.arange(count + 1) / count)[0]
     path[0] = start
     return path
 
 
 def clamp_pose(pose: Floats, stroke: float) -> Floats:
-    """Return poses (..., 7), kept above the bed's floor and within a thousand strokes, m, of the bed."""
-    # Pins bottom out at the floor: below it the force would exceed what floating-point numbers hold.
+    """Return poses (..., 7), limited to the floor and to a thousand strokes, m, from the bed."""
+    # Pins stop at the floor: below it the force would exceed the floating-point range.
     far = 1e3 * stroke
     inside = pose.copy()
     np.minimum(np.maximum(pose[..., :3], (-far, -far, 0.0)), far, out=inside[..., :3])
@@ -145,69 +145,69 @@ def clamp_pose(pose: Floats, stroke: float) -> Floats:
 def simulate_path(
     system: System, state: State, path: Floats, orders: Orders | None = None
 ) -> Iterator[State]:
-    """Yield the states along the path (t + 1, f, 7), each valid until the next one; `state` is used up."""
+    """Yield the states along the path (t + 1, f, 7), each valid until the next one; overwrites `state`."""
     fingers = trace_fingers(system, interpolate_poses(path, system.instants / system.period))
     locked = bool((state.mode() == Mode.LOCKED).any())
     systems: Iterator[System] = repeat(system, len(fingers))
     if orders is not None or locked:
         systems = _order(system, orders or Orders(np.zeros((len(fingers), ORDER))), locked=locked)
-    for own, finger in zip(systems, fingers, strict=True):
-        state = advance(own, state, finger)
+    for system, finger in zip(systems, fingers, strict=True):
+        state = advance(system, state, finger)
         yield state
 
 
 def _order(system: System, orders: Orders, *, locked: bool) -> Iterator[System]:
-    """Yield the system of each control period of a bed with orders, or whose pins are locked."""
-    method, kind = system.controller, (system.latency, system.height_floor)
-    own = order_periods(method, system.grid, system.cell, system.period, orders, *kind, locked=locked)
-    for controller in own:
+    """Yield the system of each control period of a bed with orders, or with locked pins."""
+    method, device = system.controller, (system.grid, system.cell, system.period)
+    limits = system.latency, system.height_floor
+    for controller in order_periods(method, *device, orders, *limits, locked=locked):
         yield system if controller is method else replace(system, controller=controller)
 
 
 def has_arrived(state: State) -> bool:
-    """Return whether all pins that orders drive have come to their heights."""
+    """Return whether all pins that orders move have reached their heights."""
     return not bool((state.mode() == Mode.BLISTER).any())
 
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """Fingertip path, and the orders beside it, since the start of the recording."""
+    """Fingertip paths and orders since the start of the recording."""
 
     start: bytes
-    """The state recording began with, kept by `snapshot.dump`."""
+    """The state at the start, from `snapshot.dump`."""
     first: int
     """Its period."""
     rows: Floats
-    """(capacity, 7 f + 5 + 1): Poses of the fingers at the end of each period, AWAY: not there, the order in
-    it, see `core.control.orders`, and the moment it was simulated in; row 0: the start."""
+    """(capacity, 7 f + 5 + 1): Poses of the fingers at the end of each period, AWAY if absent, its order, see
+    `core.control.orders`, and its tick; row 0: the start."""
     count: int
-    """How many of the rows are in use."""
+    """Rows in use."""
     saved: int = 0
-    """How many of those the file has, as a take."""
+    """Rows that the file has in a take."""
     surfaces: tuple[Floats, ...] = ()
-    """(n,) each: Heights that orders place pins at, m."""
+    """(n,) each: Heights to which orders move pins, m."""
 
     @classmethod
     def begin(cls, snapshot: bytes, period: int, pose: Floats, tick: int, room: int = 256) -> Recording:
-        """Return a recording of a start alone, with room for so many rows: snapshot, period, poses (f, 7)."""
+        """Return a recording of a start only: snapshot, period, poses (f, 7); `room`: its capacity."""
         rows = np.empty((room, pose.size + ORDER + 1))
         rows[0] = *pose.ravel(), *np.zeros(ORDER), tick
         return cls(snapshot, period, rows, 1)
 
     @property
     def path(self) -> Floats:
-        """Poses, shape (t + 1, f, 7): `simulate_path` simulates them again bit for bit."""
+        """Poses (t + 1, f, 7), which `simulate_path` simulates again bit for bit."""
         return self.rows[: self.count, : -ORDER - 1].reshape(self.count, -1, 7)
 
     @property
     def orders(self) -> Orders | None:
-        """The orders of all periods; None: there is none in any."""
+        """The orders of all periods; None: no period has one."""
         orders = Orders(self.rows[1 : self.count, -ORDER - 1 : -1], self.surfaces)
         return orders if orders.given else None
 
     @property
     def unsaved(self) -> bool:
-        """Whether something was recorded that the file does not have."""
+        """Whether the file lacks recorded periods."""
         return self.count > max(self.saved, 1)
 
     def extend(self, path: Floats, tick: int, orders: Orders | None = None) -> Recording:
@@ -217,19 +217,18 @@ class Recording:
         if end > len(rows):
             rows = np.empty((2 * end, self.rows.shape[1]))
             rows[: self.count] = self.rows[: self.count]
-        own = rows[self.count : end, : -ORDER - 1].reshape(len(path), -1, 7)
-        path = path.reshape(len(path), -1, 7)
-        own[:], own[:, : path.shape[1]] = AWAY, path
-        rows[self.count : end, : -ORDER - 1] = own.reshape(len(path), -1)
-        surfaces = self.surfaces
-        rows[self.count : end, -ORDER - 1 : -1] = 0.0
+        new = rows[self.count : end]
+        poses = np.tile(AWAY, (len(path), (rows.shape[1] - ORDER - 1) // 7))
+        poses[:, : path[0].size] = path.reshape(len(path), -1)
+        new[:, : -ORDER - 1] = poses
+        new[:, -1] = tick
+        given, surfaces = new[:, -ORDER - 1 : -1], self.surfaces
+        given[:] = 0.0
         if orders is not None:
-            given = rows[self.count : end, -ORDER - 1 : -1]
             given[:] = orders.rows
             surfaces, numbers = _add_surfaces(surfaces, orders.surfaces)
             placed = given[:, 4] == Verb.PLACE
             given[placed, 0] = numbers[given[placed, 0].astype(np.intp)]
-        rows[self.count : end, -1] = tick
         return replace(self, rows=rows, count=end, surfaces=surfaces)
 
     def let_in(self, poses: Floats) -> Recording:
@@ -241,55 +240,56 @@ class Recording:
         return replace(self, rows=rows)
 
     def cut_at_tick(self, tick: int, period: int) -> Recording | None:
-        """Return the recording as of a moment undo came back to, in `period`; None if that is another."""
+        """Return the recording up to the tick that undo restored, in `period`; None if they disagree."""
         count = int(np.searchsorted(self.rows[: self.count, -1], tick, side="right"))
         return self._first(count) if count and count - 1 == period - self.first else None
 
     def cut_at_period(self, period: int) -> Recording | None:
-        """Return the recording up to a period of its own; None when that is before its start."""
+        """Return the recording up to one of its periods; None if that is before its start."""
         count = period - self.first + 1
         return self._first(count) if 0 < count <= self.count else None
 
     def _first(self, count: int) -> Recording:
-        """Return the recording with its first rows alone."""
+        """Return the first rows of the recording."""
         rows = self.rows[1:count, -ORDER - 1 : -1]
         needed = int(rows[rows[:, 4] == Verb.PLACE, 0].max(initial=-1.0)) + 1
         return replace(self, count=count, saved=min(self.saved, count), surfaces=self.surfaces[:needed])
 
 
-def _add_surfaces(kept: tuple[Floats, ...], more: tuple[Floats, ...]) -> tuple[tuple[Floats, ...], Floats]:
-    """Return surfaces (n,) with more, but for the last one once again, and the numbers of the latter."""
+def _add_surfaces(
+    surfaces: tuple[Floats, ...], added: tuple[Floats, ...]
+) -> tuple[tuple[Floats, ...], Floats]:
+    """Return surfaces (n,) with those added, unless equal to the last one, and the numbers of the latter."""
     numbers = []
-    for surface in more:
-        if not (kept and (kept[-1] is surface or kept[-1].tobytes() == surface.tobytes())):
-            kept = (*kept, surface)
-        numbers.append(len(kept) - 1)
-    return kept, np.array(numbers, np.float64)
+    for surface in added:
+        if not (surfaces and (surfaces[-1] is surface or surfaces[-1].tobytes() == surface.tobytes())):
+            surfaces = (*surfaces, surface)
+        numbers.append(len(surfaces) - 1)
+    return surfaces, np.array(numbers, np.float64)
 
 
 @dataclass(frozen=True, eq=False)
 class Moment:
-    """Moment a session can go back to: period, snapshot, and poses of the fingertips (f, 7)."""
+    """Moment to which a session can return: period, snapshot, and poses of the fingertips (f, 7)."""
 
     period: int
     snapshot: bytes
     poses: Floats
     tick: int = 0
-    """Which of the session's ticks it is of: it tells moments apart."""
+    """Number of the session's tick, which identifies the moment."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class LiveSession:
-    """Live session at one instant, at the core of those in Blender and of servers."""
+    """Live session at one instant, in Blender or in a server."""
 
     scene: Scene
     system: System
     state: State
-    """Used up by the next control period: nothing of it may be stored."""
+    """The next control period overwrites it: it may not be stored."""
     poses: Floats
-    """(f, 7): The fingertips', up to which the session has followed them."""
+    """(f, 7): Poses of the fingertips that the session has reached."""
     recording: Recording | None = None
-    """Of the fingertip path."""
     monitor: accuracy.ErrorMonitor | None = None
     errors: accuracy.Errors | None = None
     """Estimate so far."""
@@ -312,14 +312,14 @@ def follow_path(
     watch: Callable[[State], None] | None = None,
     pause: int = accuracy.PAUSE,
 ) -> Session:
-    """Simulate and record the control periods of a path (t + 1, f, 7); DivergenceError uses it up.
+    """Simulate and record the control periods of a path (t + 1, f, 7); unusable after a DivergenceError.
 
     `pause`: control periods between two stretches of its monitor.
     """
     system, state, monitor = session.system, session.state, session.monitor
     monitor = monitor and accuracy.begin_stretch(monitor, state, pause)
     errors, first = None, state.period + 1
-    # The force of a pressed pin grows exponentially; the session itself reports what exceeds all floats.
+    # The force on a pressed pin grows exponentially; the session itself reports an overflow.
     with np.errstate(over="ignore", invalid="ignore"):
         for state in simulate_path(system, session.state, path, orders):
             if monitor:
@@ -330,20 +330,18 @@ def follow_path(
     if monitor:
         monitor, errors = accuracy.catch_up(monitor, state, len(path) - 1)
     recording = session.recording and session.recording.extend(path[1:], tick, orders)
-    return replace(
-        session, state=state, poses=path[-1], recording=recording, monitor=monitor,
-        errors=errors or session.errors,
-    )  # fmt: skip
+    errors = errors or session.errors
+    return replace(session, state=state, poses=path[-1], recording=recording, monitor=monitor, errors=errors)
 
 
 def start_recording(session: Session, now: bytes, tick: int = 0, room: int = 255) -> Session:
-    """Begin to record; `now` is the snapshot of the state, `room` the periods with memory from the start."""
+    """Return the session with a new recording; `now`: snapshot of the state; `room`: periods to allocate."""
     begun = Recording.begin(now, session.state.period, session.poses, tick, room + 1)
     return replace(session, recording=begun)
 
 
 def go_back(session: Session, moment: Moment) -> Session:
-    """Return the session at an earlier moment; what was recorded since is cut off."""
+    """Return the session at an earlier moment, without what was recorded since."""
     recording = session.recording and session.recording.cut_at_period(moment.period)
     state = snapshot.load(session.system, moment.snapshot)
     monitor = session.monitor and accuracy.reset(session.monitor)

@@ -9,16 +9,16 @@ from ..engine.state import Rows
 from ..scene.recorder import CHUNK, Recorder
 from ..scene.schema import Scene
 
-#: Bytes one row takes for one cell: height, force and command as float64, mode as int8; and one while the
-#: metrics are computed, of which rows a cell follows the force in.
+#: Bytes per row and cell: height, force and command as float64, mode as int8, and one while the metrics are
+#: computed, for the rows in which a cell follows the force.
 BYTES_A_CELL = 3 * 8 + 1 + 1
-#: Bytes a cell takes besides its state's rows: position (2 float64), age (float64), mode (int8).
+#: Bytes per cell besides its state's rows: position (2 float64), age (float64), mode (int8).
 BYTES_BESIDE = 2 * 8 + 8 + 1
-#: Bytes a cell of a recorded session takes while the metrics are computed, however many rows there are; and
-#: those a cell that takes part takes in a control period, and for its rows that wait (measured: about three
-#: times what they are, `CHUNK` rows of 25 bytes).
+#: Bytes per cell of a recorded session while the metrics are computed, for any number of rows; per active
+#: cell in a control period; and for its rows that wait to be written (measured: about three times their
+#: size, `CHUNK` rows of 25 bytes).
 BYTES_JUDGED, BYTES_BUSY, BYTES_WAITING = 100, 850, 3 * 25 * CHUNK
-#: Bytes of memory assumed where the system does not tell.
+#: Bytes of memory that are assumed if the system does not tell.
 ASSUMED_MEMORY = 8 * 2**30
 
 
@@ -28,13 +28,13 @@ def count_busy_cells(scene: Scene) -> int:
 
 
 def check_memory(scene: Scene, rows: Rows) -> None:
-    """Refuse a session beyond the memory, before it starts; ParameterError names the remedy."""
+    """Refuse a session that memory cannot hold, before it starts; ParameterError names the remedy."""
     busy = count_busy_cells(scene)
     refuse_what_cannot_fit(scene.recorder, rows, scene.cells, scene.periods, measure_available_memory(), busy)
 
 
 def count_bytes_needed(recorder: Recorder | None, rows: Rows, cells: int, periods: int, busy: int = 0) -> int:
-    """Return about how much memory a session takes, with so many busy cells at once."""
+    """Return the approximate memory of a session, bytes, with at most `busy` active cells."""
     each_cell = 8 * rows.count + BYTES_BESIDE
     at_work = BYTES_BUSY
     if recorder is not None:
@@ -44,12 +44,10 @@ def count_bytes_needed(recorder: Recorder | None, rows: Rows, cells: int, period
 
 
 def measure_available_memory() -> int:
-    """Return how many bytes this machine can still give."""
+    """Return the bytes of memory that are available on this machine."""
     linux = Path("/proc/meminfo")
-    answer = (
-        re.search(r"MemAvailable:\s+(\d+) kB", linux.read_text(encoding="ascii")) if linux.exists() else None
-    )
-    if answer:
+    text = linux.read_text(encoding="ascii") if linux.exists() else ""
+    if answer := re.search(r"MemAvailable:\s+(\d+) kB", text):
         return int(answer[1]) * 1024
     try:
         return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
@@ -60,7 +58,7 @@ def measure_available_memory() -> int:
 def refuse_what_cannot_fit(
     recorder: Recorder | None, rows: Rows, cells: int, periods: int, available: int, busy: int = 0
 ) -> None:
-    """Refuse a session that the available bytes cannot hold; the ParameterError says what to change."""
+    """Refuse a session that the available bytes cannot hold; ParameterError names the remedy."""
     needed = count_bytes_needed(recorder, rows, cells, periods, busy)
     if needed <= available:
         return

@@ -15,7 +15,7 @@ from ..model.touch import MOST_FORCE, MOST_INDENTATION, find_indentations, is_be
 
 #: Most pins whose heights are traced.
 PICKED = 6
-#: How much is kept, s, and in how many rows at most.
+#: Duration of a trace, s, and its most rows.
 SPAN, ROWS = 10.0, 1000
 
 
@@ -24,12 +24,12 @@ class RecentTrace:
     """Ring buffer of rows: a new row replaces the oldest."""
 
     every: int
-    """Control periods a row."""
+    """Control periods per row."""
     pins: tuple[int, ...]
     """The picked pins, at most `PICKED`."""
     rows: Floats
-    """(k, 3 + PICKED + f): Time, s; total force, N; set point, N, or NaN where there is none; heights of the
-    picked pins, m, NaN for those that are not there; of several fingers the forces, N. Oldest first."""
+    """(k, 3 + PICKED + f): Time, s; total force, N; set point, N, or NaN; heights of the picked pins, m, NaN
+    for the rest; the forces of several fingers, N. Oldest first."""
 
     @property
     def time(self) -> Floats:
@@ -58,22 +58,22 @@ class RecentTrace:
 
 
 def start(period: float, pins: Sequence[int] = (), fingers: int = 1) -> RecentTrace:
-    """Return an empty trace for a control period, s. `period`, s; `pins`: whose heights are kept."""
+    """Return an empty trace; `period`: control period, s; `pins`: whose heights are traced."""
     rows = np.empty((0, 3 + PICKED + (fingers if fingers > 1 else 0)))
     return RecentTrace(max(1, math.ceil(SPAN / period / ROWS)), tuple(pins[:PICKED]), rows)
 
 
 def pick(trace: RecentTrace, pins: Sequence[int], count: int) -> RecentTrace:
-    """Return a trace that follows other pins; those a bed of `count` cells does not have are left out."""
-    kept = tuple(pin for pin in pins if 0 <= pin < count)[:PICKED]
-    if kept == trace.pins:
+    """Return a trace of other pins, without those that a bed of `count` cells lacks."""
+    picked = tuple(pin for pin in pins if 0 <= pin < count)[:PICKED]
+    if picked == trace.pins:
         return trace
     rows = trace.rows.copy()
     rows[:, 3 : 3 + PICKED] = np.nan
-    for column, pin in enumerate(kept):
-        if pin in trace.pins:  # its past stays to be seen
+    for column, pin in enumerate(picked):
+        if pin in trace.pins:
             rows[:, 3 + column] = trace.rows[:, 3 + trace.pins.index(pin)]
-    return replace(trace, pins=kept, rows=rows)
+    return replace(trace, pins=picked, rows=rows)
 
 
 def measure_total_force(system: System, state: State) -> float:
@@ -83,9 +83,9 @@ def measure_total_force(system: System, state: State) -> float:
 
 
 def exceeds_law(system: System, state: State, pose: Floats) -> bool:
-    """Return whether the contact law does not hold, `touch.is_beyond`, of the fingertip at a pose (7,).
+    """Return whether a fingertip at a pose (7,) exceeds the range of the contact law, `touch.is_beyond`.
 
-    Of several the forces alone are judged, not how deep they are.
+    Of several fingertips only the forces are tested, not the indentations.
     """
     if system.cell.touch is None:
         return False
@@ -95,7 +95,7 @@ def exceeds_law(system: System, state: State, pose: Floats) -> bool:
     force, felt = near.force.sum(), near.force > 0.0
     if force > MOST_FORCE:
         return True
-    # Two bounds that cost little: the fingertip is above its lowest point, and within a ball that touches it.
+    # Two cheap bounds: the fingertip is above its lowest point, and within a ball that touches it there.
     depth = near.height[felt] - pose[2]
     if depth.max(initial=0.0) > MOST_INDENTATION:
         aside = near.quadratic_basis[1:3, felt].T - pose[:2]
@@ -108,7 +108,7 @@ def exceeds_law(system: System, state: State, pose: Floats) -> bool:
 
 
 def sample(system: System, state: State, set_point: SetPoint | None, pins: Sequence[int]) -> list[float]:
-    """Return what a trace keeps of a state. `pins`: whose heights are kept."""
+    """Return a row of a trace for a state; `pins`: whose heights are traced."""
     active = state.active
     heights = [math.nan] * PICKED
     for column, pin in enumerate(pins):
@@ -120,7 +120,7 @@ def sample(system: System, state: State, set_point: SetPoint | None, pins: Seque
 
 
 def extend(trace: RecentTrace, rows: list[list[float]]) -> RecentTrace:
-    """Return the trace with rows of `sample` added; time may have gone back in between."""
+    """Return the trace with rows of `sample` added; time may have gone back before them."""
     if not rows:
         return trace
     new = np.array(rows)

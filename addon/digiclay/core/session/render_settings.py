@@ -14,10 +14,10 @@ from ..base.errors import OutputError, ParameterError
 from ..base.quantity import Parameters, quantity
 from ..files.formats import is_whole_picture
 
-#: What draws, and what colors the pins.
+#: Render engines, and quantities that color the pins.
 ENGINES = ("cycles", "workbench")
 COLORS = ("mode", "force")
-#: More frames than this are a slip of the keyboard: an hour of film is 90 000.
+#: Most frames: more are a typing error, as an hour of film has 90 000.
 MOST_FRAMES = 100_000
 
 
@@ -47,7 +47,7 @@ class Moving(Picture):
     rate: int = quantity(25, "frames shown in a second", at_least=1, at_most=240)
 
     def check(self) -> None:
-        """H.264 keeps colors for blocks of 2 x 2 pixels."""
+        """Refuse odd sizes: H.264 stores colors for blocks of 2 x 2 pixels."""
         for side in ("width", "height"):
             if getattr(self, side) % 2:
                 rule = "must be an even number of pixels, as H.264 wants it"
@@ -63,11 +63,11 @@ class Turntable(Moving):
     fingertip: bool = quantity(False, "whether the fingertip is shown")
 
     def count(self, time: Sequence[float] | Floats) -> int:
-        """Return the number of frames, whatever the times of the history are."""
+        """Return the number of frames, for any times of a history."""
         return self.frames
 
     def angles(self) -> Floats:
-        """Return the turn of the bed in each frame, rad; the frame after the last would be the first."""
+        """Return the rotation of the bed in each frame, rad; the one after the last would be the first."""
         return np.arange(self.frames) * (2.0 * np.pi / self.frames)
 
 
@@ -94,13 +94,12 @@ class Film(Moving):
         if not first <= self.start <= stop:
             rule = f"must be between {first:g} s and {stop:g} s, where the film stops"
             raise ParameterError("Film", "start", rule, f"{self.start:g} s")
-        # Half a frame that remains makes one more, so that the end is seen.
+        # A remainder of half a frame or more gets one more, so that the end is shown.
         count = int((stop - self.start) * self.rate / self.speed + 0.5) + 1
         if count > MOST_FRAMES:
             rule = f"must be so high that there are at most {MOST_FRAMES} frames"
             raise ParameterError("Film", "speed", rule, f"{self.speed:g}: {count} frames")
-        moments: Floats = np.minimum(self.start + np.arange(count) * (self.speed / self.rate), stop)
-        return moments
+        return np.asarray(np.minimum(self.start + np.arange(count) * (self.speed / self.rate), stop))
 
     def rows(self, time: Sequence[float] | Floats) -> NDArray[np.intp]:
         """Return the recorded row nearest to each frame; the parameters are those of `moments`."""
@@ -117,12 +116,12 @@ def name_frame(folder: Path, frame: int) -> Path:
 
 
 def list_missing(folder: Path, frames: Sequence[int]) -> list[int]:
-    """Return the frames, numbered from 0, of which a folder has no whole picture."""
-    return [frame for frame in frames if not _is_there(name_frame(folder, frame))]
+    """Return the frames, numbered from 0, of which a folder has no complete picture."""
+    return [frame for frame in frames if not _is_complete(name_frame(folder, frame))]
 
 
-def _is_there(path: Path) -> bool:
-    """Return whether a picture is there to its end; copies break off half way."""
+def _is_complete(path: Path) -> bool:
+    """Return whether a picture exists and has its end: copies may be incomplete."""
     try:
         with path.open("rb") as file:
             file.seek(-8, os.SEEK_END)
@@ -133,10 +132,10 @@ def _is_there(path: Path) -> bool:
 
 def read_range(text: str, count: int) -> range:
     """Return the frames, of `count`, that a text names: ``0-24``, ``7``, or ``50+25``, 25 from 50 on."""
-    read = re.fullmatch(r"(\d{1,9})(?:([-+])(\d{1,9}))?", text.strip(), re.ASCII)
-    if not read:
+    match = re.fullmatch(r"(\d{1,9})(?:([-+])(\d{1,9}))?", text.strip(), re.ASCII)
+    if not match:
         raise OutputError(f"--frames must be a range such as 0-24, or 50+25 (got {text!r}).")
-    first, sign, other = int(read[1]), read[2], int(read[3] or 0)
+    first, sign, other = int(match[1]), match[2], int(match[3] or 0)
     end = {None: first + 1, "-": other + 1, "+": min(first + other, count)}[sign]
     if not first < end <= count:
         raise OutputError(f"--frames must be within 0-{count - 1}, first frame first (got {text}).")

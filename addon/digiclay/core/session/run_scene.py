@@ -45,11 +45,11 @@ class Result:
     history: History
     """The arrays of ``history.npz``; empty without a recorder."""
     periods: int
-    """Control periods done."""
+    """Simulated control periods."""
     run_time: float
-    """Time the simulation took, s; neither building nor writing is in it."""
+    """Wall time of the simulation, s, without building and writing."""
     metrics: dict[str, Any]
-    """What ``metrics.json`` holds; SI units."""
+    """Content of ``metrics.json``, in SI units."""
 
     @property
     def figures(self) -> dict[str, float | None]:
@@ -64,13 +64,9 @@ class Result:
     def summary(self) -> str:
         """Return the session in one line."""
         rfd, share = self.metrics.get("rfd"), self.metrics.get("contact_share")
-        felt = (
-            f", RFD {rfd:.2g} N{self._name_worst()}"
-            if rfd is not None
-            else ", no contact"
-            if share == 0.0
-            else ""
-        )
+        felt = ", no contact" if share == 0.0 else ""
+        if rfd is not None:
+            felt = f", RFD {rfd:.2g} N{self._name_worst()}"
         if self.metrics.get("rfd_jnd_least") is not None:
             felt += f" ({self.metrics['rfd_jnd_least']:.2g} to {self.metrics['rfd_jnd_most']:.2g} JND)"
         felt += f", {lost}" if (lost := describe_losses(self.metrics)) else ""
@@ -80,8 +76,8 @@ class Result:
         return f"{describe_time(self.metrics)}{felt}, {describe_errors(self.metrics)}{end}{warning}"
 
     def _name_worst(self) -> str:
-        """Return which finger has the largest RFD, where there are several."""
-        each = [one["rfd"] or 0.0 for one in self.metrics.get("fingers", ())]
+        """Return which of several fingers has the largest RFD."""
+        each = [finger["rfd"] or 0.0 for finger in self.metrics.get("fingers", ())]
         return f" at finger {1 + each.index(max(each))} of {len(each)}" if each else ""
 
     def with_errors(self, errors: Errors) -> Result:
@@ -92,7 +88,7 @@ class Result:
         return replace(self, metrics={**self.metrics, **added, **doubt, "units": units})
 
     def without_errors(self, why: str) -> Result:
-        """Return the result with the reason for which its errors are not estimated."""
+        """Return the result with the reason why its errors are not estimated."""
         return replace(self, metrics={**self.metrics, "errors_absent": why})
 
     def estimate_errors(
@@ -100,7 +96,7 @@ class Result:
         progress: Callable[[int, int], None] | None = None,
         stopped: Callable[[], bool] | None = None,
     ) -> Result | None:
-        """Return the result with its errors, or the reason for which there are none; None when `stopped`."""
+        """Return the result with its errors, or the reason why it has none; None when `stopped`."""
         if absent := "the session was stopped" if self.incomplete else explain_absence(self.scene):
             return self.without_errors(absent)
         errors = estimate_errors(self.scene, self.history, progress=progress, stopped=stopped)
@@ -108,7 +104,7 @@ class Result:
 
 
 class Ended(NamedTuple):
-    """End of a session: control periods done, time they took, s, losses where the controller counts them."""
+    """End of a session: control periods, their wall time, s, and losses if the controller counts them."""
 
     periods: int
     run_time: float
@@ -147,11 +143,11 @@ def evaluate(
         "position": system.grid.positions,
     }
     each, depths, felt = [], [], []
-    for finger, own in zip(scene.fingers, split_fingers(history), strict=True):
-        each.append(compute_metrics(own, scene.set_point))
-        felt.append((own["total_force"], own["fingertip"][:, 2]))
+    for finger, of_finger in zip(scene.fingers, split_fingers(history), strict=True):
+        each.append(compute_metrics(of_finger, scene.set_point))
+        felt.append((of_finger["total_force"], of_finger["fingertip"][:, 2]))
         if system.cell.touch is not None and finger.fingertip:
-            depths.append(find_indentations(finger.fingertip, own))
+            depths.append(find_indentations(finger.fingertip, of_finger))
     metrics: dict[str, Any] = take_worst(each)
     if system.fingers > 1:
         metrics["fingers"] = each
@@ -169,10 +165,10 @@ def evaluate(
 def report(
     scene: Scene,
     ended: Ended,
-    found: Mapping[str, Any],
+    figures: Mapping[str, Any],
     versions: Mapping[str, str] = MappingProxyType({}),
 ) -> Result:
-    """Return the result of an ended session without its history, but with metrics found in it."""
+    """Return the result of an ended session without its history, but with figures of it."""
     simulated = ended.periods * scene.simulation.control_period
     metrics: dict[str, Any] = {
         "scene": scene.name,
@@ -191,7 +187,7 @@ def report(
             "python": platform.python_version(),
             "system": platform.system(),
         },
-        **found,
+        **figures,
     }
     units = {**METRICS, **RUN}
     metrics["units"] = {name: units[name].unit for name in metrics if name in units}
@@ -215,10 +211,9 @@ def run(
 ) -> Result:
     """Run a scene from rest to its end.
 
-    `progress`: called after each control period with how many are done, and of how many; `stopped`: called
-    then too; when it returns True, the result is what there is so far; `versions`: what else to note as
-    versions the run was made with. Raises ParameterError when the session cannot fit in memory. Raises
-    DivergenceError when the integration leaves the finite numbers.
+    `progress`: called after each control period with the number done and the number of all; `stopped`: called
+    then too; when it returns True, the result is that so far; `versions`: further versions to note. Raises
+    ParameterError when the session does not fit in memory, DivergenceError when the integration diverges.
     """
     system = assemble(scene)
     check_memory(scene, system.rows)

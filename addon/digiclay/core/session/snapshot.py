@@ -1,8 +1,8 @@
 """Snapshot of a state as bytes, restored bit for bit.
 
-A short header in JSON says what follows; then come the arrays, little-endian. The
-controller's memory is written by its structure and rebuilt after the memory a session of the
-same controller begins with: nothing that is read can name a class or run code.
+A short header in JSON describes what follows: the arrays, little-endian. The controller's
+memory is written by its structure, and rebuilt like the memory with which a session of the
+same controller begins: no content can name a class or run code.
 """
 
 import json
@@ -25,12 +25,12 @@ from ..engine.system import System
 from ..files.formats import read_count
 from ..model.layout import Disc, join_discs
 
-#: No number a controller remembers is larger, but those that may be infinite.
+#: Largest number of a controller's memory, except those that begin infinite.
 LARGEST_KEPT = 1e75
 
 
 def flatten(memory: Any, arrays: list[NDArray[Any]]) -> Any:
-    """Return a memory as JSON: named tuples as lists led by their names, arrays as places in `arrays`."""
+    """Return a memory as JSON: named tuples as lists that begin with their names, arrays as indices."""
     if isinstance(memory, np.ndarray):
         arrays.append(np.ascontiguousarray(memory, memory.dtype.newbyteorder("<")))
         return {"array": len(arrays) - 1}
@@ -38,69 +38,69 @@ def flatten(memory: Any, arrays: list[NDArray[Any]]) -> Any:
         return [type(memory).__name__, *(flatten(item, arrays) for item in memory)]
     if isinstance(memory, Enum):
         return memory.value
-    # Numbers of numpy become Python's own, which JSON writes so that they read back as the same ones.
+    # Numbers of numpy become Python's own, which JSON restores exactly.
     return memory.item() if isinstance(memory, np.generic) else memory
 
 
-def rebuild(template: Any, kept: Any, arrays: list[NDArray[Any]]) -> Any:
+def rebuild(template: Any, stored: Any, arrays: list[NDArray[Any]]) -> Any:
     """Return a flattened memory in the types of a `template` of the same controller, or raise StateError."""
     try:
-        return _rebuild_like(template, kept, arrays)
+        return _rebuild_like(template, stored, arrays)
     except (ValueError, TypeError, KeyError, IndexError, OverflowError):
         raise StateError(
             f"The kept state's memory of the controller must be a {type(template).__name__} "
-            f"(got {str(kept)[:60]}). Reset the session to begin with a bed at rest."
+            f"(got {str(stored)[:60]}). Reset the session to begin with a bed at rest."
         ) from None
 
 
-def _rebuild_like(template: Any, kept: Any, arrays: list[NDArray[Any]]) -> Any:
-    """Return `kept` in the types of the template; any error means another structure."""
+def _rebuild_like(template: Any, stored: Any, arrays: list[NDArray[Any]]) -> Any:
+    """Return a stored memory in the types of the template; any error means another structure."""
     kind = type(template)
     if isinstance(template, np.ndarray):
-        array = arrays[kept["array"]]
+        array = arrays[stored["array"]]
         if array.ndim != template.ndim or array.dtype.kind != template.dtype.kind:
             raise ValueError("another array")
         return array.astype(template.dtype)
     if isinstance(template, tuple):
-        name, *items = kept
+        name, *items = stored
         if name != kind.__name__:
             raise ValueError("another named tuple")
         like = [_rebuild_like(part, item, arrays) for part, item in zip(template, items, strict=True)]
         return kind(*like) if hasattr(kind, "_fields") else kind(like)
     if template is None:
-        if kept is not None:
+        if stored is not None:
             raise ValueError("something instead of nothing")
         return None
     if not isinstance(template, Enum):
-        _check_number(template, kept)
-    return kind(kept)
+        _check_number(template, stored)
+    return kind(stored)
 
 
-def _check_number(template: Any, kept: Any) -> None:
-    """Refuse what is no number a controller comes to: infinite only what begins so, counts whole."""
-    if not isinstance(kept, (bool, int, float)) or math.isnan(kept):
+def _check_number(template: Any, number: Any) -> None:
+    """Refuse a number that no controller reaches: counts are whole, only what begins infinite may be so."""
+    if not isinstance(number, (bool, int, float)) or math.isnan(number):
         raise ValueError("no number")
     if isinstance(template, int) and not isinstance(template, bool):
-        if not 0 <= kept <= 2**53:
+        if not 0 <= number <= 2**53:
             raise ValueError("no count")
-    elif abs(kept) > LARGEST_KEPT and kept != template:
+    elif abs(number) > LARGEST_KEPT and number != template:
         raise ValueError("a number that is too large")
 
 
-#: First bytes of a snapshot; the number changes with their arrangement. In the first version the entry of the
-#: fingertip stood by itself.
+#: First bytes of a snapshot, with the version of its format. The first version had one fingertip, not in a
+#: list.
 START, FIRST = b"digiclay state 2\n", b"digiclay state 1\n"
 #: Types of the arrays, by their names in `State` and `ActiveSet`.
 ARRAYS = {"rows": "<f8", "modes": "i1", "aged": "<f8", "cells": "<i8", "block": "<f8", "mode": "i1"}
-#: Those of which, with several fingers, only what is not 0 is written: most cells are pressed by one at most.
+#: Arrays of which, with several fingers, only values other than 0 are written: at most one finger presses
+#: most cells.
 THIN = ("rows", "block")
-#: How far rounding may take a height, m, or an opening beyond its ends.
+#: Tolerance of rounding beyond the ends of a height, m, or an opening.
 SLACK = 1e-6
-#: No number of a state is as large: a session ends when the square of one is no longer finite.
+#: Largest number of a state: a session ends when the square of one is no longer finite.
 LARGEST = 1e154
-#: No disc a session works in reaches as far, m.
+#: Largest coordinate or radius of a disc, m.
 FARTHEST = 1e9
-#: What can be done about bytes that cannot be used.
 REMEDY = "Reset the session to begin with a bed at rest."
 
 
@@ -114,18 +114,18 @@ class Snapshot:
 
 
 def dump(system: System, state: State) -> bytes:
-    """Return a state as bytes, which do not change as the session continues."""
+    """Return a state as bytes, which stay as they are when the session continues."""
     active, rows = state.active, system.rows
     arrays: list[NDArray[Any]] = []
     memory = flatten(state.memory, arrays)
     values = state.rows, state.modes, state.aged, active.cells, active.block, active.mode
     body = [np.ascontiguousarray(array, kind) for array, kind in zip(values, ARRAYS.values(), strict=True)]
     thin = []
-    for place, name in enumerate(ARRAYS):
+    for number, name in enumerate(ARRAYS):
         if name in THIN and system.fingers > 1:
-            filled = body[place].view("<i8").reshape(-1) != 0  # a negative 0 is none
-            body[place] = body[place].reshape(-1)[filled]
-            thin.append(body[place].size)
+            filled = body[number].view("<i8").reshape(-1) != 0  # by their bits, as -0.0 is to be restored
+            body[number] = body[number].reshape(-1)[filled]
+            thin.append(body[number].size)
             arrays.append(np.packbits(filled))
     header = {
         "cells": system.grid.count,
@@ -146,23 +146,23 @@ def dump(system: System, state: State) -> bytes:
         "arrays": [[array.dtype.str, list(array.shape)] for array in arrays],
     }
     text = json.dumps(header).encode()
-    # One copy: the arrays are joined as they stand.
+    # The arrays are joined without another copy.
     parts = (array.data for array in (*body, *arrays))
     return b"".join([START, len(text).to_bytes(4, "little"), text, *parts])
 
 
 def load(system: System, data: bytes) -> State:
-    """Return the state that bytes hold, bit for bit; StateError when they are damaged or of another bed."""
-    kept = _read(data)
-    header, arrays, rows = kept.header, kept.arrays, system.rows
-    here = _list_rows(rows)
+    """Return the state in bytes, bit for bit; StateError if they are damaged or of another bed."""
+    stored = _read(data)
+    header, arrays, rows = stored.header, stored.arrays, system.rows
     _check_same("number of cells", header["cells"], system.grid.count)
-    _check_same("rows of a cell", header["rows"], here)
+    _check_same("rows of a cell", header["rows"], _list_rows(rows))
     _check_same("control period", header["control_period"], system.period)
     _check_same("number of fingers", len(header["gathered"]["fingers"]), system.fingers)
-    _check_limits(system, kept)
+    _check_limits(system, stored)
     gathered = header["gathered"]
-    reaches, controls = _read_discs(gathered)
+    discs = _read_discs(gathered)
+    reach, control = (each[0] if system.fingers == 1 else join_discs(each) for each in discs)
     cells = arrays["cells"].astype(np.intp)
     active = ActiveSet(
         rows,
@@ -171,27 +171,27 @@ def load(system: System, data: bytes) -> State:
         arrays["block"],
         arrays["mode"],
         system.grid.compute_basis(cells),
-        reaches[0] if system.fingers == 1 else join_discs(reaches),
-        controls[0] if system.fingers == 1 else join_discs(controls),
+        reach,
+        control,
         gathered["peak"],
         gathered["until"],
     )
-    memory = rebuild(system.controller.begin(), header["memory"], kept.memory)
+    memory = rebuild(system.controller.begin(), header["memory"], stored.memory)
     bed = arrays["rows"], arrays["modes"], arrays["aged"]
     return State(header["period"], *bed, header["peak"], active, memory)
 
 
 def count_fingers(data: bytes) -> int:
-    """Return the number of fingers of a kept state; StateError when it is damaged."""
+    """Return the number of fingers of a stored state; StateError if it is damaged."""
     return len(_read(data).header["gathered"]["fingers"])
 
 
 def transfer_heights(system: System, data: bytes) -> State:
-    """Return a session's beginning with the heights of a kept state: what is left when parts have changed."""
-    kept = _read(data)
-    _check_same("number of cells", kept.header["cells"], system.grid.count)
-    height = kept.arrays["rows"][0].copy()
-    height[kept.arrays["cells"]] = kept.arrays["block"][0]
+    """Return the first state of a session, with the heights of a stored state whose parts were others."""
+    stored = _read(data)
+    _check_same("number of cells", stored.header["cells"], system.grid.count)
+    height = stored.arrays["rows"][0].copy()
+    height[stored.arrays["cells"]] = stored.arrays["block"][0]
     actuator, state = system.cell.actuator, begin(system)
     height = np.clip(height, 0.0, actuator.stroke)
     state.rows[0] = state.rows[system.rows.target] = height
@@ -199,11 +199,11 @@ def transfer_heights(system: System, data: bytes) -> State:
     return state._replace(peak=float(height.max()))
 
 
-def _check_limits(system: System, kept: Snapshot) -> None:
-    """Refuse pins beyond their end stops, and valves opened wider than all the way."""
+def _check_limits(system: System, stored: Snapshot) -> None:
+    """Refuse pins beyond their end stops, and openings of valves above 1."""
     rows, top = system.rows, system.cell.actuator.stroke + SLACK
     for name in ("rows", "block"):
-        values = kept.arrays[name]
+        values = stored.arrays[name]
         height, valves = values[0], (values[system.cell.lag_rows], values[rows.commands])
         wide = any((np.abs(opening) > 1.0 + SLACK).any() for opening in valves)
         wide |= (np.abs(values[rows.controlled]) > LARGEST_KEPT).any()
@@ -212,7 +212,7 @@ def _check_limits(system: System, kept: Snapshot) -> None:
 
 
 def _read(data: bytes) -> Snapshot:
-    """Read bytes without regard to any system; their arrays are new ones."""
+    """Read bytes into new arrays, for any system."""
     if not isinstance(data, bytes) or not data.startswith((START, FIRST)):
         raise _make_error("does not begin as one")
     try:
@@ -236,20 +236,20 @@ def _read(data: bytes) -> Snapshot:
         numbers = [header["peak"], gathered["peak"], header["control_period"]]
         numbers += [read_count(value) for value in (header["period"], gathered["until"], gathered["near"])]
         numbers += [number for discs in _read_discs(gathered) for disc in discs for number in disc or ()]
-        kept = Snapshot(header, dict(zip(ARRAYS, arrays, strict=False)), arrays[len(ARRAYS) :])
-        for name, bits in zip(thin, kept.memory[len(kept.memory) - len(thin) :], strict=True):
-            kept.arrays[name] = _fill(kept.arrays[name], bits, whole[name])
-        # A memory of nothing is None; one that is not there at all is damage.
+        stored = Snapshot(header, dict(zip(ARRAYS, arrays, strict=False)), arrays[len(ARRAYS) :])
+        for name, bits in zip(thin, stored.memory[len(stored.memory) - len(thin) :], strict=True):
+            stored.arrays[name] = _fill(stored.arrays[name], bits, whole[name])
+        # An empty memory is None; a missing one is damage.
         sound = "memory" in header and gathered["near"] <= taken and all(map(math.isfinite, numbers))
     except (ValueError, KeyError, TypeError, IndexError, OverflowError, RecursionError) as error:
         raise _make_error(f"is damaged: {type(error).__name__}") from None
-    if not sound or not _is_sound(kept, cells):
+    if not sound or not _is_sound(stored, cells):
         raise _make_error("holds numbers that no state has")
-    return kept
+    return stored
 
 
 def _fill(values: NDArray[Any], bits: NDArray[Any], shape: tuple[int, ...]) -> Floats:
-    """Return an array of values (k,) where the packed bits are 1, and else of zeros."""
+    """Return an array with the values (k,) where the packed bits are 1, and 0 elsewhere."""
     count = math.prod(shape)
     if bits.shape != (-(-count // 8),):
         raise ValueError("another number of bits")
@@ -261,7 +261,7 @@ def _fill(values: NDArray[Any], bits: NDArray[Any], shape: tuple[int, ...]) -> F
 def _read_arrays(
     data: bytes, at: int, shapes: list[tuple[str, tuple[int, ...]]]
 ) -> tuple[list[NDArray[Any]], int]:
-    """Return copies of the arrays that stand in `data` from a place on, and where they end."""
+    """Return copies of the arrays in `data` from byte `at` on, and the byte after them."""
     arrays = []
     for name, shape in shapes:
         kind, count = np.dtype(name), math.prod(shape)
@@ -272,9 +272,9 @@ def _read_arrays(
     return arrays, at
 
 
-def _is_sound(kept: Snapshot, count: int) -> bool:
-    """Return whether the arrays hold what those of a state can hold."""
-    arrays = kept.arrays
+def _is_sound(stored: Snapshot, count: int) -> bool:
+    """Return whether the values of the arrays are those of a state."""
+    arrays = stored.arrays
     cells = arrays["cells"]
     return bool(
         all((np.abs(arrays[name]) < LARGEST).all() for name in ("rows", "aged", "block"))
@@ -285,20 +285,20 @@ def _is_sound(kept: Snapshot, count: int) -> bool:
 
 
 def _list_rows(rows: Rows) -> list[int]:
-    """Return the numbers of rows; those of forces of several fingers where there are any."""
-    own = [rows.physics, rows.queue, rows.control, rows.sensors, rows.fingers]
-    return own if rows.fingers else own[:-1]
+    """Return the numbers of rows, with those of the forces of several fingers if there are any."""
+    numbers = [rows.physics, rows.queue, rows.control, rows.sensors, rows.fingers]
+    return numbers if rows.fingers else numbers[:-1]
 
 
 def _list_discs(discs: Any, fingers: int) -> list[Any]:
-    """Return the disc of one finger, or those of several out of arrays (f,); None: no disc."""
+    """Return the disc of one finger, or those of several from arrays (f,); None: no disc."""
     if fingers == 1 or discs is None:
         return [discs] * fingers
     return [None if disc[2] < 0.0 else disc for disc in np.transpose(discs).tolist()]
 
 
 def _read_discs(gathered: dict[str, Any]) -> tuple[list[Disc | None], list[Disc | None]]:
-    """Return the discs that the fingers may touch, and those that are controlled."""
+    """Return the discs that the fingers may touch, and the controlled discs."""
     fingers = gathered["fingers"]
     controls = gathered["control"] if len(fingers) > 1 else [gathered["control"]]
     return [_read_disc(finger["reach"]) for finger in fingers], [_read_disc(disc) for disc in controls]
@@ -322,11 +322,13 @@ def change_fingers(former: System, system: System, state: State, kept: Sequence[
     # Behind the display of a shape stands the memory of the method.
     after, before = (getattr(memory, "method", memory) for memory in (fresh.memory, state.memory))
     if isinstance(after, Hands) or isinstance(before, Hands):
-        begun, had = (list(own.fingers) if isinstance(own, Hands) else [own] for own in (after, before))
-        # A controller that remembers other rows of a cell begins anew.
+        begun, had = (
+            list(memory.fingers) if isinstance(memory, Hands) else [memory] for memory in (after, before)
+        )
+        # A controller with other rows per cell begins anew.
         if new.control * former.fingers == old.control * system.fingers:
             _take_fingers(rows[new.controlled], state.rows[old.controlled], former.fingers, kept)
-            begun = [one if was is None else had[was] for one, was in zip(begun, kept, strict=True)]
+            begun = [new if was is None else had[was] for new, was in zip(begun, kept, strict=True)]
         before = after._replace(fingers=tuple(begun)) if isinstance(after, Hands) else begun[0]
     else:
         rows[new.controlled] = state.rows[old.controlled]
@@ -339,16 +341,16 @@ def change_fingers(former: System, system: System, state: State, kept: Sequence[
 
 
 def _take_fingers(into: Floats, of: Floats, former: int, kept: Sequence[int | None]) -> None:
-    """Put rows (r, n) of former fingers into those of fingers, in place; some may come or go at the end."""
-    parts, own = np.split(into, len(kept)), np.split(of, former)
+    """Copy rows (r, n) of former fingers to those of fingers, in place; either may have more at the end."""
+    parts, sources = np.split(into, len(kept)), np.split(of, former)
     for part, was in zip(parts, kept, strict=True):
         if was is not None:
-            least = min(len(part), len(own[was]))
-            part[:least] = own[was][:least]
+            least = min(len(part), len(sources[was]))
+            part[:least] = sources[was][:least]
 
 
 def _read_disc(values: Any) -> Disc | None:
-    """Return a part of the bed."""
+    """Return a disc of the bed; None: no disc."""
     if values is None:
         return None
     x, y, radius = (float(value) for value in values)
@@ -357,13 +359,13 @@ def _read_disc(values: Any) -> Disc | None:
     return x, y, radius
 
 
-def _check_same(what: str, kept: Any, here: Any) -> None:
+def _check_same(what: str, stored: Any, here: Any) -> None:
     """Refuse a state of another system."""
-    if kept != here:
-        rule = f"must have the same {what} as the bed now, {here} (got {kept})"
+    if stored != here:
+        rule = f"must have the same {what} as the bed now, {here} (got {stored})"
         raise StateError(f"The kept state {rule}. {REMEDY}")
 
 
 def _make_error(reason: str) -> StateError:
-    """Return the error of bytes that are no state."""
+    """Return the error of bytes that are not a state."""
     return StateError(f"The kept state {reason}, and cannot be taken up. {REMEDY}")

@@ -1,8 +1,8 @@
 """Take: initial state and fingers' paths of a session, replayed bit for bit.
 
-The path is a pose at the start and one at the end of every control period, between which the
-finger goes straight; that, the orders in each period, and the state at the start decide all
-that follows. The state at the end is kept as well, so that a replay can prove that it came to the same.
+The path is a pose at the start and one at the end of every control period, with straight motion
+between them; the path, the orders in each period, and the state at the start determine all
+states. The state at the end is stored too, so that a replay can be verified.
 """
 
 import io
@@ -30,17 +30,17 @@ from ..scene.toml_table import format_scene, resolve
 from . import snapshot
 from .live_session import AWAY, Recording, simulate_path
 
-#: Waypoints that lie this near to the straight way between their neighbors are left out, m and 1.
+#: Waypoints this close to the straight line between their neighbors are left out, m and 1.
 STRAIGHT = 1e-12
 #: The arrays of a take.
 PARTS = ("scene", "start", "poses", "end")
-#: What the number of a format's version stands for: 1, which is not written down, has poses (t + 1, 7) of one
-#: finger; 2 has (t + 1, f, 7); 3 has the array `SMOOTHING` besides, (t, 4), orders that smooth; 4 has orders
-#: (t, 5) and their surfaces (s, n) instead; 5 has more fingers than the scene. A take with neither is written
-#: as 2, which older versions read.
+#: Versions of the format: 1, which is not written down, has poses (t + 1, 7) of one finger; 2 has (t + 1,
+#: f, 7); 3 also has the array `SMOOTHING` (t, 4), orders that smooth; 4 has orders (t, 5) and their
+#: surfaces (s, n) instead; 5 has more fingers than the scene. A take with neither is written as 2, which
+#: older releases read.
 PLAIN, ORDERED, VERSION = 2, 4, 5
 SMOOTHING, ORDERS, SURFACES = "smoothing", "orders", "surfaces"
-#: Most parts a physics step is cut into when a take is simulated once more.
+#: Most parts of a physics step in a replay.
 MOST_PARTS = 64
 
 
@@ -49,7 +49,7 @@ class Take:
     """Stretch of a session.
 
     Raises ParameterError when there is no period, a pose is not finite, the scene has another number of
-    fingers, or the orders are none.
+    fingers, or the orders are invalid.
     """
 
     scene: Scene
@@ -57,12 +57,12 @@ class Take:
     start: bytes
     poses: Floats
     """(t + 1, f, 7): Fingers at the start, and at the end of each of t control periods: lowest point, m, and
-    unit quaternion. Behind those of the scene are those that strokes had for their images, like the first
-    one: they are there in the periods between two poses that are not AWAY."""
+    unit quaternion. After those of the scene follow the fingers of strokes' images, like the first one: they
+    are present in the periods between two poses that are not AWAY."""
     end: bytes
     """The states before and after, from `snapshot.dump`."""
     orders: Orders | None = None
-    """What brushes do beside the fingers, see `control.orders`; None: nothing in any period."""
+    """Orders of brushes, see `control.orders`; None: none in any period."""
 
     def __post_init__(self) -> None:
         fingers = len(self.scene.fingers)
@@ -94,34 +94,34 @@ class Take:
     @property
     def fingers(self) -> list[int]:
         """Number of fingers in each period."""
-        own = len(self.scene.fingers)
-        there = (self.poses[:, own:] != AWAY).any(axis=2)
-        counts: list[int] = (own + (there[1:] & there[:-1]).sum(axis=1)).tolist()
+        fingers = len(self.scene.fingers)
+        present = (self.poses[:, fingers:] != AWAY).any(axis=2)
+        counts: list[int] = (fingers + (present[1:] & present[:-1]).sum(axis=1)).tolist()
         return counts
 
     @property
     def duration(self) -> float:
-        """How long it lasts, s."""
+        """Duration, s."""
         return self.periods * self.scene.simulation.control_period
 
 
 def replay(take: Take, scene: Scene | None = None) -> Iterator[State]:
-    """Simulate a take once more, or as another scene integrates it; a state is valid until the next one."""
+    """Simulate a take again, or as another scene integrates it; a state is valid until the next one."""
     return (state for _, state in islice(play(take, scene), 1, None))
 
 
 def play(take: Take, scene: Scene | None = None) -> Iterator[tuple[System, State]]:
-    """Yield system and state of a take, as `replay` has it, at its start and after each period."""
-    made = scene or take.scene
+    """Yield system and state of a take, as `replay`, at its start and after each period."""
+    scene = scene or take.scene
 
     def change(system: System, state: State, count: int) -> tuple[System, State]:
         if count == system.fingers:
             return system, state
-        other, kept = assemble(made.with_fingers(count)), range(system.fingers)
-        places = [place if place in kept else None for place in range(count)]
-        return other, snapshot.change_fingers(system, other, state, places)
+        other = assemble(scene.with_fingers(count))
+        former = [finger if finger < system.fingers else None for finger in range(count)]
+        return other, snapshot.change_fingers(system, other, state, former)
 
-    system = assemble(made.with_fingers(snapshot.count_fingers(take.start)))
+    system = assemble(scene.with_fingers(snapshot.count_fingers(take.start)))
     state, first, end = snapshot.load(system, take.start), 0, take.end and snapshot.count_fingers(take.end)
     yield system, state
     for count, group in groupby(take.fingers):
@@ -134,14 +134,14 @@ def play(take: Take, scene: Scene | None = None) -> Iterator[tuple[System, State
 
 
 def refine(scene: Scene, parts: int) -> Scene:
-    """Return a scene whose physics steps are cut into 1 to 64 parts; control is sampled as before."""
+    """Return a scene with physics steps of 1 to 64 parts; control is sampled as before."""
     if not 1 <= parts <= MOST_PARTS:
         raise ParameterError("Take", "parts", f"must be from 1 to {MOST_PARTS}", str(parts))
     return replace(scene, simulation=scene.simulation.refined(parts))
 
 
 def to_scene(take: Take, name: str) -> Scene:
-    """Return a take from rest as a scene that `digiclay run` simulates; OutputError of any other take."""
+    """Return a take from rest as a scene that `digiclay run` simulates; OutputError for any other take."""
     if take.orders is not None:
         raise OutputError(
             f"The take {name!r} has strokes in which the valves drive pins by themselves, and a scene file "
@@ -176,7 +176,7 @@ def _make_path(times: Floats, poses: Floats) -> Path:
 
 
 def _is_at_rest(system: System, start: bytes) -> bool:
-    """Return whether a state is that of a bed nothing has happened to, however long it has waited."""
+    """Return whether a state is that of an untouched bed, however long it has been at rest."""
     state, rest = snapshot.load(system, start), begin(system)
     return (
         all(np.array_equal(state.row(index), rest.row(index)) for index in range(len(rest.rows)))
@@ -207,13 +207,11 @@ def from_bytes(data: bytes) -> Take:
     """Read what `to_bytes` wrote; OutputError when it is damaged."""
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
-            there = archive.namelist()
-            names = [
-                *PARTS,
-                *(name for name in ("version", SMOOTHING, ORDERS, SURFACES) if f"{name}.npy" in there),
-            ]
+            stored = archive.namelist()
+            optional = ("version", SMOOTHING, ORDERS, SURFACES)
+            names = [*PARTS, *(name for name in optional if f"{name}.npy" in stored)]
             heads = read_heads(archive, names)
-            # `to_bytes` does not compress: a take unpacks to no more than it is.
+            # `to_bytes` does not compress: a take unpacks to at most its own size.
             size = sum(head.size for head in heads.values())
             if size > len(data):
                 raise ValueError(f"it must unpack to at most its own {len(data):,} bytes (got {size:,})")
@@ -230,14 +228,14 @@ def from_bytes(data: bytes) -> Take:
 
 
 def _read_orders(parts: dict[str, NDArray[Any]]) -> Orders | None:
-    """Return the orders of a take's arrays, of which some version has none."""
+    """Return the orders in a take's arrays, which some versions lack."""
     if SMOOTHING in parts:
         return Orders(add_verbs(parts[SMOOTHING]))
     return Orders(parts[ORDERS], tuple(parts[SURFACES])) if ORDERS in parts else None
 
 
 def make_take(scene: Scene, recording: Recording, end: bytes) -> Take | None:
-    """Return what was recorded as a take, with the snapshot of its end; None without a control period."""
+    """Return a recording as a take, with the snapshot of its end; None without a control period."""
     if recording.count < 2:
         return None
     orders = recording.orders
