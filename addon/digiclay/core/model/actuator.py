@@ -4,7 +4,6 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..base.arrays import Floats
 from ..base.errors import ParameterError
@@ -23,19 +22,18 @@ class Supply(Parameters):
     )
 
     def check(self) -> None:
-        """The high reservoir must stand above the low one."""
+        """Refuse a high pressure that is not above the low one."""
         if not self.high > self.low:
-            raise ParameterError(
-                "Supply", "high", "must be above Supply.low", f"{self.high:g} Pa, low {self.low:g} Pa"
-            )
+            value = f"{self.high:g} Pa, low {self.low:g} Pa"
+            raise ParameterError("Supply", "high", "must be above Supply.low", value)
 
     @property
     def largest(self) -> float:
-        """Size of the larger of the two pressures, Pa."""
+        """Larger absolute value of the two pressures, Pa."""
         return max(abs(self.high), abs(self.low))
 
-    def pressure(self, opening: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the pressure at the far side of the valve, Pa, for openings K, shape (n,)."""
+    def pressure(self, opening: Floats) -> Floats:
+        """Return the pressure of the reservoir behind the valve, Pa, for openings K, (n,)."""
         return np.where(opening > 0.0, self.high, self.low)
 
 
@@ -52,7 +50,7 @@ class Actuator(Parameters):
     rest_height: float = quantity(40e-3, "initial height of all pins", unit="m", symbol="H_0", at_least=0.0)
 
     def check(self) -> None:
-        """The rest height lies between the end stops."""
+        """Refuse a rest height above the upper end stop."""
         if self.rest_height > self.stroke:
             rule = f"must be at most the stroke, {self.stroke:g} m"
             raise ParameterError("Actuator", "rest_height", rule, f"{self.rest_height:g} m")
@@ -67,7 +65,7 @@ class Actuator(Parameters):
         return force / self.area
 
     def rate(self, flow: Floats, height: Floats) -> Floats:
-        """Return dH/dt = q / A_a, m/s (equation 1), of flows q, m³/s, in; none goes into an end stop."""
+        """Return dH/dt = q / A_a, m/s (equation 1), of inflows q, m³/s; 0 into an end stop."""
         speed: Floats = flow / self.area
         if height.size and height.min() > 0.0 and height.max() < self.stroke:
             return speed

@@ -26,10 +26,10 @@ class Conduit(Parameters):
 
 @dataclass(frozen=True)
 class OrificeAndConduit(Flow):
-    """Valve and conduit in series: the drops add, the flow is one.
+    """Valve and conduit in series: the drops add, the flow is the same.
 
-    Each branch of the valve gives a line or a quadratic in Q, solved in closed form; the
-    smaller flow holds, as without a conduit.
+    Each branch of the valve gives a linear or quadratic equation in Q, solved in closed form;
+    the smaller flow holds, as without a conduit.
     """
 
     valve: Orifice
@@ -38,7 +38,7 @@ class OrificeAndConduit(Flow):
 
     @property
     def knee(self) -> float:
-        """Smallest drop at which some opening lets the flow turn turbulent, Pa."""
+        """Smallest drop at which the flow becomes turbulent at some opening, Pa."""
         return self.valve.knee
 
     def laminar_conductance(self, opening: Any, out: Floats | None = None) -> Any:

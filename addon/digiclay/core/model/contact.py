@@ -9,12 +9,12 @@ import numpy as np
 from ..base.arrays import Constants, Floats
 from ..base.quantity import Parameters, quantity, refuse_overrides
 
-#: Beyond this exponent the spring is stiffer than anything physical; the cut keeps even its square finite.
+#: Largest exponent, far beyond physical stiffness, so that the square of the force is finite.
 LARGEST_EXPONENT = 300.0
 
 
 class ExponentialLaw:
-    """Base of the contact laws ``T(x) = (b/m) (exp(m (x - x0)) - 1)``, whatever their parameters are."""
+    """Base of the contact laws ``T(x) = (b/m) (exp(m (x - x0)) - 1)``, of any parameters."""
 
     if TYPE_CHECKING:  # parameters or properties of each law
 
@@ -52,7 +52,7 @@ class ExponentialLaw:
 
     @cached_property
     def _numbers(self) -> Constants:
-        """What `tension` is made with: m, 1/m; m x0; the exponent's bounds; b/m, N."""
+        """Constants of `tension`: m, 1/m; m x0; the exponent's bounds; b/m, N."""
         m = self.exponent
         return Constants((m, m * self.offset, 0.0, LARGEST_EXPONENT, self.stiffness / m))
 

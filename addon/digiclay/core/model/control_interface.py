@@ -1,4 +1,4 @@
-"""Interface of the control methods: what is measured of cells, commanded to them and asked of the method."""
+"""Interface of the control methods: measurements of cells, their commands, and the controller."""
 
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol, TypeAlias
@@ -15,32 +15,32 @@ Memory: TypeAlias = Any
 
 
 class Measurement(NamedTuple):
-    """Measured quantities of some cells."""
+    """Measured quantities of cells."""
 
     quadratic_basis: Floats
-    """(6, m): Rows 1, x, y, x², x y, y² of where they are, m."""
+    """(6, m): Rows 1, x, y, x², x y, y² of their positions, m."""
     height: Floats
     force: Floats
     """(m,): As measured, m and N."""
     target: Floats
-    """(m,): Height they are commanded to, m."""
+    """(m,): Commanded heights, m."""
     mode: NDArray[np.int8]
     """(m,)."""
     own: Floats
-    """(rows, m): What the controller remembers of each cell; brought up to date in place. Of several fingers
-    all active cells', of which the m are the first."""
+    """(rows, m): The controller's state rows of each cell, updated in place. With several fingers of all
+    active cells, which begin with these m."""
     cells: NDArray[np.intp]
     """(m,): Their numbers in the bed."""
     command: Floats = NONE
-    """(m,): Valve command of the period before, 1."""
+    """(m,): Valve commands of the previous period, 1."""
     sensed: Floats = NONE
-    """(rows, m): What the sensors remember of each cell."""
+    """(rows, m): The sensors' state rows of each cell."""
     present: tuple[int, ...] = ()
-    """In a batch how many of the cells, the first, take part in each run; empty: all do."""
+    """In a batch, how many of the cells, from the first on, take part in each run; empty: all."""
     discs: Discs | None = None
-    """With several fingers x, y and radius, m, (f,) each, of the discs of their active cells."""
+    """With several fingers, x, y and radius, m, (f,) each, of the discs of their active cells."""
     pressing: Floats | None = None
-    """(f, m): Then also the force of each finger, N, which only names new fingers; see `pin_division`."""
+    """(f, m): With several fingers, the force of each, N, which only names new fingers; see `pin_division`."""
 
 
 class Commands(NamedTuple):
@@ -66,16 +66,16 @@ class Controller(Protocol):
 
     @property
     def rows(self) -> int:
-        """State rows a cell needs."""
+        """State rows per cell."""
 
     def begin(self) -> Memory:
         """Return the memory before a session."""
 
     def locate(self, memory: Memory, touched: Measurement) -> tuple[Memory, Disc | None]:
-        """Take in the cells the fingertip may touch; return memory and the disc x, y, radius to control."""
+        """Take the cells that the fingertip may touch; return memory and the disc x, y, radius to control."""
 
     def command(self, memory: Memory, seen: Measurement) -> tuple[Memory, Commands]:
-        """Return memory and orders for the cells of the disc and all that still move."""
+        """Return memory and commands for the cells of the disc and all that still move."""
 
 
 @dataclass(frozen=True)
@@ -85,7 +85,7 @@ class SetPoint:
     force: float
     """F_ref, N."""
     per_cell: bool = False
-    """Whether every cell that follows the fingertip is asked for it, and not all cells together."""
+    """Whether it applies to each cell that follows the fingertip, and not to their sum."""
 
     def total(self, following: ArrayLike) -> Floats:
         """Return the set point of n following cells, N: F_ref, or per cell n F_ref, NaN at n = 0."""

@@ -7,7 +7,7 @@ from ..base.quantity import Parameters, quantity
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Delay(Parameters):
-    """Dead time: a command acts `dead_time` after the controller issued it."""
+    """Dead time: a command acts `dead_time` after its issue."""
 
     dead_time: float = quantity(1e-3, "dead time", unit="s", symbol="t_d", at_least=0.0)
 
@@ -21,13 +21,13 @@ class Queue:
     """
 
     length: int = 1
-    """Number of commands kept, at least 1."""
+    """Number of commands, at least 1."""
     cut: float = 0.0
-    """Time into the period at which the valve goes over to the next command, s; 0 when the dead time is a
-    whole number of periods (then the valve sees the oldest all along)."""
+    """Time into the period at which the valve changes to the next command, s; 0 when the dead time is a whole
+    number of periods, and the valve sees the oldest in all of the period."""
 
     def seen(self, time: float) -> int:
-        """Return which command of the queue the valve sees from `time` into the period on."""
+        """Return the index of the command that the valve sees at a time into the period, s."""
         return 1 if self.cut > 0.0 and time >= self.cut * (1.0 - 1e-12) else 0
 
 

@@ -1,7 +1,7 @@
 """Several fingertips on one bed: their pulps, and their paths over it.
 
-The pulp's memory belongs to a pair of fingertip and cell, so a cell has the filters of each finger, one after
-the other. Where two fingertips meet over a cell, their forces add.
+The relaxation of the pulp belongs to a pair of fingertip and cell: a cell has the filters of each finger, one
+after the other. The forces of fingertips over the same cell add.
 """
 
 from collections.abc import Sequence
@@ -21,17 +21,17 @@ MOST_FINGERS = 32
 
 
 class Places(NamedTuple):
-    """Places under g fingers, which have up to w each."""
+    """Positions under g fingers, up to w each."""
 
     fingers: Cells
     basis: Floats
-    """(g, 6, w): See `FingerPath.under`; places that make up the number are any."""
+    """(g, 6, w): See `FingerPath.under`; of fewer positions the rest is arbitrary."""
     at: Cells
-    """(k,): Which of all g w are places, those of the first finger first."""
+    """(k,): Which of all g w are positions, those of the first finger first."""
 
 
 def gather_places(inside: Flags, basis: Floats) -> Places:
-    """Return which of places with a basis (6, k) are under each of the fingers that have any, (f, k)."""
+    """Return which positions with a basis (6, k) are `inside` the reach of each finger, (f, k), if any."""
     (fingers,) = inside.any(axis=1).nonzero()
     sizes = np.count_nonzero(inside[fingers], axis=1)
     present = np.arange(sizes.max(initial=0)) < sizes[:, None]
@@ -48,7 +48,7 @@ class HandPulp:
 
     @property
     def rows(self) -> int:
-        """State rows a cell needs."""
+        """State rows per cell."""
         return sum(pulp.rows for pulp in self.pulps)
 
     @cached_property
@@ -56,22 +56,22 @@ class HandPulp:
         """Relaxation rates of all rows, (rows, 1), 1/s."""
         return np.concatenate([pulp.rates for pulp in self.pulps])
 
-    def age(self, own: Floats, time: Floats) -> None:
+    def age(self, filters: Floats, time: Floats) -> None:
         """Let filters (rows, n) decay without contact for times (n,) or (rows, n), s, in place; exact."""
-        own *= np.exp(-self.rates * time)
+        filters *= np.exp(-self.rates * time)
 
 
 @dataclass(frozen=True)
 class HandTouch(Touch):
-    """Touch of several fingers; fingertip and contact law are the first one's, the pulp is that of all."""
+    """Touch of several fingers: fingertip and contact law of the first one, pulps of all."""
 
     each: tuple[Touch, ...]
-    """Those of the fingers."""
+    """One per finger."""
 
     @cached_property
     def shapes(self) -> list[tuple[Fingertip, list[int]]]:
-        """The shapes of the fingertips, and which fingers have each."""
-        tips = [own.fingertip for own in self.each]
+        """The different fingertips, and which fingers have each."""
+        tips = [touch.fingertip for touch in self.each]
         return [(tip, [i for i, other in enumerate(tips) if other == tip]) for tip in dict.fromkeys(tips)]
 
 
@@ -90,13 +90,13 @@ class HandPath:
         self._ahead = Ahead()
 
     def under(self, number: int, places: Places) -> Floats:
-        """Return the undersides in a period over each finger's places, one after the other, (p, k), m."""
+        """Return the undersides in a period at the positions of all fingers, (p, k), m."""
         return self._ahead.find(number, places, self.join.shape[3] * places.basis.size, self._compute)
 
     def _compute(self, several: slice, places: Places) -> Floats:
         """Return the undersides in several periods, (t, p, k), m."""
-        own = self.forms[places.fingers, several], self.join[places.fingers, several]
-        under = compute_underside(*own, places.basis[:, None]).transpose(1, 2, 0, 3)
+        forms, join = self.forms[places.fingers, several], self.join[places.fingers, several]
+        under = compute_underside(forms, join, places.basis[:, None]).transpose(1, 2, 0, 3)
         return under.reshape(*under.shape[:2], -1).take(places.at, axis=2)
 
 
@@ -109,14 +109,14 @@ class HandPeriod(NamedTuple):
     """(6, f)."""
 
     def under(self, places: Places) -> Floats:
-        """Return the undersides over each finger's places, one after the other, (p, k), m."""
+        """Return the undersides at the positions of all fingers, (p, k), m."""
         return self.path.under(self.number, places)
 
 
 def join_touches(touches: Sequence[Touch]) -> HandTouch:
     """Return the touch of several fingers."""
     first = touches[0]
-    # A pulp of all fingers only ages; each finger's own is pressed.
+    # The joint pulp is only aged; the pulp of each finger is pressed.
     pulp: Pulp = HandPulp(tuple(touch.pulp for touch in touches))  # type: ignore[assignment]
     return HandTouch(first.fingertip, first.contact, pulp, tuple(touches))
 
@@ -126,9 +126,9 @@ def trace_hands(touch: HandTouch, poses: Floats) -> list[HandPeriod]:
     periods, instants, fingers, _ = poses.shape
     forms = np.empty((fingers, periods, 2 * instants, 6))
     join, windows = np.empty((fingers, periods, 2, instants, 1)), np.empty((fingers, periods, 6))
-    for tip, own in touch.shapes:  # those of one shape at once: as periods after each other
-        traced = trace_periods(tip, poses[:, :, own].transpose(2, 0, 1, 3).reshape(-1, instants, 7))
-        for rows, made in zip((forms, join, windows), traced, strict=True):
-            rows[own] = made.reshape(len(own), *rows.shape[1:])
+    for tip, alike in touch.shapes:  # fingers of one shape together, as periods in sequence
+        traced = trace_periods(tip, poses[:, :, alike].transpose(2, 0, 1, 3).reshape(-1, instants, 7))
+        for rows, of_alike in zip((forms, join, windows), traced, strict=True):
+            rows[alike] = of_alike.reshape(len(alike), *rows.shape[1:])
     path = HandPath(forms, join, np.ascontiguousarray(windows.transpose(1, 2, 0)))
     return [HandPeriod(path, number, window) for number, window in enumerate(path.windows)]

@@ -1,9 +1,8 @@
 """Fingertip ellipsoid: its underside over each cell.
 
-Beyond nine tenths of the way to its rim the ellipsoid is continued by the paraboloid
-that meets it with equal slope. The ellipsoid itself ends there with infinite slope; the
-finger does not end there, and a tall pin that the fingertip runs into sideways must be met
-by a force that grows, not by one that jumps.
+Near its rim, a paraboloid that meets the ellipsoid with equal slope replaces it (see
+`JOIN`). The slope of an ellipsoid is infinite at the rim, but a finger continues there, and
+the force on a tall pin that the fingertip meets sideways must grow, not jump.
 """
 
 import math
@@ -19,11 +18,11 @@ from ..base.quantity import Parameters, quantity
 from .layout import Discs
 
 Item = TypeVar("Item")
-#: Where a fingertip goes in a period: center x, y of its path and half its length, m; base, m, tilt and bend,
-#: 1/m, of the paraboloid below it. Of b runs the rows of an array (6, b), or (6, 1) of one for all.
+#: Path of a fingertip in a period: center x, y and half its length, m; base, m, tilt and bend, 1/m, of the
+#: paraboloid below it. Of b runs the rows of an array (6, b), or (6, 1) of one for all.
 Window = tuple[float, float, float, float, float, float] | Floats
 
-#: Squared reduced radius at which the paraboloid takes over.
+#: Squared reduced radius from which the paraboloid replaces the ellipsoid.
 JOIN = 0.96
 #: Orientation of a level finger (quaternion w, x, y, z).
 LEVEL = (1.0, 0.0, 0.0, 0.0)
@@ -33,14 +32,14 @@ _SLOPE = 0.5 / _ROOT
 
 
 def continue_ball(square: Floats) -> Floats:
-    """Return the underside of a ball of radius 1 about 0, continued, at squared distances of its axis."""
+    """Return the underside of a ball of radius 1 about 0, continued, at squared distances from its axis."""
     low = np.sqrt(np.maximum(1.0 - square, 1.0 - JOIN))
     under: Floats = _SLOPE * np.maximum(square - JOIN, 0.0) - low
     return under
 
 
 def require_one(fingers: Sequence[Item]) -> Item:
-    """Return the only item of a list of one a finger, or raise ParameterError; see docs/architecture.md."""
+    """Return the item of the only finger, or raise ParameterError; see docs/architecture.md."""
     if len(fingers) != 1:
         rule = "must be one here: this is of a single finger"
         raise ParameterError("scene", "fingers", rule, str(len(fingers)))
@@ -53,17 +52,32 @@ class Fingertip(Parameters):
     """Ellipsoid with semi-axes along the finger (local x), across it (y) and upwards (z)."""
 
     length: float = quantity(
-        10e-3, "semi-axis along the fingertip: half its length", unit="m", symbol="a_x",
-        source="C, Microsoft", above=0.0, whole="length of the fingertip",
-    )  # fmt: skip
+        10e-3,
+        "semi-axis along the fingertip: half its length",
+        unit="m",
+        symbol="a_x",
+        source="C, Microsoft",
+        above=0.0,
+        whole="length of the fingertip",
+    )
     width: float = quantity(
-        8e-3, "semi-axis across the fingertip: half its width", unit="m", symbol="a_y",
-        source="C, Microsoft", above=0.0, whole="width of the fingertip",
-    )  # fmt: skip
+        8e-3,
+        "semi-axis across the fingertip: half its width",
+        unit="m",
+        symbol="a_y",
+        source="C, Microsoft",
+        above=0.0,
+        whole="width of the fingertip",
+    )
     height: float = quantity(
-        8e-3, "semi-axis upwards: half the height of the fingertip", unit="m", symbol="a_z",
-        source="C, Microsoft", above=0.0, whole="height of the fingertip",
-    )  # fmt: skip
+        8e-3,
+        "semi-axis upwards: half the height of the fingertip",
+        unit="m",
+        symbol="a_z",
+        source="C, Microsoft",
+        above=0.0,
+        whole="height of the fingertip",
+    )
 
     @property
     def flattest(self) -> float:
@@ -72,7 +86,7 @@ class Fingertip(Parameters):
         return max(axes) ** 2 / min(axes)
 
     def outline(self, poses: Floats) -> Floats:
-        """Return what the undersides at poses (k, 7) need, (k, 10).
+        """Return the parameters of the undersides at poses (k, 7), (k, 10).
 
         Center x, y, z, m; matrix of the squared reduced radius S_xx, S_xy, S_yy, 1/m²; tilt of the mid
         surface t_x, t_y; half thickness over the center, m; smaller eigenvalue of S, 1/m².
@@ -101,9 +115,9 @@ def compute_reaches(outline: Floats) -> Floats:
 
 
 def compute_reach(window: Window, peak: Any) -> Discs | None:
-    """Return the disc, or that of each of b runs, beyond which the underside is above `peak`, m.
+    """Return the disc, or that of each of b runs, outside which the underside is above `peak`, m.
 
-    A paraboloid below the underside bounds every tilt, also with the smallest base and bend of several poses.
+    A paraboloid is below the underside at any tilt, also with the smallest base and bend of several poses.
     """
     x, y, spread, base, tilt, bend = window
     square = tilt * tilt + 2.0 * bend * (peak - base)
@@ -114,14 +128,14 @@ def compute_reach(window: Window, peak: Any) -> Discs | None:
 
 
 def compute_forms(outline: Floats) -> tuple[Floats, Floats]:
-    """Return what `compute_underside` needs as quadratic forms of the position.
+    """Return the quadratic forms of the position that `compute_underside` needs.
 
     With r² the squared reduced radius, t the half thickness over the center, and
     ``R = c (1 - r²) / (1 - JOIN)``, the underside is ``tangent + (sqrt(max(R, c)) - sqrt(c))²``: the
-    tangent, a quadratic form, is the paraboloid that takes over at R = c, and c is in m.
+    tangent, a quadratic form, is the paraboloid from R = c on, and c is in m.
 
-    Of outlines (..., p, 10): `forms` (..., 2 p, 6), coefficients of 1, x, y, x², x y, y², p rows of R, then p
-    rows of the tangent, m; `join` (..., 2, p, 1), c, m, and its root.
+    For outlines (..., p, 10): `forms` (..., 2 p, 6), coefficients of 1, x, y, x², x y, y², p rows of R, then
+    p rows of the tangent, m; `join` (..., 2, p, 1), c, m, and its root.
     """
     x, y, z, xx, xy, yy, tilt_x, tilt_y, half, _ = (outline[..., part] for part in range(10))
     count = outline.shape[-2]
@@ -145,9 +159,9 @@ def compute_forms(outline: Floats) -> tuple[Floats, Floats]:
 
 
 def compute_underside(forms: Floats, join: Floats, basis: Floats) -> Floats:
-    """Return the underside over places with rows 1, x, y, x², x y, y² (6, k), shape (..., p, k), m."""
+    """Return the undersides (..., p, k), m, at positions with rows 1, x, y, x², x y, y² (6, k)."""
     count = join.shape[-2]
-    # Not one large product: so each pose comes out the same, bit for bit, with any others beside it.
+    # Not one large product, so that the result of a pose does not depend on the others, bit for bit.
     rows = np.matmul(forms, basis)
     return join_surfaces(rows[..., :count, :], rows[..., count:, :], join[..., 0, :, :], join[..., 1, :, :])
 

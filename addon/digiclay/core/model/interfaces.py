@@ -1,7 +1,7 @@
 """Interfaces of the parts between fingertip and pins, as protocols.
 
-An interface is implemented by the part and by a null part from `null_parts`, which has no state rows and
-computes nothing. Parts hold parameters only: state is an argument and a result.
+A part implements its interface, and so does a null part from `null_parts`, which has no state rows and
+computes nothing. Parts hold only parameters: state is an argument and a result.
 """
 
 from __future__ import annotations
@@ -14,9 +14,9 @@ from ..base.arrays import Floats
 from .control_interface import Measurement
 from .delay import Queue
 
-#: Moves a block of cells on by one control period, in place. It takes the underside of the fingertip over the
-#: first k cells at the period's instants, (p, k), m, and returns the force on them at the end, (k,), N. Of
-#: the cells of b runs all arrays have one axis more, the last.
+#: Moves a block of cells by one control period, in place. It takes the underside of the fingertip over the
+#: first k cells at the period's instants, (p, k), m, and returns the force on them at the end, (k,), N. For
+#: b runs all arrays have another axis, the last.
 Movement = Callable[[Floats], Floats]
 
 
@@ -38,25 +38,25 @@ class Flow(Protocol):
 
 
 class Lag(Protocol):
-    """Response of the valve's opening to its command; `own` are its state rows, shape (rows, n)."""
+    """Response of the valve's opening to its command; `rows` are its state rows, (r, n)."""
 
     @property
     def rows(self) -> int: ...
 
-    def opening(self, own: Floats, command: Floats) -> Floats:
-        """Return the opening K, shape (n,). `own` (rows, n); `command` (n,)."""
+    def opening(self, rows: Floats, command: Floats) -> Floats:
+        """Return the opening K (n,) for a command (n,)."""
 
-    def rate(self, own: Floats, command: Floats) -> Floats:
-        """Return the rates of change of `own`, 1/s. `own` (rows, n); `command` (n,)."""
+    def rate(self, rows: Floats, command: Floats) -> Floats:
+        """Return the rates of change of the rows, 1/s, for a command (n,)."""
 
     def response(self, queue: Queue, times: Sequence[float]) -> Floats:
-        """Return the linear map from own rows and queued commands to the openings at times of a period, s."""
+        """Return the linear map from its rows and queued commands to the openings at times of a period, s."""
 
-    def settle(self, own: Floats) -> None: ...
+    def settle(self, rows: Floats) -> None: ...
 
 
 class Pulp(Protocol):
-    """Relaxation of the pulp; `own` are its state rows, shape (rows, k)."""
+    """Relaxation of the pulp; `filters` are its state rows, (rows, k)."""
 
     @property
     def rates(self) -> Floats:
@@ -64,40 +64,40 @@ class Pulp(Protocol):
 
     @property
     def shares(self) -> Floats:
-        """Shares of the force that the filters take in the end, shape (rows,)."""
+        """Shares of the force that the filters finally take, shape (rows,)."""
 
     @property
     def rows(self) -> int: ...
 
-    def relaxed(self, own: Floats) -> Any: ...
+    def relaxed(self, filters: Floats) -> Any: ...
 
-    def rate(self, own: Floats, tension: Floats) -> Floats:
-        """Return the rates of change of `own`, N/s. `own` (rows, k); `tension` (k,), elastic force, N."""
+    def rate(self, filters: Floats, tension: Floats) -> Floats:
+        """Return the rates of change of the filters, N/s; `tension` (k,): elastic force, N."""
 
     def mean_loss_map(self, step: float) -> tuple[Floats, float]: ...
 
     def propagator(self, step: float) -> Floats: ...
 
-    def age(self, own: Floats, time: Floats) -> None:
-        """Let `own` decay without tension, in place. `own` (rows, k); `time` (k,), s."""
+    def age(self, filters: Floats, time: Floats) -> None:
+        """Let the filters decay without tension for times (k,), s, in place."""
 
 
 class Sensors(Protocol):
-    """Measured forces and heights for the controller, of cells as they are after so many control periods."""
+    """Measured forces and heights for the controller; `period`: control periods so far."""
 
     @property
     def rows(self) -> int: ...
 
     def measure(self, seen: Measurement, period: int) -> tuple[Floats, Floats]:
-        """Return measured forces, N, and heights, m, shape (m,); `seen.sensed` stays as it is."""
+        """Return measured forces, N, and heights, m, (m,); does not change `seen.sensed`."""
 
     def read(self, seen: Measurement, period: int) -> Measurement:
-        """Return cells with measured forces and heights."""
+        """Return the cells with measured forces and heights."""
         force, height = self.measure(seen, period)
         return seen._replace(force=force, height=height)
 
     def note(self, seen: Measurement, period: int) -> None:
-        """Bring `seen.sensed` up to date, in place, at the end of a period."""
+        """Update `seen.sensed`, in place, at the end of a period."""
 
 
 class Stepper(Protocol):
@@ -111,24 +111,24 @@ class Stepper(Protocol):
 
     @property
     def nodes(self) -> tuple[float, ...]:
-        """When, in shares of a physics step, the fingertip's pose is needed."""
+        """Instants, in shares of a physics step, at which the fingertip's pose is needed."""
 
     @property
     def bridges(self) -> bool:
-        """Whether a step may hold the instant at which a lagging valve goes over to the next command."""
+        """Whether a step may contain the instant at which a lagging valve changes to the next command."""
 
     def plan(self, cell: Any, queue: Queue, segments: tuple[Segment, ...]) -> Any:
         """Compute once what all periods share, for a `physics.Cell` and the physics steps of a period."""
 
     def prepare(self, plan: Any, rows: Floats, near: int) -> Movement:
-        """Prepare to move cells, of which the fingertip may touch the first k, as often as their set serves.
+        """Return the movement of cells, of which the fingertip may touch the first `near`.
 
         Rows (r + q, n[, b]) are those of `physics.Cell`, then the commands of the queue, oldest first.
         """
 
 
 class Alike:
-    """Part without parameters: all of one class are equal."""
+    """Part without parameters: all of a class are equal."""
 
     def __eq__(self, other: object) -> bool:
         return type(self) is type(other)
@@ -145,4 +145,4 @@ class Segment:
     length: float
     """Time into the period, and length, s."""
     nodes: tuple[int, ...]
-    """Which of the period's instants the stepper needs."""
+    """Indices of the period's instants that the stepper needs."""

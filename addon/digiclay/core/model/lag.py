@@ -10,8 +10,8 @@ from ..base.arrays import Floats
 from ..base.quantity import Parameters, quantity
 from .delay import Queue
 
-#: A valve on its way shut and this little open counts as shut: it can let through no more than
-#: 1e-18 of a cell's free speed, and a cell with a shut valve need not be integrated.
+#: Opening below which a closing valve counts as shut: its flow is at most 1e-18 of a cell's free
+#: speed, and a cell with a shut valve need not be integrated.
 SHUT = 1e-9
 
 
@@ -23,17 +23,17 @@ class ValveLag(Parameters):
 
     @property
     def rows(self) -> int:
-        """State rows a cell needs: its opening."""
+        """State rows per cell: its opening."""
         return 1
 
-    def opening(self, own: Floats, command: Floats) -> Floats:
+    def opening(self, rows: Floats, command: Floats) -> Floats:
         """Return the opening K, shape (n,)."""
-        opening: Floats = own[0]
+        opening: Floats = rows[0]
         return opening
 
-    def rate(self, own: Floats, command: Floats) -> Floats:
-        """Return dK/dt, 1/s (equation 9), shape (1, n), for held commands, shape (n,)."""
-        return (command - own) / self.time_constant
+    def rate(self, rows: Floats, command: Floats) -> Floats:
+        """Return dK/dt, 1/s (equation 9), (1, n), for held commands (n,)."""
+        return (command - rows) / self.time_constant
 
     def response(self, queue: Queue, times: Sequence[float]) -> Floats:
         """Return the exact map (t, 1 + queue.length) from opening and commands to openings at times, s."""
@@ -46,6 +46,6 @@ class ValveLag(Parameters):
                 row[2] = -math.expm1(-max(time - queue.cut, 0.0) / self.time_constant)
         return response
 
-    def settle(self, own: Floats) -> None:
+    def settle(self, rows: Floats) -> None:
         """Shut valves that are almost shut, in place."""
-        own[np.abs(own) < SHUT] = 0.0
+        rows[np.abs(rows) < SHUT] = 0.0

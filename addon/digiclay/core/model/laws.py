@@ -1,8 +1,8 @@
-"""Laws a scene's valve and contact can follow: one row a law, one module each.
+"""Laws of a scene's valve and contact: one row per law, one module each.
 
-A section with one law has that law's parameters. A section with several has `law` besides, which
-selects one, and the parameters of all: scene files, ``--set``, Blender and the nomenclature take them
-from this one class. A parameter that an earlier law of the section declares is not declared again.
+A section with one law has the parameters of that law. A section with several has the parameters of all, and
+`law`, which selects one: scene files, ``--set``, Blender and the nomenclature use this class. A parameter
+that an earlier law of the section declares is not declared again.
 """
 
 import importlib
@@ -14,9 +14,9 @@ from typing import Any
 from ..base.errors import ParameterError
 from ..base.quantity import Parameters, quantity
 
-#: By section: a law's name, the module within the core, and the class of its parameters there. The first is
+#: By section: name of a law, its module within the core, and the class of its parameters there. The first is
 #: the default. A valve law has a method ``flow_law(fluid)``, see `valve.Valve`; a contact law is a
-#: `contact.ExponentialLaw`. Scene files have the keys of the selected law alone.
+#: `contact.ExponentialLaw`. Scene files have only the keys of the selected law.
 LAWS: dict[str, dict[str, tuple[str, str]]] = {
     "valve": {
         "orifice": ("model.valve", "Valve"),
@@ -25,7 +25,7 @@ LAWS: dict[str, dict[str, tuple[str, str]]] = {
         "exponential": ("model.contact", "Contact"),
     },
 }
-#: Base of a section's laws, beside `Parameters`, and the attributes a law has.
+#: Base class of a section's laws besides `Parameters`, and the attributes of a law.
 NEEDED: dict[str, tuple[tuple[str, str], tuple[str, ...]]] = {
     "valve": (("base.quantity", "Parameters"), ("flow_law",)),
     "contact": (("model.contact", "ExponentialLaw"), ("stiffness", "exponent", "offset", "share")),
@@ -37,17 +37,17 @@ def law_parameters(section: str) -> type[Parameters]:
     return _merge(section, tuple(LAWS[section]))
 
 
-def select_law(section: str, own: Any) -> Any:
+def select_law(section: str, parameters: Any) -> Any:
     """Return the parameters of the law that a section selects."""
-    law = getattr(own, "law", "")
-    if not law:  # the only one, or given without the others
-        return own
+    law = getattr(parameters, "law", "")
+    if not law:  # of the only law, or of one law alone
+        return parameters
     kind = _load(section, law)
-    return kind(**{field.name: getattr(own, field.name) for field in fields(kind)})
+    return kind(**{field.name: getattr(parameters, field.name) for field in fields(kind)})
 
 
 def _load(section: str, law: str) -> Any:
-    """Import the class of a law's parameters, and refuse one that the steps cannot compute with."""
+    """Import the class of a law's parameters, and refuse one with which the steppers cannot compute."""
     kind, (base, needed) = import_part(*LAWS[section][law]), NEEDED[section]
     missing = [parent.__name__ for parent in (import_part(*base), Parameters) if not issubclass(kind, parent)]
     missing += [name for name in needed if not hasattr(kind, name)]
@@ -58,7 +58,7 @@ def _load(section: str, law: str) -> Any:
 
 
 def import_part(module: str, name: str) -> Any:
-    """Import a class of the core by name, now that a scene needs it."""
+    """Import a class of the core by name, when a scene needs it."""
     return getattr(importlib.import_module(f"..{module}", __package__), name)
 
 
@@ -71,10 +71,10 @@ def _merge(section: str, names: tuple[str, ...]) -> type[Parameters]:
     declared: dict[str, Any] = {
         "law": (str, quantity(names[0], f"law of the {section}", choices=names)),
     }
-    own = {field.name for field in fields(first)}
+    of_first = {field.name for field in fields(first)}
     for name in names[1:]:
         for field in fields(_load(section, name)):
-            if field.name not in own:
+            if field.name not in of_first:
                 again = declare(default=field.default, metadata=field.metadata)
                 declared.setdefault(field.name, (field.type, again))
 
@@ -98,5 +98,5 @@ def _merge(section: str, names: tuple[str, ...]) -> type[Parameters]:
 
 
 def _restore(section: str, values: dict[str, Any]) -> Parameters:
-    """Return parameters read from a pickle."""
+    """Return parameters from a pickle."""
     return law_parameters(section)(**values)

@@ -15,15 +15,15 @@ from ..base.quantity import Parameters, quantity
 
 #: Center x, y and radius, m.
 Disc = tuple[float, float, float]
-#: The same of a run, or arrays (b,) of a batch, in which a radius of -inf stands for no disc.
+#: The same of a run, or arrays (b,) of a batch, in which a radius of -inf is no disc.
 Discs = tuple[Any, Any, Any]
 
 
 class Arrangement(NamedTuple):
     """Distance of rows and shift of odd ones along x, in pitches; meaning; share of the contact law.
 
-    Where rows are not shifted a pin has four neighbors beside it, where they are by half a pitch six; what
-    needs neighbors refuses all other beds. `share` is None where the default of the law holds.
+    A pin has four neighbors if rows are not shifted, and six if they are shifted by half a pitch; features
+    that need neighbors refuse all other beds. `share` is None for the default of the law.
     """
 
     spacing: float
@@ -32,7 +32,7 @@ class Arrangement(NamedTuple):
     share: float | None = None
 
 
-#: Arrangements of the cells by name: the only place that knows them.
+#: Arrangements of the cells by name; all else is derived from this table.
 ARRANGEMENTS = {
     "aligned": Arrangement(1.0, 0.0, "A square grid"),
     "staggered": Arrangement(1.0, 0.5, "Every other row shifted by half a pitch, rows one pitch apart"),
@@ -40,15 +40,15 @@ ARRANGEMENTS = {
         math.sqrt(0.75), 0.5, "Every other row shifted, six neighbors at the same distance", share=0.29
     ),
 }
-#: Steps (rows, columns) to the neighbors, counter-clockwise: in a square grid with those at the corners, in
-#: shifted ones of rows that stand back and of rows that are shifted forward along x.
+#: Steps (rows, columns) to the neighbors, counter-clockwise: in a square grid, with diagonal ones; in a
+#: shifted one, of rows behind their neighbors along x, and of rows ahead of them.
 SQUARE = ((0, 1), (1, 1), (1, 0), (1, -1), (0, -1), (-1, -1), (-1, 0), (-1, 1))
 BACK = ((0, 1), (1, 0), (1, -1), (0, -1), (-1, -1), (-1, 0))
 FORWARD = ((0, 1), (1, 1), (1, 0), (0, -1), (-1, 0), (-1, 1))
 #: Those of even and of odd rows, by twice the shift of odd rows, in pitches.
 STEPS = {0: (SQUARE, SQUARE), 1: (BACK, FORWARD), -1: (FORWARD, BACK)}
 
-#: Relative slack, so that cells exactly on a limit count the same on every side of the center.
+#: Relative tolerance, so that cells exactly on a limit count alike on all sides of the center.
 RELATIVE_TOLERANCE = 1e-9
 
 
@@ -85,7 +85,7 @@ class Layout(Parameters):
 
     @property
     def shift(self) -> float:
-        """How far odd rows are shifted along x, m."""
+        """Shift of odd rows along x, m."""
         return self.pitch * ARRANGEMENTS[self.arrangement].shift
 
     @property
@@ -94,7 +94,7 @@ class Layout(Parameters):
         return list_steps(ARRANGEMENTS[self.arrangement].shift).shape[1] == len(BACK)
 
     def find_neighbors(self, *, corners: bool) -> Cells:
-        """Return the neighbors of all cells; see the function of this name."""
+        """Return the neighbors of all cells; see the function `find_neighbors`."""
         shift = ARRANGEMENTS[self.arrangement].shift
         return find_neighbors(self.rows, self.columns, shift, corners=corners)
 
@@ -124,7 +124,7 @@ class Grid:
         return np.column_stack([self.x, self.y])
 
     def box(self, x: float, y: float, radius: float) -> Cells:
-        """Return the cells of the rows and columns that a disc may reach, m, in ascending order."""
+        """Return the cells in the rows and columns that a disc may reach, m, in ascending order."""
         plan = self.layout
         spacing, (left, bottom) = plan.row_spacing, self.corner
         low_row = max(0, math.ceil((y - radius - bottom) / spacing - RELATIVE_TOLERANCE))
@@ -135,13 +135,13 @@ class Grid:
         return (rows[:, None] + np.arange(low, high + 1)).ravel()
 
     def disc(self, x: float, y: float, radius: float) -> Cells:
-        """Return the cells within `radius` of a point, m, in ascending order; those exactly on it too."""
+        """Return the cells within `radius` of a point, m, in ascending order, those on its limit included."""
         cells = self.box(x, y, radius)
         square = (self.x.take(cells) - x) ** 2 + (self.y.take(cells) - y) ** 2
         return cells[square <= radius * radius * (1.0 + RELATIVE_TOLERANCE)]
 
     def cover(self, discs: Discs | None) -> Flags:
-        """Return which cells are in some of f discs, (n,); a negative radius: nothing is in it."""
+        """Return which cells are in any of f discs, (n,); a disc of negative radius is empty."""
         covered = np.zeros(self.count, np.bool_)
         if discs is None:
             return covered
@@ -150,7 +150,7 @@ class Grid:
         size = max(0.0, float(radius.max()))
 
         def span(first: Floats, width: float, count: int) -> Cells:
-            """Return as many rows, or columns, of each disc as the widest has, (f, 1, k)."""
+            """Return the rows, or columns, of each disc, as many as of the widest, (f, 1, k)."""
             most = min(int(min(width, count)) + 2, count)
             least = np.clip(np.ceil(first - RELATIVE_TOLERANCE), 0, count - most)
             lines: Cells = least.astype(np.intp) + np.arange(most)
@@ -164,7 +164,7 @@ class Grid:
         return covered
 
     def enclose(self, cells: Cells) -> Disc | None:
-        """Return a disc that holds the axes of some cells, m; None without any."""
+        """Return a disc around the axes of cells, m; None without cells."""
         if not cells.size:
             return None
         x, y = self.x[cells], self.y[cells]
@@ -182,7 +182,7 @@ class Grid:
         return covered
 
     def at(self, x: Floats, y: Floats) -> Cells:
-        """Return the cells nearest to some places, m, shape (k,)."""
+        """Return the cells nearest to positions, m, (k,)."""
         plan, (left, bottom) = self.layout, self.corner
         row = np.clip(np.rint((y - bottom) / plan.row_spacing), 0, plan.rows - 1)
         column = np.clip(np.rint((x - left - (row % 2) * plan.shift) / plan.pitch), 0, plan.columns - 1)
@@ -207,25 +207,29 @@ def make_grid(layout: Layout) -> Grid:
 
 def find_grid_shape(position: ArrayLike) -> tuple[int, int]:
     """Return the rows and columns of pins at positions (n, 2), m, in order, or raise ParameterError."""
-    place = read_places(position)
-    if not len(place):
+    points = read_places(position)
+    if not len(points):
         raise ParameterError("Surface", "position", "must hold at least one pin", "none")
-    spacing = float(np.hypot(*(place[1] - place[0]))) if len(place) > 1 else 1.0
-    other_row = np.flatnonzero(np.abs(place[:, 1] - place[0, 1]) > 0.1 * spacing)
-    columns = int(other_row[0]) if len(other_row) else len(place)
-    if len(place) % columns:
-        raise ParameterError("Surface", "position", f"must fill rows of {columns} pins", f"{len(place)} pins")
-    return len(place) // columns, columns
+    spacing = float(np.hypot(*(points[1] - points[0]))) if len(points) > 1 else 1.0
+    other_row = np.flatnonzero(np.abs(points[:, 1] - points[0, 1]) > 0.1 * spacing)
+    columns = int(other_row[0]) if len(other_row) else len(points)
+    if len(points) % columns:
+        raise ParameterError(
+            "Surface", "position", f"must fill rows of {columns} pins", f"{len(points)} pins"
+        )
+    return len(points) // columns, columns
 
 
 def read_places(position: ArrayLike) -> Floats:
-    """Return `position` as an array, or refuse its shape or a number in it."""
-    place = np.asarray(position, dtype=np.float64)
-    if place.ndim != 2 or place.shape[1] != 2:
-        raise ParameterError("Surface", "position", "must have two coordinates a pin", f"shape {place.shape}")
-    if not np.all(np.isfinite(place)):
-        raise ParameterError("Surface", "position", "must be finite", name_first_bad(place.sum(axis=1)))
-    return place
+    """Return `position` as an array (n, 2), or refuse its shape or a value."""
+    points = np.asarray(position, dtype=np.float64)
+    if points.ndim != 2 or points.shape[1] != 2:
+        raise ParameterError(
+            "Surface", "position", "must have two coordinates a pin", f"shape {points.shape}"
+        )
+    if not np.all(np.isfinite(points)):
+        raise ParameterError("Surface", "position", "must be finite", name_first_bad(points.sum(axis=1)))
+    return points
 
 
 def name_first_bad(values: Floats) -> str:
@@ -253,18 +257,18 @@ def find_neighbors(rows: int, columns: int, shift: float, *, corners: bool) -> C
 
 
 def add_disc(discs: Any, other: Disc) -> Any:
-    """Return the least disc that holds two; beside those of several fingers, a list, one more."""
+    """Return the smallest disc around two; or the list of several fingers' discs with another one."""
     if isinstance(discs, list):
         return [*discs, other]
     return enclose_discs(discs or other, other)
 
 
-def enclose_discs(one: Disc, other: Disc) -> Disc:
-    """Return the least disc, x, y and radius in m, that holds two."""
-    (x, y, radius), (other_x, other_y, other_radius) = one, other
+def enclose_discs(disc: Disc, other: Disc) -> Disc:
+    """Return the smallest disc, x, y and radius in m, around two."""
+    (x, y, radius), (other_x, other_y, other_radius) = disc, other
     apart = math.hypot(other_x - x, other_y - y)
     if apart + other_radius <= radius:
-        return one
+        return disc
     if apart + radius <= other_radius:
         return other
     whole = (apart + radius + other_radius) / 2.0
@@ -278,11 +282,11 @@ def widen_disc(disc: Discs | None, margin: float) -> Discs | None:
 
 
 def encloses(outer: Discs | None, inner: Discs | None) -> bool:
-    """Return whether a disc, or each one of a batch, holds another one."""
+    """Return whether a disc, or each disc of a batch, contains another one."""
     if inner is None or outer is None:
         return inner is None
     (x, y, radius), (other_x, other_y, limit) = inner, outer
-    # One that touches the limit from inside is in: a last bit, other in a batch than alone, decides nothing.
+    # A disc that touches the limit is inside: the last bit, which may differ in a batch, must not decide.
     limit = limit * (1.0 + RELATIVE_TOLERANCE)
     if isinstance(limit, float):
         return bool(math.hypot(x - other_x, y - other_y) + radius <= limit)

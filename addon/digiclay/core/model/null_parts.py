@@ -16,21 +16,21 @@ class InstantValve(Alike):
 
     rows = 0
 
-    def opening(self, own: Floats, command: Floats) -> Floats:
+    def opening(self, rows: Floats, command: Floats) -> Floats:
         """Return the command."""
         return command
 
-    def rate(self, own: Floats, command: Floats) -> Floats:
+    def rate(self, rows: Floats, command: Floats) -> Floats:
         """Return no rows."""
-        return own
+        return rows
 
     def response(self, queue: Queue, times: Sequence[float]) -> Floats:
-        """Return the map that picks the command seen at each time, s, shape (t, queue.length)."""
+        """Return the map (t, queue.length) that selects the command seen at each time, s."""
         response = np.zeros((len(times), queue.length))
         response[np.arange(len(times)), [queue.seen(time) for time in times]] = 1.0
         return response
 
-    def settle(self, own: Floats) -> None:
+    def settle(self, rows: Floats) -> None:
         """Nothing to settle."""
 
 
@@ -41,13 +41,13 @@ class Unrelaxed(Alike):
     rates: ClassVar[Floats] = np.empty((0, 1))
     shares: ClassVar[Floats] = np.empty(0)
 
-    def relaxed(self, own: Floats) -> float:
+    def relaxed(self, filters: Floats) -> float:
         """Return no loss of force."""
         return 0.0
 
-    def rate(self, own: Floats, tension: Floats) -> Floats:
-        """Return no rows. `own` (0, n); `tension` (n,), N."""
-        return own
+    def rate(self, filters: Floats, tension: Floats) -> Floats:
+        """Return no rows. `filters` (0, n); `tension` (n,), N."""
+        return filters
 
     def mean_loss_map(self, step: float) -> tuple[Floats, float]:
         """Return the map to no loss of force, shape (1,), and no share."""
@@ -57,8 +57,8 @@ class Unrelaxed(Alike):
         """Return the map to no rows, shape (0, 3)."""
         return np.empty((0, 3))
 
-    def age(self, own: Floats, time: Floats) -> None:
-        """Nothing to age. `own` (0, n); `time` (n,), s."""
+    def age(self, filters: Floats, time: Floats) -> None:
+        """Nothing to age. `filters` (0, n); `time` (n,), s."""
 
 
 class PerfectSensors(Alike, Sensors):

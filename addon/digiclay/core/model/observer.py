@@ -1,4 +1,4 @@
-"""Force observer: force on a pin from its height and its commands alone."""
+"""Force observer: force on a pin from only its height and its commands."""
 
 from dataclasses import dataclass
 from itertools import pairwise
@@ -11,13 +11,13 @@ from .delay import Queue
 from .interfaces import Sensors
 from .physics import Cell
 
-#: Root mean square opening in a control period below which a valve counts as shut: through it
-#: next to nothing flows, whatever the load, so the motion says nothing of the force.
+#: Root mean square opening in a control period below which a valve counts as shut: its flow is so
+#: small under any load that the motion does not tell the force.
 SHUT = 0.05
 #: Nodes of the averages over each stretch of a held command: the opening decays exponentially in it.
 NODES = 6
-#: Rounds by which the conductance is settled; where the flow is laminar one would do. In the
-#: turbulent branch each round halves the logarithm of the error, and the last period's force is near.
+#: Rounds in which the conductance converges; one is enough for laminar flow. For turbulent flow each
+#: round halves the logarithm of the error, and the force of the last period is a good start.
 ROUNDS = 6
 
 
@@ -28,29 +28,28 @@ class ValveObserver(Sensors):
     In a control period a pin moves by ``A ΔH = ∫ α(K) (P_s(K) - F/A) dt``, where α is the
     conductance of valve and conduit. The opening K is known from the commands, so
     ``F = A (<α P_s> - A ΔH/T) / <α>``: the mean force of the period, weighted with α. It is
-    not below 0, for a fingertip cannot pull. Where the valve is shut, or the pin is at an end
-    stop, the motion says nothing, and the last estimate is held.
+    not below 0, since a fingertip cannot pull. Where the valve is shut, or the pin is at an end
+    stop, the motion does not tell the force, and the last estimate is held.
     """
 
     inner: Sensors
-    """Without state; its heights are used, its forces are not."""
+    """Without state; only its heights are used."""
     cell: Cell
     period: float
     """Control period, s."""
     length: int
-    """Commands on their way to the valve."""
+    """Queued commands."""
     response: Floats
-    """(nodes + 1, s): Opening at the nodes of a period, then at its end, from the lag's rows and the
-    commands."""
+    """(nodes + 1, s): Map from the lag's rows and the commands to the opening at the nodes of a period and at
+    its end."""
     weights: Floats
     """(nodes,): Of the nodes; their sum is 1."""
     doubt: float = 0.0
-    """How far the difference of two heights may be off, m: an estimate that is no larger than what this comes
-    to is none."""
+    """Error of the difference of two heights, m; estimates below the force that it corresponds to are 0."""
 
     @property
     def rows(self) -> int:
-        """State rows: estimate, periods known (0: none), the height then, opening, commands on their way."""
+        """State rows: estimate, last period + 1 (0: none), height then, opening, queued commands."""
         return 3 + self.cell.lag.rows + self.length
 
     def measure(self, seen: Measurement, period: int) -> tuple[Floats, Floats]:
@@ -58,21 +57,21 @@ class ValveObserver(Sensors):
         return seen.sensed[0], self.inner.measure(seen, period)[1]
 
     def note(self, seen: Measurement, period: int) -> None:
-        """Follow the valve through the period, and estimate the force where it was open."""
-        own = seen.sensed
-        # The reading before this one, made again: the cell has not changed while it took no part.
-        former = np.where(own[1] > 0.0, own[2], self.cell.actuator.rest_height)
+        """Compute the opening in the period, and estimate the force where the valve was open."""
+        rows = seen.sensed
+        # The previous reading, repeated: an idle cell has not changed since.
+        former = np.where(rows[1] > 0.0, rows[2], self.cell.actuator.rest_height)
         _, before = self.inner.measure(seen._replace(height=former), period - 1)
         _, after = self.inner.measure(seen, period)
-        commands, lag = own[3 + self.cell.lag.rows :], own[3 : 3 + self.cell.lag.rows]
+        commands, lag = rows[3 + self.cell.lag.rows :], rows[3 : 3 + self.cell.lag.rows]
         commands[:-1] = commands[1:]
         commands[-1] = seen.command
-        opening = apply_map(self.response, own[3:])
-        own[0] = self._estimate(opening[:-1], before, after, own[0])
+        opening = apply_map(self.response, rows[3:])
+        rows[0] = self._estimate(opening[:-1], before, after, rows[0])
         if lag.shape[0]:
             lag[:] = opening[-1]
             self.cell.lag.settle(lag)
-        own[1], own[2] = period + 1, seen.height
+        rows[1], rows[2] = period + 1, seen.height
 
     def _estimate(self, opening: Floats, before: Floats, after: Floats, last: Floats) -> Floats:
         """Return the forces, N, from openings (nodes, m[, b]) and the heights before and after, m."""

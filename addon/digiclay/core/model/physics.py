@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
@@ -33,18 +32,18 @@ class Cell:
 
     @cached_property
     def lag_rows(self) -> slice[int, int, None]:
-        """The rows of ``y`` that the valve lag owns."""
+        """Rows of ``y`` of the valve lag."""
         first = self.pulp_rows.stop
         return slice(first, first + self.lag.rows)
 
     @cached_property
     def pulp_rows(self) -> slice[int, int, None]:
-        """The rows of ``y`` that the relaxation owns."""
+        """Rows of ``y`` of the relaxation."""
         return slice(1, 1 + (self.touch.pulp.rows if self.touch else 0))
 
     @cached_property
     def rows(self) -> int:
-        """State rows a cell needs."""
+        """State rows per cell."""
         return self.pulp_rows.stop + self.lag.rows
 
 
@@ -52,15 +51,15 @@ class Cell:
 class Speeds:
     """Speeds of a pin without load behind a fully open valve, m/s."""
 
-    fall: Any
-    rise: Any
-    """Its velocity downwards, not above 0, and upwards, not below; a number or (b,)."""
+    fall: Floats | float
+    rise: Floats | float
+    """Its velocities downwards, at most 0, and upwards, at least 0; a number or (b,)."""
 
     def reach(self, height: Floats, under: Floats, time: Floats | float) -> tuple[Floats, Floats]:
-        """Return the lowest and the highest that pins can be after some time, (n, ..), m.
+        """Return the lowest and the highest possible heights of pins after a time, (n, ..), m.
 
-        A fingertip that pushes a pin leaves it where they part, and what it does not push goes no faster than
-        its valve lets it: no pin is lower than it was, or than the undersides (p, k, ..), m, by more.
+        A fingertip pushes a pin at most to its own underside, (p, k, ..), m, and a pin that is not pushed is
+        no faster than its valve permits.
         """
         lowest = height.copy()
         near = lowest[: under.shape[1]]
@@ -70,10 +69,10 @@ class Speeds:
 
 
 def find_speeds(cell: Cell) -> Speeds:
-    """Work out how fast a pin without load goes at most."""
-    wide = np.array([-1.0, 1.0])
-    ways = cell.flow.flow(wide, cell.supply.pressure(wide)) / cell.actuator.area
-    return Speeds(min(float(ways.min()), 0.0), max(float(ways.max()), 0.0))
+    """Return the largest speeds of a pin without load."""
+    openings = np.array([-1.0, 1.0])
+    speeds = cell.flow.flow(openings, cell.supply.pressure(openings)) / cell.actuator.area
+    return Speeds(min(float(speeds.min()), 0.0), max(float(speeds.max()), 0.0))
 
 
 def find_contact_force(cell: Cell, y: Floats, under: Floats) -> Floats:
@@ -97,7 +96,7 @@ def compute_rates(cell: Cell, y: Floats, under: Floats, command: Floats) -> Floa
         load = np.zeros(height.shape)
         load[:near] = cell.actuator.pressure(relax_force(cell.touch, tension, pulp[:, :near]))
         drop = drop - load
-    # Where no drop reaches the knee no flow is turbulent, and a third of the time is enough.
+    # If no drop reaches the knee, all flow is laminar, and a third of the time is enough.
     laminar = drop.size > 0 and -cell.flow.knee < drop.min() and drop.max() < cell.flow.knee
     conductance = cell.flow.laminar_conductance(opening) if laminar else cell.flow.conductance(opening, drop)
     change[0] = cell.actuator.rate(conductance * drop, height)

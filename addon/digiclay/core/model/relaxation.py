@@ -14,8 +14,8 @@ from ..base.quantity import Parameters, quantity
 class Relaxation(Parameters):
     """Reduced relaxation ``G(t) = (c0 + Σ c_i exp(-t/t_i)) / Σ c`` as filters ``dz_i/dt = (T - z_i)/t_i``.
 
-    The force is ``F = T - Σ ĉ_i z_i`` with ``ĉ_i = c_i / Σ c``: exactly the convolution of
-    equation 10, not an approximation to it.
+    The force is ``F = T - Σ ĉ_i z_i`` with ``ĉ_i = c_i / Σ c``, which is exactly the
+    convolution of equation 10.
     """
 
     times: tuple[float, ...] = quantity(
@@ -30,7 +30,7 @@ class Relaxation(Parameters):
     )
 
     def check(self) -> None:
-        """One weight more than times, and not all of them zero."""
+        """Refuse weights that are not one more than times, or all zero."""
         if len(self.weights) != len(self.times) + 1:
             rule = f"must have one value more than times, {len(self.times) + 1}"
             raise ParameterError("Relaxation", "weights", rule, str(len(self.weights)))
@@ -39,17 +39,17 @@ class Relaxation(Parameters):
 
     @property
     def rows(self) -> int:
-        """State rows a cell needs: one a filter."""
+        """State rows per cell: one per filter."""
         return len(self.times)
 
     @cached_property
     def rates(self) -> Floats:
-        """Relaxation rates ν_i, shape (k, 1), or (k, b) where runs differ, 1/s."""
+        """Relaxation rates ν_i, shape (k, 1), or (k, b) of differing runs, 1/s."""
         return 1.0 / per_row(np.stack(np.broadcast_arrays(*self.times)), 2)
 
     @cached_property
     def shares(self) -> Floats:
-        """Shares ĉ_i of the filters, shape (k,), or (k, b) where runs differ."""
+        """Shares ĉ_i of the filters, shape (k,), or (k, b) of differing runs."""
         weights = np.stack(np.broadcast_arrays(*self.weights))
         return np.asarray(weights[1:] / weights.sum(axis=0))
 
@@ -58,23 +58,23 @@ class Relaxation(Parameters):
         decay = np.exp(-np.asarray(time)[..., None] / np.array(self.times))
         return np.asarray(1.0 - self.shares.sum() + decay @ self.shares)
 
-    def relaxed(self, own: Floats) -> Floats:
+    def relaxed(self, filters: Floats) -> Floats:
         """Return the force lost to relaxation S = Σ ĉ_i z_i, N, shape (n[, b]), of filters z (k, n[, b])."""
-        relaxed: Floats = apply_map(self.shares[None], own)[0]
+        relaxed: Floats = apply_map(self.shares[None], filters)[0]
         return relaxed
 
-    def rate(self, own: Floats, tension: Floats) -> Floats:
+    def rate(self, filters: Floats, tension: Floats) -> Floats:
         """Return dz/dt = ν (T - z), N/s (equation 13), of filters z (k, n) under tensions T (n,), N."""
-        return self.rates * (tension - own)
+        return self.rates * (tension - filters)
 
     def mean_loss_map(self, step: float) -> tuple[Floats, float]:
         """Return map and share of a mean loss of force ``map . (z, T_0) + share T``, exact for linear T."""
         turns = self.rates[:, 0] * step
-        kept = -np.expm1(-turns) / turns
-        # Of a small number of turns the difference is rounding only; its series takes over there.
+        held = -np.expm1(-turns) / turns
+        # For small turns the difference is only rounding error, and its series is used.
         series = turns / 3.0 - turns * turns / 12.0
-        share = float(self.shares @ np.where(turns < 1e-3, series, 1.0 - 2.0 * (1.0 - kept) / turns))
-        return np.append(self.shares * kept, self.shares @ (1.0 - kept) - share), share
+        share = float(self.shares @ np.where(turns < 1e-3, series, 1.0 - 2.0 * (1.0 - held) / turns))
+        return np.append(self.shares * held, self.shares @ (1.0 - held) - share), share
 
     def propagator(self, step: float) -> Floats:
         """Return the map (k, k + 3) from (z; T at start, mean, at end) to new z; exact for linear T."""
@@ -83,6 +83,6 @@ class Relaxation(Parameters):
         bend = 1.0 - fresh * (1.0 / turns + 0.5)
         return np.hstack([np.diag(1.0 - fresh[:, 0]), -bend, fresh, bend])
 
-    def age(self, own: Floats, time: Floats) -> None:
-        """Let filters (k, n[, b]) decay without contact for so long, (n[, b]), s, in place; exact."""
-        own *= np.exp(-per_row(self.rates, own.ndim) * time)
+    def age(self, filters: Floats, time: Floats) -> None:
+        """Let filters (k, n[, b]) decay without contact for times (n[, b]), s, in place; exact."""
+        filters *= np.exp(-per_row(self.rates, filters.ndim) * time)

@@ -1,8 +1,8 @@
 """Sensor model: noise, quantization and delay of forces and heights.
 
-Each is a small part around another, so a scene puts together what it wants:
-``Delayed(Quantized(Noisy(PerfectSensors())))``, and `observer.ValveObserver` in between. A
-part without an effect is not put in.
+Each effect is a part around another one, which a scene combines:
+``Delayed(Quantized(Noisy(PerfectSensors())))``, with `observer.ValveObserver` in between. A
+part without an effect is left out.
 """
 
 import math
@@ -21,14 +21,14 @@ from .interfaces import Sensors
 
 Words = NDArray[np.uint64]
 
-#: Standard deviations from which on a reading is no noise: by chance one in 3.5 million is above.
+#: Standard deviations above which a reading is not noise: noise exceeds them once in 3.5 million readings.
 SURE = 5.0
 #: Finest step a reading can have: below it, rounding errors are larger than the step.
 FINEST = 1e-12
 #: Odd constants of the 64-bit mixer SplitMix64 (Steele, Lea and Flood 2014).
 WEYL, FIRST, SECOND = 0x9E3779B97F4A7C15, 0xBF58476D1CE4E5B9, 0x94D049BB133111EB
-#: Control periods whose noise is drawn at once: one set of cells serves for so many, less one; and most
-#: numbers that they may be.
+#: Control periods whose noise is drawn at once, one more than a set of active cells serves; and most numbers
+#: at once.
 AHEAD, MOST = 33, 200_000
 
 
@@ -63,21 +63,21 @@ class Sensing(Parameters):
 
     @property
     def force_floor(self) -> float:
-        """Force from which on a reading is no noise, N: rounding adds half a step; 0 without noise."""
+        """Force above which a reading is not noise, N: rounding adds half a step; 0 without noise."""
         return SURE * self.force_noise + 0.5 * self.force_step if self.force_noise else 0.0
 
     @property
     def height_floor(self) -> float:
-        """Distance from which on a height that is read is not the true one, m; 0 of perfect sensors."""
+        """Largest error of a height reading, m; 0 for perfect sensors."""
         return SURE * self.height_noise + 0.5 * self.height_step
 
     @property
     def motion_floor(self) -> float:
-        """Distance from which on the difference of two heights that are read is motion, m."""
+        """Difference of two height readings above which a pin has moved, m."""
         return SURE * math.sqrt(2.0) * self.height_noise + self.height_step
 
     def check(self) -> None:
-        """A step is worth rounding to; an observer leaves no force sensor to be noisy."""
+        """Refuse steps too small to round to, and force sensors beside an observer."""
         for name, unit in (("force_step", "N"), ("height_step", "m")):
             step = getattr(self, name)
             if 0.0 < step < FINEST:
@@ -90,10 +90,10 @@ class Sensing(Parameters):
 
 
 def draw_polar(seed: Any, period: Any, cells: NDArray[np.intp]) -> tuple[Floats, Floats]:
-    """Return a radius and an angle a cell, a pure function of the arguments.
+    """Return a radius and an angle per cell, a pure function of the arguments.
 
-    A counter is hashed instead of drawing from a generator: what a cell reads does not depend
-    on which others are read, nor on what was read before. The numbers are ([t,] m[, b]) for seeds (b,),
+    A hashed counter replaces a generator: the noise of a cell does not depend on other cells
+    or earlier readings. The numbers are ([t,] m[, b]) for seeds (b,),
     periods (t,) and cells (m[, b]). Radius times cosine and sine are two independent standard normal numbers
     (Box and Muller); none is farther from 0 than 8.6.
     """
@@ -106,7 +106,7 @@ def draw_polar(seed: Any, period: Any, cells: NDArray[np.intp]) -> tuple[Floats,
 
 
 def _mix(words: Words) -> Words:
-    """Scramble 64-bit words: any bit of one changes about half the bits of its result."""
+    """Scramble 64-bit words: each bit changes about half the bits of the result."""
     words = words + np.uint64(WEYL)
     for shift, factor in ((30, FIRST), (27, SECOND), (31, 1)):
         words ^= words >> np.uint64(shift)
@@ -115,7 +115,7 @@ def _mix(words: Words) -> Words:
 
 
 def _draw_uniform(counter: Words) -> Floats:
-    """Return numbers spread evenly in (0, 1), without both ends."""
+    """Return uniform numbers in (0, 1), without both ends."""
     uniform: Floats = ((_mix(counter) >> np.uint64(12)).astype(np.float64) + 0.5) * 2.0**-52
     return uniform
 
@@ -123,8 +123,8 @@ def _draw_uniform(counter: Words) -> Floats:
 class NoiseAhead:
     """Noise of the coming periods, drawn at once for the cells read last.
 
-    It depends on seed, a number or (b,), period and cell alone, so any leading part of the cells is served.
-    `deviations` are those of forces, N, and heights, m, numbers or (b,).
+    It depends only on seed, a number or (b,), period and cell, so that it holds for any first part of the
+    cells. `deviations` are those of forces, N, and heights, m, numbers or (b,).
     """
 
     def __init__(self, seed: Any, *deviations: Any) -> None:
@@ -133,11 +133,11 @@ class NoiseAhead:
         self._drawn: list[Floats | None] = []
 
     def draw(self, period: int, cells: NDArray[np.intp]) -> list[Floats | None]:
-        """Return the noise of forces, N, and heights, m, in a period, (m[, b]) each; None: there is none."""
+        """Return the noise of forces, N, and heights, m, in a period, (m[, b]) each; None: no noise."""
         count = len(cells)
         continued = bool(self._drawn) and cells.tobytes() == self._cells[:count].tobytes()
         if not (continued and self._first <= period < self._end):
-            # The leading part of the cells is read before all of them.
+            # The first part of the cells is read before all of them.
             self._cells = self._cells if continued else cells.copy()
             self._first, self._end = period, period + max(1, min(AHEAD, MOST // max(1, self._cells.size)))
             radius, angle = draw_polar(self._seed, np.arange(self._first, self._end), self._cells)
@@ -151,17 +151,17 @@ class NoiseAhead:
 
 @dataclass(frozen=True)
 class Stateless(Sensors):
-    """Sensors around others that remember nothing of their own."""
+    """Sensors around others, without state rows of their own."""
 
     inner: Sensors
 
     @property
     def rows(self) -> int:
-        """State rows a cell needs: those of the inner sensors."""
+        """State rows per cell: those of the inner sensors."""
         return self.inner.rows
 
     def note(self, seen: Measurement, period: int) -> None:
-        """Bring the rows of the inner sensors up to date."""
+        """Update the rows of the inner sensors."""
         self.inner.note(seen, period)
 
 
@@ -178,20 +178,18 @@ class Noisy(Stateless):
         """Return forces and heights with noise; a force may read below 0."""
         force, height = self.inner.measure(seen, period)
         of_force, of_height = self._ahead.draw(period, seen.cells)
-        return (
-            force if of_force is None else force + of_force,
-            height if of_height is None else height + of_height,
-        )
+        force = force if of_force is None else force + of_force
+        return force, height if of_height is None else height + of_height
 
     @cached_property
     def _ahead(self) -> NoiseAhead:
-        """Noise drawn ahead; keeping it changes no reading."""
+        """Noise drawn ahead, a cache that changes no reading."""
         return NoiseAhead(self.seed, self.force, self.height)
 
 
 @dataclass(frozen=True)
 class Quantized(Stateless):
-    """Readings in whole steps, the nearest one (halves: the even one); a step of 0 rounds nothing."""
+    """Readings rounded to the nearest step, halves to the even one; a step of 0 rounds nothing."""
 
     force: float
     height: float
@@ -213,38 +211,38 @@ def _round_to_step(values: Floats, step: Any) -> Floats:
 
 @dataclass(frozen=True)
 class Delayed(Sensors):
-    """Readings that arrive some whole control periods late; before the first arrives, those of the start.
+    """Readings that arrive whole control periods late; before the first arrives, those of the start.
 
-    A cell that takes no part is not read, and does not change: its readings of that time are
-    made up when they are asked for, so it matters to nobody which cells take part.
+    An idle cell is not read, and does not change: its readings of that time are computed when
+    they are needed, so that results do not depend on which cells are active.
     """
 
     inner: Sensors
     periods: int
-    """How late, at least 1."""
+    """Delay, at least 1."""
     rest: float
     """Height of every pin at the start, m."""
 
     @property
     def rows(self) -> int:
-        """State rows: periods read (0: none), force and height then, the readings on their way, the inner."""
+        """State rows: periods read (0: none), force and height then, delayed readings, the inner rows."""
         return 3 + 2 * (self.periods + 1) + self.inner.rows
 
     def measure(self, seen: Measurement, period: int) -> tuple[Floats, Floats]:
-        """Return the readings made `periods` ago."""
+        """Return the readings of `periods` ago."""
         force, height = self._read(seen, max(period - self.periods, 0))
         return force, height
 
     def note(self, seen: Measurement, period: int) -> None:
-        """Make up for the readings a cell has missed, and take new ones."""
-        own = seen.sensed
+        """Add the readings that cells have missed while idle, and the new ones."""
+        rows = seen.sensed
         for missed in range(max(period - self.periods, 0), period):
-            own[self._slot(missed)] = self._read(seen, missed)
+            rows[self._slot(missed)] = self._read(seen, missed)
         inner = self._show_inner(seen)
         self.inner.note(inner, period)
-        own[self._slot(period)] = self.inner.measure(inner, period)
-        own[0] = period + 1
-        own[1], own[2] = seen.force, seen.height
+        rows[self._slot(period)] = self.inner.measure(inner, period)
+        rows[0] = period + 1
+        rows[1], rows[2] = seen.force, seen.height
 
     def _show_inner(self, seen: Measurement) -> Measurement:
         """Return cells with the rows of the inner sensors."""
@@ -257,12 +255,12 @@ class Delayed(Sensors):
 
     def _read(self, seen: Measurement, period: int) -> Floats:
         """Return force and height read in a period, shape (2, m[, b])."""
-        own = seen.sensed
-        stored: Floats = own[self._slot(period)]
-        missed = own[0] <= period
+        rows = seen.sensed
+        stored: Floats = rows[self._slot(period)]
+        missed = rows[0] <= period
         if not missed.any():
             return stored
-        height = np.where(own[0] > 0.0, own[2], self.rest)
-        # A cell that takes no part has its valve shut and nothing on its way to it.
-        still = self._show_inner(seen)._replace(force=own[1], height=height, command=np.zeros_like(height))
+        height = np.where(rows[0] > 0.0, rows[2], self.rest)
+        # An idle cell has a shut valve and no queued command.
+        still = self._show_inner(seen)._replace(force=rows[1], height=height, command=np.zeros_like(height))
         return np.where(missed, self.inner.measure(still, period), stored)

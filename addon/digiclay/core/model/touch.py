@@ -21,7 +21,7 @@ from .fingertip import (
 )
 from .interfaces import Pulp
 
-#: Control periods whose undersides are worked out at a time, and most numbers that they may be.
+#: Control periods whose undersides are computed at a time, and most numbers of them.
 AHEAD, MOST = 32, 200_000
 
 
@@ -35,19 +35,19 @@ class Touch:
 
     @cached_property
     def constants(self) -> Constants:
-        """What `force` is made with: no force, and the share of it that a cell carries."""
+        """Constants of `relax_force`: no force, and a cell's share of it."""
         return Constants((0.0, self.contact.share))
 
 
 class Ahead:
-    """Undersides in coming periods, over the places asked for last: mostly those of the period before."""
+    """Cache of the undersides in coming periods, at the last positions, which mostly stay the same."""
 
     def __init__(self) -> None:
         self._places: Any = None
         self._first, self._unders = 0, np.empty((0, 0, 0))
 
     def find(self, index: int, places: Any, numbers: int, compute: Callable[[slice, Any], Floats]) -> Floats:
-        """Return those of a period, (p, k), m, of so many `numbers`; several are computed at a time."""
+        """Return the undersides of a period, (p, k), m; `numbers`: their count p k."""
         if places is not self._places or not self._first <= index < self._first + len(self._unders):
             count = max(1, min(AHEAD, MOST // max(1, numbers)))
             self._unders = compute(slice(index, index + count), places)
@@ -63,22 +63,21 @@ class FingerPath:
     first: int
     """The first of these periods."""
     forms: Floats
-    """(t, 2 p, 6[, b]): From `fingertip.compute_forms`. The last axis is 1 where all runs have one and the
-    same path."""
+    """(t, 2 p, 6[, b]): From `fingertip.compute_forms`. The last axis is 1 if all runs have the same path."""
     join: Floats
     """(t, 2, p, 1[, b])."""
     windows: Any
-    """(t, 6, b): One a period."""
+    """(t, 6, b): One per period."""
 
     def __post_init__(self) -> None:
         self._ahead = Ahead()
 
     def at(self, period: int) -> FingerPeriod:
-        """Return the path in one of the periods."""
+        """Return the path in a period."""
         return FingerPeriod(self, period - self.first, self.windows[period - self.first])
 
     def under(self, index: int, basis: Floats) -> Floats:
-        """Return the underside in the period of an index over places (6, k[, b]), shape (p, k[, b]), m."""
+        """Return the underside in the period of an index at positions (6, k[, b]), (p, k[, b]), m."""
         if basis.ndim == 3:
             forms, (least, root) = self.forms[index], self.join[index]
             rows = apply_map(forms[..., 0] if forms.shape[-1] == 1 else forms, basis)
@@ -86,7 +85,7 @@ class FingerPath:
         return self._ahead.find(index, basis, self.join.shape[2] * basis.shape[1], self.compute)
 
     def compute(self, several: slice, basis: Floats) -> Floats:
-        """Return the undersides in several periods over places (6, k), shape (t, p, k), m."""
+        """Return the undersides in several periods at positions (6, k), (t, p, k), m."""
         return compute_underside(self.forms[several], self.join[several], basis)
 
 
@@ -98,12 +97,12 @@ class FingerPeriod(NamedTuple):
     window: Window
 
     def under(self, basis: Floats) -> Floats:
-        """Return the underside at the period's p instants over places (6, k[, b]), shape (p, k[, b]), m."""
+        """Return the underside at the period's p instants at positions (6, k[, b]), (p, k[, b]), m."""
         return self.path.under(self.number, basis)
 
 
 def trace_finger(fingertip: Fingertip, poses: Floats, first: int = 0) -> FingerPath:
-    """Compute the path of a fingertip whose poses at the p instants of t periods are given, (t, p, 7)."""
+    """Return the path of a fingertip with poses (t, p, 7) at the p instants of t periods."""
     forms, join, windows = trace_periods(fingertip, poses)
     return FingerPath(first, forms, join, windows.tolist())
 
@@ -113,8 +112,8 @@ def trace_periods(fingertip: Fingertip, poses: Floats) -> tuple[Floats, Floats, 
     count, instants, _ = poses.shape
     outline = fingertip.outline(poses.reshape(-1, 7)).reshape(count, instants, -1)
     # Instant by instant: numpy's own reduction over so short an axis takes ten times as long.
-    places, (bases, tilts, bends) = outline[:, :, :2].swapaxes(0, 1), compute_reaches(outline).T
-    low, high = reduce(np.minimum, places), reduce(np.maximum, places)
+    centers, (bases, tilts, bends) = outline[:, :, :2].swapaxes(0, 1), compute_reaches(outline).T
+    low, high = reduce(np.minimum, centers), reduce(np.maximum, centers)
     windows = np.empty((count, 6))
     windows[:, :2] = 0.5 * (low + high)
     windows[:, 2] = np.hypot(*(0.5 * (high - low)).T)
@@ -124,7 +123,7 @@ def trace_periods(fingertip: Fingertip, poses: Floats) -> tuple[Floats, Floats, 
 
 
 def join_paths(paths: Sequence[FingerPath]) -> FingerPath:
-    """Return the path of a batch from those of its runs; from one alone when all have the same."""
+    """Return the path of a batch from those of its runs, or from a single one that all have."""
     parts = zip(*((path.forms, path.join, np.array(path.windows)) for path in paths), strict=True)
     return FingerPath(paths[0].first, *(np.stack(part, axis=-1) for part in parts))
 
@@ -143,44 +142,43 @@ def relax_force(touch: Touch, tension: Floats, filters: Floats) -> Floats:
     return tension
 
 
-#: Total force up to which the law and its relaxation were measured, N: Pawluk and Howe, Dynamic contact of
-#: the human fingerpad against a flat surface, J Biomech Eng 121(6), 605-611 (1999): 0 to 2 N.
+#: Largest total force at which the law and its relaxation were measured, N: Pawluk and Howe, Dynamic
+#: contact of the human fingerpad against a flat surface, J Biomech Eng 121(6), 605-611 (1999): 0 to 2 N.
 MOST_FORCE = 2.0
-#: Indentation up to which fingerpads were pressed in measurements, m: Gulati and Srinivasan, Human fingerpad
-#: under indentation I: static and dynamic force response (1995), 0.5 to 3 mm. Below lies the bone.
+#: Largest measured indentation of fingerpads, m: Gulati and Srinivasan, Human fingerpad under indentation I:
+#: static and dynamic force response (1995), 0.5 to 3 mm. The bone is below.
 MOST_INDENTATION = 3e-3
-#: Rows whose undersides are worked out at a time.
+#: Rows whose undersides are computed at a time.
 ROWS = 64
 
 
 def is_beyond(force: Any, indentation: Any) -> Any:
-    """Return whether the contact law does not hold at total forces, N, and indentations, m, of any shape."""
+    """Return whether total forces, N, or indentations, m, exceed the range of the contact law."""
     return (force > MOST_FORCE) | (indentation > MOST_INDENTATION)
 
 
 def find_indentations(fingertip: Fingertip, history: Mapping[str, Floats]) -> Floats:
-    """Return the largest indentation in each row of a history, (t,), m; rows that are shallow may have 0."""
+    """Return the largest indentation in each row of a history, (t,), m; shallow rows may have 0."""
     felt, height = history["force"] > 0.0, history["height"]
-    # No pin stands deeper than it is above the lowest point: few rows are left to look at.
+    # The indentation of a pin is at most its height above the lowest point: few rows remain.
     most = np.max(height, axis=1, where=felt, initial=-np.inf) - history["fingertip"][:, 2]
     deepest_first, deepest = np.argsort(-most, kind="stable"), np.zeros(len(most))
-    cells = np.flatnonzero(felt.any(axis=0))  # the only ones that are worked out: of a large bed they are few
+    cells = np.flatnonzero(felt.any(axis=0))  # few of a large bed
     x, y = np.asarray(history["position"], dtype=np.float64)[cells].T
     basis = np.array([np.ones_like(x), x, y, x * x, x * y, y * y])
     for start in range(0, len(most), ROWS):
         rows = deepest_first[start : start + ROWS]
         if most[rows[0]] <= min(deepest.max(), MOST_INDENTATION):
             break
-        under = compute_underside(
-            *compute_forms(fingertip.outline(np.asarray(history["fingertip"])[rows])), basis
-        )
+        outline = fingertip.outline(np.asarray(history["fingertip"])[rows])
+        under = compute_underside(*compute_forms(outline), basis)
         part = np.ix_(rows, cells)
         deepest[rows] = np.max(height[part] - under, axis=1, where=felt[part], initial=0.0)
     return deepest
 
 
 def describe_excess(force: float | None, indentation: float | None) -> str:
-    """Return the message on a total force, N, and indentation, m, beyond the law; None: not known; or ""."""
+    """Return the message on a total force, N, and indentation, m, beyond the law, or ""; None: unknown."""
     excess = []
     if force is not None and force > MOST_FORCE:
         excess.append(f"{force:.3g} N (fingers were measured up to {MOST_FORCE:g} N)")

@@ -14,9 +14,9 @@ from ..base.quantity import Parameters, quantity
 from ..base.spline import compute_inner_slopes
 from .fingertip import LEVEL
 
-#: Waypoints are no nearer to each other, s: speeds stay finite.
+#: Shortest time between waypoints, s, so that speeds are finite.
 SHORTEST = 1e-9
-#: The fingertip's path when a scene names none: one press in the middle of the bed, m above the rest height.
+#: Default path of the fingertip: one press in the middle of the bed, s, m above the rest height.
 PRESS = ((0.0, 6e-3), (0.5, -4e-3), (1.0, -4e-3), (1.5, 6e-3))
 
 
@@ -33,7 +33,7 @@ class Waypoint(Parameters):
     )
 
     def check(self) -> None:
-        """Three coordinates, four parts of a quaternion."""
+        """Refuse other than three coordinates and four parts of a quaternion."""
         for name, count in (("position", 3), ("orientation", 4)):
             value = getattr(self, name)
             if len(value) != count:
@@ -47,7 +47,7 @@ class Trajectory:
 
     *smooth* joins them by monotone cubics (Fritsch and Carlson): velocity is continuous,
     and no coordinate overshoots a waypoint. *linear* joins them by straight lines.
-    Before the first and after the last waypoint the fingertip stays. Raises ParameterError on values that are
+    Before the first and after the last waypoint the fingertip rests. Raises ParameterError on values that are
     not finite, times that do not increase, or a quaternion of length 0.
     """
 
@@ -56,7 +56,7 @@ class Trajectory:
     positions: Floats
     """(w, 3): m."""
     orientations: Floats
-    """(w, 4): Quaternions w, x, y, z, turned along the shortest arc; made unit ones."""
+    """(w, 4): Quaternions w, x, y, z, normalized; between them the shortest arc holds."""
     interpolation: str = "smooth"
 
     def __post_init__(self) -> None:
@@ -110,19 +110,19 @@ class Trajectory:
 
 @dataclass(frozen=True)
 class Path:
-    """The fingertip's path, as a scene gives it."""
+    """The fingertip's path in a scene."""
 
     interpolation: str = "smooth"
     waypoints: tuple[Waypoint, ...] = ()
 
     @classmethod
     def press(cls, rest_height: float) -> Path:
-        """Return the path of a scene that names none."""
+        """Return the default path."""
         points = (Waypoint(time=t, position=(0.0, 0.0, rest_height + z)) for t, z in PRESS)
         return cls(waypoints=tuple(points))
 
     def trajectory(self) -> Trajectory:
-        """Return the path as something that has poses, made once: many scenes may have the same path."""
+        """Return the path as a trajectory, made once: many scenes may share a path."""
         return self._trajectory
 
     @cached_property
@@ -153,18 +153,15 @@ def interpolate_poses(path: Floats, parts: Floats) -> Floats:
 
 
 def _interpolate_turns(start: Floats, end: Floats, part: Floats) -> Floats:
-    """Turn unit quaternions (.., 4) along the shortest arc, by the share `part` (.., 1) of the way."""
+    """Return unit quaternions (.., 4) at shares `part` (.., 1) of the shortest arc."""
     cosine = np.einsum("...j,...j->...", start, end)[..., None]
-    if (np.abs(cosine) >= 1.0).all():  # as mostly: no turn at all
+    if (np.abs(cosine) >= 1.0).all():  # no turn, the usual case
         return np.asarray(start / np.linalg.norm(start, axis=-1, keepdims=True))
     end = np.where(cosine < 0.0, -end, end)
     angle = np.arccos(np.clip(np.abs(cosine), 0.0, 1.0))
     sine = np.sin(angle)
     small = sine < 1e-9
     divisor = np.where(small, 1.0, sine)
-    turned = np.where(
-        small,
-        start,
-        (np.sin((1.0 - part) * angle) * start + np.sin(part * angle) * end) / divisor,
-    )
+    turned = (np.sin((1.0 - part) * angle) * start + np.sin(part * angle) * end) / divisor
+    turned = np.where(small, start, turned)
     return np.asarray(turned / np.linalg.norm(turned, axis=-1, keepdims=True))

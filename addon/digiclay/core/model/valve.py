@@ -82,7 +82,7 @@ class Orifice(Flow):
 
     @property
     def knee(self) -> float:
-        """Smallest drop at which some opening lets the flow turn turbulent, Pa (equation 6 at h* = 1)."""
+        """Smallest drop at which the flow becomes turbulent at some opening, Pa (equation 6 at h* = 1)."""
         return (self.turbulent / self.laminar) ** 2
 
     def laminar_conductance(self, opening: Any, out: Floats | None = None) -> Any:
@@ -92,7 +92,7 @@ class Orifice(Flow):
         return conductance
 
     def laminar_lift(self, opening: Any, out: Floats | None) -> Any:
-        """Return the size of openings to the power of the laminar branch, in the array `out` if given."""
+        """Return openings to the power of the laminar branch, in the array `out` if given."""
         if out is None:
             return opening * opening if self.power == 2 else abs(opening)
         return np.multiply(opening, opening, out) if self.power == 2 else np.abs(opening, out)
@@ -105,7 +105,7 @@ class Orifice(Flow):
 
 
 def make_orifice(valve: Valve, fluid: Fluid) -> Orifice:
-    """Work out the flow law from the conditions of equation 5, slope and knee, not from rounded constants."""
+    """Return the flow law from the slope and the knee of equation 5, not from rounded constants."""
     area_term = math.pi * valve.discharge_slope * valve.orifice_diameter**2
     laminar = area_term**2 / (8.0 * valve.knee_reynolds**2 * fluid.density * fluid.viscosity * valve.stroke)
     turbulent = area_term / 4.0 * math.sqrt(2.0 / fluid.density)
