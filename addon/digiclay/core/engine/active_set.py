@@ -1,9 +1,9 @@
 """Active set of cells, of a run or a batch: selection, and transfer of rows out of the bed and back.
 
 A cell is active if the fingertip may touch it, the controller commands it, or it still moves:
-its valve is not shut, a command is on its way, or a force acts on it. Other cells cannot
-change, so skipping them is exact, and a period's cost does not depend on the size of the bed.
-The set is kept for some periods, with a margin around it.
+its valve is not shut, a command is queued, or a force acts on it. Other cells cannot change, so
+that skipping them is exact, and the cost of a period does not depend on the size of the bed. A
+set serves for several periods, with a margin around it.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ from ..model.physics import Cell
 from ..model.touch import FingerPeriod
 from .state import ActiveSet, Rows, State
 
-#: A set is made anew, without the cells at rest by then, after so many control periods, or this time, s,
-#: if that is longer.
-KEPT, LASTS = 32, 0.16
+#: A set is renewed, without the cells at rest by then, after this number of control periods, or this time,
+#: s, if that is longer.
+LASTING_PERIODS, LASTING_TIME = 32, 0.16
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,31 +38,31 @@ class Selection:
     period: Any
     """Control period, s; a number or (b,)."""
     fastest: Any
-    """No pin rises faster, m/s; a number or (b,)."""
+    """Largest speed of a rising pin, m/s; a number or (b,)."""
 
     #: The margin of a set, in pitches.
     margin_pitches: ClassVar[float] = 1.0
     #: The larger and the smaller of two numbers, of a run or (b,) of a batch.
-    larger: ClassVar[Callable[..., Any]] = staticmethod(lambda one, other: max(one, float(other)))
+    larger: ClassVar[Callable[..., Any]] = staticmethod(lambda value, other: max(value, float(other)))
     smaller: ClassVar[Callable[..., Any]] = staticmethod(min)
 
     @cached_property
     def kept(self) -> int:
         """Control periods for which a set is kept."""
-        return max(KEPT, int(LASTS / np.max(self.period)))
+        return max(LASTING_PERIODS, int(LASTING_TIME / np.max(self.period)))
 
     @property
     def margin(self) -> float:
-        """How much farther than it must the set goes, so that it serves for some periods, m."""
+        """Extension of the set's discs, so that it serves for several periods, m."""
         return self.margin_pitches * self.grid.layout.pitch
 
     @property
     def rise(self) -> Any:
-        """How far pins may rise while a set serves, m: as far as they can; a number or (b,)."""
+        """Largest rise of pins while a set serves, m; a number or (b,)."""
         return self.kept * self.period * self.fastest
 
     def update(self, state: State, finger: FingerPeriod | None, control: Any) -> State:
-        """Return a state, in the same arrays, whose active cells are all that can change in a period."""
+        """Return a state, in the same arrays, whose active cells include all that can change in a period."""
         active, window, disc = state.active, finger and finger.window, self.join(control)
         if self.serves(active, state.period, window, disc):
             return state
@@ -76,7 +76,7 @@ class Selection:
         return control
 
     def serves(self, active: ActiveSet, period: int, window: Window | None, control: Discs | None) -> bool:
-        """Return whether a set has all cells that can change in a period."""
+        """Return whether a set includes all cells that can change in a period."""
         return (
             period < active.until
             and encloses(active.control, control)
@@ -92,7 +92,7 @@ class Selection:
         moving: Flags,
         top: Any,
     ) -> ActiveSet:
-        """Return the set that follows another one, without its rows; no pin top is higher than `top`, m."""
+        """Return the next set, without its rows; `top`: the highest pin top, m."""
         peak = self.smaller(top + self.rise, self.cell.actuator.stroke)
         reach = widen_disc(_reach(window, peak), self.margin)
         control = widen_disc(control, self.margin)
@@ -123,12 +123,12 @@ class Selection:
         state.aged.reshape(-1)[active.flat[: active.near]] = state.period * self.period
         moving: Flags = active.block[cell.lag_rows.start : rows.target].any(axis=0)
         moving |= active.block[rows.force] > 0.0
-        # A locked pin needs nobody.
+        # Locked pins do not move.
         moving |= (active.mode > Mode.HOLD) & (active.mode != Mode.LOCKED)
         return moving
 
     def take(self, state: State, chosen: ActiveSet) -> ActiveSet:
-        """Take chosen cells out of the bed of a state whose set is released, the pulp over them aged."""
+        """Return the chosen set with its rows of a state whose set is released; ages the pulp over them."""
         near, flat, touch = chosen.near, chosen.flat, self.cell.touch
         block = state.rows.reshape(self.rows.count, -1).take(flat, axis=1)
         block[self.rows.force, near:] = 0.0

@@ -17,9 +17,10 @@ from ..model.trajectory import Trajectory, sample_poses
 from .state import State, make_initial_state
 from .system import System
 
-#: Control periods whose finger poses are worked out at a time.
+#: Control periods whose finger poses are computed at a time.
 CHUNK = 256
-#: Numbers from which on numpy's library takes several threads for a dot product: more time than they save.
+#: Most numbers of a dot product for which numpy's library uses one thread: several cost more time than they
+#: save.
 THREADED = 10_000
 
 
@@ -43,7 +44,7 @@ def trace_fingers(system: System, poses: Floats) -> list[Any]:
 
 
 def step(system: System, state: State, poses: Floats) -> State:
-    """Simulate one control period of poses (p, f, 7) at `System.instants`; the state given stays as it is.
+    """Simulate one control period with poses (p, f, 7) at `System.instants`; `state` does not change.
 
     Raises DivergenceError when a height, force or opening is no longer finite.
     """
@@ -51,7 +52,7 @@ def step(system: System, state: State, poses: Floats) -> State:
 
 
 def advance(system: System, state: State, finger: FingerPeriod | None) -> State:
-    """Simulate one control period in the arrays of `state`; keep a `State.copy` to come back to it.
+    """Simulate one control period in the arrays of `state`; a `State.copy` preserves it.
 
     Raises DivergenceError when a height, force or opening is no longer finite.
     """
@@ -64,7 +65,7 @@ def advance(system: System, state: State, finger: FingerPeriod | None) -> State:
 
 
 def _are_finite(numbers: Floats) -> bool:
-    """Return whether numbers (k,) are finite for certain: NaN and infinity remain in a dot product."""
+    """Return whether numbers (k,) are certainly finite: NaN and infinity remain in a dot product."""
     if numbers.size <= THREADED:
         return math.isfinite(numbers.dot(numbers))
     parts = (numbers[start : start + THREADED] for start in range(0, numbers.size, THREADED))
@@ -86,10 +87,11 @@ def simulate_period(system: System, state: State, finger: FingerPeriod | None) -
 
 
 def repeat_period(system: System, state: State, finger: FingerPeriod | None, leader: State) -> State:
-    """Simulate the control period that a run, or a batch, has just done, under its commands.
+    """Simulate the last control period of a run, or a batch, again, under its commands.
 
-    The state before the period is used up; `leader` is the one after it, of the same bed and rows. The cells
-    active there are so here: the two differ by errors of the integration, and a set has room for far more.
+    `state`, before the period, is overwritten; `leader` is the run's state after it, of the same bed and
+    rows. Its active cells are used here too: the two differ only by errors of the integration, far less than
+    the margin of a set.
     """
     if state.active.cells is not leader.active.cells:
         system.selection.release(state)

@@ -1,8 +1,8 @@
 """State of a session at one instant, as a value.
 
-All that belongs to a cell is a row of one array, so that a part that is left out owns no
-row. The few cells that take part in a period are taken out of that array and kept out,
-side by side, for as long as the same cells take part.
+All quantities of a cell are rows of one array, so that an omitted part has no row. The few
+active cells are stored outside that array, contiguously, as long as the active set is the
+same.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ class Rows:
     """Meaning of the rows of a cell's state.
 
     The first `physics` rows (height first, m) are the continuous state of `physics.Cell`;
-    then come the commands on their way to the valve, oldest first; the height a cell is
-    commanded to, m; the force on it at the end of the last period, N; what the
-    controller and the sensors remember of each cell; and the forces of several fingers, N.
+    then come the queued commands, oldest first; the commanded height, m; the force at the end
+    of the last period, N; the rows of the controller and the sensors; and the forces of several
+    fingers, N.
     """
 
     physics: int
@@ -39,12 +39,12 @@ class Rows:
 
     @cached_property
     def driven(self) -> slice:
-        """Rows a stepper works on: the physics and the commands on their way."""
+        """Rows of a stepper: the physics and the queued commands."""
         return slice(0, self.physics + self.queue)
 
     @cached_property
     def commands(self) -> slice:
-        """Rows of the commands on their way."""
+        """Rows of the queued commands."""
         return slice(self.physics, self.physics + self.queue)
 
     @cached_property
@@ -69,17 +69,17 @@ class Rows:
 
     @cached_property
     def controlled(self) -> slice:
-        """Rows the controller owns."""
+        """Rows of the controller."""
         return slice(self.force + 1, self.force + 1 + self.control)
 
     @cached_property
     def sensed(self) -> slice:
-        """Rows the sensors own."""
+        """Rows of the sensors."""
         return slice(self.force + 1 + self.control, self.count - self.fingers)
 
     @cached_property
     def pressing(self) -> slice:
-        """Rows of the forces of several fingers; of a single one it is the force."""
+        """Rows of the forces of several fingers; a single one has only the force."""
         return slice(self.count - self.fingers, self.count)
 
 
@@ -88,12 +88,12 @@ class ActiveSet:
     """Active cells, with their rows outside the bed's array: m of one run, or m of each of b runs."""
 
     rows: Rows
-    """Which row of the block holds what."""
+    """Meaning of the rows of the block."""
     cells: Cells
-    """(m,) or (m, b): Numbers in their own beds: first those the fingertip may touch, then the others that
+    """(m,) or (m, b): Numbers in their beds: first those that the fingertip may touch, then the others that
     move or are controlled."""
     near: int
-    """Number k of those the fingertip may touch."""
+    """Number k of cells that the fingertip may touch."""
     block: Floats
     """(r, m) or (r, m, b): Their rows, see `Rows`."""
     mode: NDArray[np.int8]
@@ -102,30 +102,30 @@ class ActiveSet:
     """(6, m) or (6, m, b): Rows 1, x, y, x², x y, y²: any quadratic form of the position is one product."""
     reach: Discs | None
     control: Discs | None
-    """Discs of which every cell is in, the fingertip's and the controller's: center x, y, radius, m; arrays
-    (b,) of b runs."""
+    """Discs whose cells are all included, the fingertip's and the controller's: center x, y, radius, m;
+    arrays (b,) of b runs."""
     peak: Any
-    """No pin top in the fingertip's part is higher while this set is in use, m; a number or (b,)."""
+    """Bound of the pin tops near the fingertip while this set serves, m; a number or (b,)."""
     until: int
-    """Control period by which the set is to be made anew."""
+    """Control period by which the set is to be renewed."""
     own: tuple[ActiveSet, ...] = ()
-    """In a batch whose runs have the sets they have alone: these, of which block, modes and basis are not
-    looked at. Their cells are the first of each run's; others make up the number."""
+    """In a batch whose runs keep the sets they have alone: these sets, without block, modes and basis. Their
+    cells are the first of each run; others fill the columns."""
 
-    # Parts of the block, all of them views. Each is made once: a set lives for many periods.
+    # Parts of the block, all of them views, made once, since a set serves for many periods.
 
     @cached_property
     def all(self) -> Measurement:
         """All cells."""
-        return self._part(len(self.cells), [len(one.cells) for one in self.own])
+        return self._part(len(self.cells), [len(run.cells) for run in self.own])
 
     @cached_property
     def touched(self) -> Measurement:
-        """The cells the fingertip may touch."""
-        return self._part(self.near, [one.near for one in self.own])
+        """The cells that the fingertip may touch."""
+        return self._part(self.near, [run.near for run in self.own])
 
     def _part(self, count: int, present: list[int]) -> Measurement:
-        """Return the rows of the first `count` cells; the first `present` of them are the runs' own."""
+        """Return the rows of the first `count` cells, of which the first `present` are those of the runs."""
         rows, block = self.rows, self.block[:, :count]
         return Measurement(
             self.quadratic_basis[:, :count],
@@ -143,7 +143,7 @@ class ActiveSet:
 
     @cached_property
     def driven(self) -> Floats:
-        """What a stepper works on."""
+        """The rows of a stepper."""
         return self.block[self.rows.driven]
 
     @cached_property
@@ -153,17 +153,17 @@ class ActiveSet:
 
     @cached_property
     def queue(self) -> tuple[Floats, ...]:
-        """The commands on their way, oldest first."""
+        """The queued commands, oldest first."""
         return tuple(self.block[self.rows.commands])
 
     def queue_commands(self, newest: Floats) -> None:
-        """Put valve commands (m,) or (m, b), 1, behind those on their way, in place."""
+        """Queue valve commands (m,) or (m, b), 1, in place."""
         for older, newer in pairwise(self.queue):
             older[:] = newer
         self.queue[-1][:] = newest
 
     def follow(self, orders: Commands) -> None:
-        """Take over targets, modes and valve commands, in place."""
+        """Set targets, modes and valve commands, in place."""
         self.all.target[:] = orders.target
         self.all.mode[:] = orders.mode
         self.queue_commands(orders.command)
@@ -186,16 +186,16 @@ class State(NamedTuple):
     """State of a session, or of b sessions, at the start of a control period."""
 
     period: int
-    """Number of control periods done."""
+    """Number of control periods so far."""
     rows: Floats
     """(r, n) or (r, n, b): See `Rows`; out of date for the cells in `active`: read it with `row`."""
     modes: NDArray[np.int8]
     """(n,) or (n, b): Control modes; out of date for the cells in `active`: read them with `mode`."""
     aged: Floats
-    """(n,) or (n, b): Time up to which a cell's relaxation has been worked out, s: the pulp over cells out of
-    reach goes on relaxing, and is aged exactly when it is needed again."""
+    """(n,) or (n, b): Time up to which a cell's relaxation is computed, s: the pulp over cells out of reach
+    relaxes further, and is aged exactly when it is needed again."""
     peak: Any
-    """No pin top outside `active` is higher than this, m; a number or (b,)."""
+    """Bound of the pin tops outside `active`, m; a number or (b,)."""
     active: ActiveSet
     memory: Any
     """The controller's memory."""
@@ -205,7 +205,7 @@ class State(NamedTuple):
         return State(self.period + 1, self.rows, self.modes, self.aged, self.peak, self.active, memory)
 
     def row(self, index: int) -> Floats:
-        """Return one row of all cells, shape (n,) or (n, b), as a new array; `Rows` names them."""
+        """Return a row of all cells, (n,) or (n, b), as a new array; see `Rows`."""
         values: Floats = self.rows[index].copy()
         values.reshape(-1)[self.active.flat] = self.active.block[index]
         return values
@@ -213,8 +213,8 @@ class State(NamedTuple):
     def finger_forces(self) -> Floats:
         """Return the total force of each finger, (f,), N."""
         rows = self.active.rows
-        own = slice(rows.force, rows.force + 1) if not rows.fingers else rows.pressing
-        forces: Floats = self.active.block[own].sum(axis=1)
+        pressing = rows.pressing if rows.fingers else slice(rows.force, rows.force + 1)
+        forces: Floats = self.active.block[pressing].sum(axis=1)
         return forces
 
     def mode(self) -> NDArray[np.int8]:
@@ -224,7 +224,7 @@ class State(NamedTuple):
         return values
 
     def copy(self) -> State:
-        """Return a state that shares no array with this one that a step would change."""
+        """Return a state that shares with this one no array that a step changes."""
         active = replace(self.active, block=self.active.block.copy(), mode=self.active.mode.copy())
         return self._replace(
             rows=self.rows.copy(), modes=self.modes.copy(), aged=self.aged.copy(), active=active

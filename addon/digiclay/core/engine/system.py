@@ -28,23 +28,23 @@ class System:
     controller: Controller
     stepper: Stepper
     plan: Any
-    """What the stepper works out once for all periods."""
+    """The stepper's constants of all periods."""
     period: Any
     """Control period, s; a number or (b,)."""
     fastest: Any
-    """No pin rises faster, m/s; a number or (b,)."""
+    """Largest speed of a rising pin, m/s; a number or (b,)."""
     selection: Selection
     """Of the active cells."""
     instants: Floats
     """(p,): Times into the period at which the fingertip's pose is needed, first 0, last `period`, s."""
     rows: Rows
     by_set: bool
-    """Whether what becomes of a cell depends on which others are active: in a batch each run then keeps the
-    active set it has alone."""
+    """Whether the result of a cell depends on the other active cells: in a batch each run then keeps the
+    active set that it has alone."""
     latency: float
-    """From a valve's command to what is read of it: dead time, lag, and the delay of the sensors, s."""
+    """Time from a valve's command to the reading of its effect, s: dead time, lag, sensors' delay."""
     height_floor: float
-    """Distance from which on a height that is read is not the true one, m."""
+    """Largest error of a height reading, m."""
 
     @property
     def fingers(self) -> int:
@@ -63,14 +63,14 @@ class System:
         active.touched.force[:] = movement(under)
 
     def prepare(self, active: ActiveSet) -> Movement:
-        """Prepare to move active cells as often as their set serves."""
+        """Return the movement of active cells for as long as their set serves."""
         return self.stepper.prepare(self.plan, active.driven, active.near)
 
 
 def make_segments(
     stepper: Stepper, cut: float, period: float, count: int
 ) -> tuple[tuple[Segment, ...], Floats]:
-    """Return a period's steps, `count` of equal length and cut at a time, s, and its instants (p,), s."""
+    """Return a period's steps, `count` equal ones, cut at a time, s, and its instants (p,), s."""
     times = {round(i * period / count, 15) for i in range(count + 1)}
     if cut:
         times = {t for t in times if abs(t - cut) > 1e-9 * period} | {cut}

@@ -40,7 +40,7 @@ class Measurement(NamedTuple):
     discs: Discs | None = None
     """With several fingers, x, y and radius, m, (f,) each, of the discs of their active cells."""
     pressing: Floats | None = None
-    """(f, m): With several fingers, the force of each, N, which only names new fingers; see `pin_division`."""
+    """(f, m): With several fingers, the force of each, N; it only names new fingers, see `pin_division`."""
 
 
 class Commands(NamedTuple):

@@ -1,9 +1,9 @@
 """Adaptive stepper: sub-steps chosen cell by cell within a height tolerance.
 
-Each control period is done with whole steps and with half steps. Where the two differ by
-more than a cell may add to its error, that cell alone is done again with quarter steps, and
-so on. Under the fingertip what is kept is the extrapolation of the two finest, whose error is
-smaller still.
+Each control period is integrated with whole steps and with half steps. A cell in which the two
+differ by more than its share of the tolerance is integrated again with quarter steps, and so
+on. Under the fingertip the result is the extrapolation of the two finest levels, whose error is
+smaller.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ from ..model.physics import Cell, Speeds, find_contact_force, find_speeds
 from .bernoulli import BernoulliExponential, BernoulliPlan
 from .richardson import bound
 
-#: A block to work in, the map to the fingertip's underside at the instants of a level's steps, and what moves
-#: the block on.
+#: A working block, the map to the fingertip's underside at the instants of a level's steps, and the movement
+#: of the block.
 Bound = tuple[Floats, Floats, Movement]
 
-#: Steps are halved at most so often.
+#: Most halvings of a step.
 FINEST = 7
-#: Share of the tolerance that a control period may add to a cell under the fingertip, where errors
-#: die out within some periods, and to any other, where they add up over the session.
+#: Share of the tolerance per control period: of a cell under the fingertip, where errors decay
+#: within a few periods, and of any other, where they add up over the session.
 PRESSED, FREE = 0.1, 0.001
 
 
@@ -42,8 +42,8 @@ class AdaptivePlan:
     of a level's steps: exact at the instants, by parabolas between them."""
     allowed: float
     allowed_tension: float
-    """Difference between two levels that the whole run may let pass, of heights, m; and of the pulp's
-    filters, N: what so much height makes at first touch, where the pulp is softest."""
+    """Difference between two levels that is allowed over the whole run: of heights, m, and of the pulp's
+    filters, N, from that of heights by the stiffness at first touch, where the pulp is softest."""
     speeds: Speeds
     period: float
     """s."""
@@ -62,7 +62,7 @@ class Adaptive:
     bridges = False
 
     def plan(self, cell: Cell, queue: Queue, segments: tuple[Segment, ...]) -> AdaptivePlan:
-        """Work out once what all periods share."""
+        """Compute once what all periods share."""
         closed_form = BernoulliExponential()
         count = segments[-1].nodes[-1] + 1
         levels, between = [], []
@@ -79,14 +79,14 @@ class Adaptive:
 
     def prepare(self, plan: AdaptivePlan, rows: Floats, near: int) -> Movement:
         """Prepare to move a block of cells; see `interfaces.Stepper`."""
-        # Every period is done at these two levels, by all cells.
+        # All cells are integrated at these two levels in every period.
         coarse, fine = (_prepare(plan, level, rows.shape, near) for level in (0, 1))
         return partial(self._advance, plan, rows, coarse, fine)
 
     def _advance(
         self, plan: AdaptivePlan, rows: Floats, whole: Bound, halves: Bound, under: Floats
     ) -> Floats:
-        """Move a block of cells on by one control period, in place; see `interfaces.Movement`."""
+        """Move a block of cells by one control period, in place; see `interfaces.Movement`."""
         cell, k = plan.levels[0].cell, under.shape[1]
         start, share = rows.copy(), np.full(rows.shape[1], FREE)
         share[:k][start[0, :k] > under.min(axis=0)] = PRESSED
@@ -97,13 +97,13 @@ class Adaptive:
             if level > 1:
                 halves = _prepare(plan, level, (len(rows), open_cells.size), near.size)
             fine = _advance_copy(halves, start[:, open_cells], under[:, near])
-            # Extrapolation holds where the error is of second order; a free cell's is of fourth.
+            # Extrapolation is for errors of second order; that of a free cell is of fourth.
             gain = (fine[: cell.rows] - coarse[: cell.rows]) / 3.0
             rows[: cell.rows, open_cells] = fine[: cell.rows] + gain * (share[open_cells] == PRESSED)
             off = np.abs(fine - coarse)
             wide = off[0] > plan.allowed * share[open_cells]
             wide |= (off[cell.pulp_rows] > plan.allowed_tension * PRESSED).any(axis=0)
-            # Where a flow turns turbulent within a step, or a load is met, two levels may agree by accident.
+            # If a flow becomes turbulent or contact begins within a step, two levels may agree by accident.
             wide |= level < 2 and not plan.levels[0].laminar
             if not any_true(wide):
                 break
@@ -113,13 +113,13 @@ class Adaptive:
 
 
 def _prepare(plan: AdaptivePlan, level: int, shape: tuple[int, ...], near: int) -> Bound:
-    """Return what moves a block of some shape with the steps of a level."""
+    """Return the working block of a shape, and its movement with the steps of a level."""
     block = np.empty(shape)
     return block, plan.between[level], BernoulliExponential().prepare(plan.levels[level], block, near)
 
 
 def _advance_copy(bound: Bound, start: Floats, under: Floats) -> Floats:
-    """Return rows moved on by one control period, in the arrays of `bound`."""
+    """Return rows moved by one control period, in the arrays of `bound`."""
     block, between, advance = bound
     block[:] = start
     advance(np.dot(between, under))
@@ -127,7 +127,7 @@ def _advance_copy(bound: Bound, start: Floats, under: Floats) -> Floats:
 
 
 def _divided(segments: tuple[Segment, ...], parts: int, count: int) -> tuple[tuple[Segment, ...], Floats]:
-    """Cut segments into equal parts; return them, and the map from instants to their ends and middles."""
+    """Return segments cut into equal parts, and the map from instants to their ends and middles."""
     cut: list[Segment] = []
     rows: list[Floats] = []
     for segment in segments:

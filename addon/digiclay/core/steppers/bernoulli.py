@@ -1,12 +1,12 @@
 """Closed-form stepper: exact for an exponential spring behind a linear flow resistance.
 
-The valve's opening is known in closed form all through a period. Over a physics step its
+The valve's opening is known in closed form for a whole period. Over a physics step its
 conductance, the force lost to relaxation and the fingertip's speed are frozen at their means, and
-what remains is solved exactly (`closed_form`). The step is therefore stable at any length and
-stiffness, without iteration, and second order. What the frozen speeds leave out most of, that
-free pin and finger go bent paths, is put back by its mean, the chord deviation. A valve that changes
-reservoir within a step needs no care (conductance and drive are averaged at Gauss points of the
-exact opening), and a cell that meets or leaves the fingertip does so at the exact instant.
+the remaining equation is solved exactly (`closed_form`). The step is therefore stable at any length
+and stiffness, without iteration, and of second order. The largest error of frozen speeds, that the
+paths of a free pin and the finger are curved, is corrected by its mean, the chord deviation. A valve
+that changes reservoir within a step is no special case (conductance and drive are averaged at Gauss
+points of the exact opening), and contact with a cell begins and ends at the exact instant.
 """
 
 from __future__ import annotations
@@ -33,13 +33,13 @@ def _legendre(count: int) -> tuple[tuple[float, float], ...]:
     return tuple(zip((0.5 + 0.5 * nodes).tolist(), (0.5 * weights).tolist(), strict=True))
 
 
-#: Gauss points, nodes and weights, for a piece that is at most this share of its step: within a step a valve
-#: may go all its way, within a short piece it goes less of it.
+#: Gauss points, nodes and weights, for a piece of at most this share of its step: a valve may open fully
+#: within a step, and only in part within a short piece.
 POINTS = ((0.3, _legendre(2)), (0.6, _legendre(3)), (1.0, _legendre(4)))
 
-#: Largest chord deviation, in 1/m, whose step may be taken for a straight one that lies higher by so much.
-#: Out of touch at the start, in the middle and at the end it then leaves no tension on average, as it should:
-#: that comes out as at most exp(b) (1 - exp(-3 b)) / (3 b) - 1 of a deviation b, above 0 from 1.54 on.
+#: Largest chord deviation, in 1/m, at which a step is replaced by a straight one that is higher by it. A
+#: step without contact at its start, middle and end then has no mean tension, as it should: for a deviation
+#: b the mean is at most exp(b) (1 - exp(-3 b)) / (3 b) - 1, which is above 0 from b = 1.54 on.
 LARGEST_DEVIATION = 1.5
 
 
@@ -53,41 +53,41 @@ class BernoulliPlan:
     response: Floats
     """(g + 1, r): From opening and queued commands to the openings at all g Gauss points, and at the end."""
     moves: Floats
-    """(4 s, 2 g): From conductances at the Gauss points, and the same with the signs of the openings, to what
-    each step has: free rise, m; the same and its chord deviation, in 1/m; decay, see `closed_form`."""
+    """(4 s, 2 g): From conductances at the Gauss points, and the same with the signs of the openings, to the
+    free rise of each step, m; the same and its chord deviation, in 1/m; its decay, see `closed_form`."""
     path: Floats
-    """(3 s + 1, p): From the fingertip's underside at the period's instants to what each step has, in 1/m:
-    rise and its chord deviation; underside at the start, and at the end of the last."""
+    """(3 s + 1, p): From the fingertip's underside at the period's instants to its rise in each step and the
+    chord deviation of that, in 1/m; then the underside at the start of each, and at the end of the last."""
     loaded: Floats
-    """(1 + 3 s, 2 g + p + 1): Both together: from conductances, underside and a row of ones to the exponent
-    less m H at the start, with its sign changed; then what each step has: slip, chord deviation and decay."""
+    """(1 + 3 s, 2 g + p + 1): Both together: from conductances, underside and a row of ones to m H less the
+    exponent at the start; then for each step slip, chord deviation and decay."""
     nodes: tuple[slice, ...]
     """The Gauss points of each step."""
     weights: Floats
     """(g,): Their weights, s."""
     mean_loss: tuple[Floats, ...]
-    """(2, r + 3): The relaxation's maps, one a step: from filters, N, force (which does not count), ones, and
-    tension, to the tension at which the pulp begins to push, and to one more."""
+    """(2, r + 3): Maps of the relaxation, one per step: from filters, N, force (with weight 0), ones, and
+    tension, to the tension at which the pulp begins to push, and to that plus one."""
     propagator: tuple[Floats, ...]
-    """(r + 1, r + 5): From these, and the tension on average and at the end, to the filters and the force at
-    its end, N."""
+    """(r + 1, r + 5): From these, and the mean and the final tension, to the filters and the force at its
+    end, N."""
     shares: tuple[float, ...]
-    """Share of the tension that does push, one a step: the rest is lost within it."""
+    """Share of the tension that pushes, one per step: the rest is lost to relaxation within it."""
     laminar: bool
-    """No valve without load is turbulent."""
+    """Whether the flow of a valve without load is always laminar."""
     numbers: tuple[float, ...]
     """The contact's m, 1/m; m x0; 1/m, m; the largest exponent; 0, 1, 1/2 and `TINY`."""
     limits: Floats
-    """(5,): `closed_form.solve_pressed` holds below all of them: the exponent at the start of a step, at its
-    end and with the chord deviation, where every flow is laminar; the growth, where nothing overflows and
-    what does not push moves no pin; and the chord deviation, see `LARGEST_DEVIATION`."""
+    """(5,): Limits of `closed_form.solve_pressed`: of the exponent at the start of a step, at its end and
+    with the chord deviation, so that every flow is laminar; of the growth, so that nothing overflows and a
+    finger that does not push moves no pin; and of the chord deviation, see `LARGEST_DEVIATION`."""
     to_load: float
-    """Pressure that a unit of tension makes, Pa."""
+    """Pressure per unit of tension, Pa."""
 
 
 def _hard(cell: Cell, to_load: float, steepest: float) -> float:
-    """Return the exponent from which on a flow may be turbulent or an exponential overflow."""
-    # How far the load may drive up the drop before some flow could turn turbulent.
+    """Return the exponent above which a flow may be turbulent or an exponential overflow."""
+    # Pressure that the load may add to the drop before some flow could become turbulent.
     spare = cell.flow.knee - cell.supply.largest
     if spare <= 0.0:
         return -math.inf
@@ -130,10 +130,10 @@ def _path(segments: tuple[Segment, ...]) -> Floats:
 
 
 def _gauss_points(queue: Queue, segments: tuple[Segment, ...]) -> tuple[Floats, Floats, tuple[slice, ...]]:
-    """Return Gauss points of all steps: times and weights, s, and which are whose.
+    """Return Gauss points of all steps: times and weights, s, and the slice of each step.
 
-    Where the valve goes over to the next command its opening has a kink: a step that holds one
-    takes its points on either side of it.
+    The opening has a kink where the valve changes to the next command: a step with a kink has
+    points on both sides of it.
     """
     times: list[float] = []
     weights: list[float] = []
@@ -156,7 +156,8 @@ def _mean_loss(pulp: Pulp, step: float, unit: float) -> Floats:
     loss[:-1] /= unit
     loss /= 1.0 - share
     both = np.tile([*loss[:-1], 0.0, 0.0, loss[-1]], (2, 1))
-    # A pulp that touches as a step begins, by the clock or a lattice, comes to touch in it.
+    # A pulp that touches exactly at the start of a step, by the clock or the lattice, makes contact within
+    # it.
     both[:, -2] = TIE, 1.0
     return both
 
@@ -180,7 +181,7 @@ class BernoulliExponential(Alike):
     bridges = True
 
     def plan(self, cell: Cell, queue: Queue, segments: tuple[Segment, ...]) -> BernoulliPlan:
-        """Work out once what all periods share."""
+        """Compute once what all periods share."""
         times, weights, nodes = _gauss_points(queue, segments)
         end = segments[-1].start + segments[-1].length
         pulp, contact = (cell.touch.pulp, cell.touch.contact) if cell.touch else (Unrelaxed(), Contact())
@@ -190,9 +191,9 @@ class BernoulliExponential(Alike):
         shares = tuple(1.0 - pulp.mean_loss_map(part.length)[1] for part in segments)
         steps, deviations = np.zeros((2, len(nodes), len(times)))
         for s, part in enumerate(segments):
-            own = nodes[s]
-            steps[s, own] = weights[own] / cell.actuator.area
-            deviations[s, own] = steps[s, own] * (0.5 - (times[own] - part.start) / part.length)
+            points = nodes[s]
+            steps[s, points] = weights[points] / cell.actuator.area
+            deviations[s, points] = steps[s, points] * (0.5 - (times[points] - part.start) / part.length)
         widest = float(cell.flow.laminar_conductance(1.0))
         hard = _hard(cell, to_load, to_decay * widest * float(steps.sum(axis=1).max()))
         moves = _moves(supply, steps, m * deviations, to_decay * np.array(shares)[:, None] * steps, m)
@@ -221,11 +222,11 @@ class BernoulliExponential(Alike):
 
 
 class StepWorkspace:
-    """A block of cells, prepared to be moved period by period: its rows, and the arrays to work in.
+    """Movement of a block of cells, period by period: its rows, and working arrays.
 
-    The cells are those of one run, (n,), or of b runs, (n, b), and then the plan's numbers and maps may
-    be each run's own. What is in the arrays before a period does not count. Linear maps are bound to
-    the arrays they lead from and to. See `interfaces.Stepper.prepare`; k is short for `near` here.
+    The cells are those of one run, (n,), or of b runs, (n, b), with plans whose numbers and maps may
+    differ from run to run. A period overwrites the arrays. Linear maps are bound to the arrays of
+    their arguments and results. See `interfaces.Stepper.prepare`; k is short for `near` here.
     """
 
     def __init__(self, plan: BernoulliPlan, rows: Floats, near: int) -> None:
@@ -241,19 +242,19 @@ class StepWorkspace:
         openings = empty(len(plan.response), every)
         self.opening, self.opening_after = openings[:gauss], openings[len(openings) - len(self.lag) :]
         self.open_valves = prepare_map(plan.response, rows[cell.lag_rows.start :], openings)
-        # The valves' conductances, the same with the signs of the openings, underside, and ones.
+        # Conductances of the valves, the same with the signs of the openings, underside, and ones.
         inputs = empty(2 * gauss + instants + 1, every)
         inputs[-1] = 1.0
         self.size, self.signed = inputs[:gauss], inputs[gauss : 2 * gauss]
         self.under = inputs[2 * gauss : -1, :k]
-        # What the maps make of them: see `BernoulliPlan.moves`, of which the first rows, and `loaded`.
+        # Results of the maps: the first rows of `BernoulliPlan.moves`, and `loaded`.
         self.free, loaded = empty(steps, every), empty(len(plan.loaded), touched)
         self.rise_freely = prepare_map(plan.moves[:steps], inputs[: 2 * gauss], self.free)
         self.meet_finger = prepare_map(plan.loaded, inputs[:, :k], loaded)
         self.start = loaded[0]
         begins = empty(2, touched)
         self.lost, self.relaxed = begins
-        # What `BernoulliPlan.mean_loss` and `propagator` are maps of.
+        # Arguments of the maps `BernoulliPlan.mean_loss` and `propagator`.
         work = empty(len(self.pulp) + 5, touched)
         work[-5], work[-4] = 0.0, 1.0
         self.filters: Floats = work[:-5]
@@ -271,7 +272,7 @@ class StepWorkspace:
             for s, rise in enumerate(self.free)
         )
         self.constants, self.none = Constants(plan.numbers)[touched], np.zeros_like(self.moved)
-        # What `pressed` is not for from the limits on.
+        # Quantities that `solve_pressed` requires to be below the limits.
         self.guarded, self.limits = empty(5, touched), empty(5, touched)
         self.limits[:] = per_row(plan.limits, rows.ndim)
         self.exponent, self.end, self.bent, self.growth, self.deviation = self.guarded
@@ -296,7 +297,7 @@ class StepWorkspace:
         return self.force
 
     def _conduct(self) -> None:
-        """Work out the conductances of the valves without load; the sign picks the reservoir."""
+        """Compute the conductances of the valves without load; the sign selects the reservoir."""
         cell, opening, size = self.plan.cell, self.opening, self.size
         if self.plan.laminar:
             cell.flow.laminar_conductance(opening, size)
@@ -305,7 +306,7 @@ class StepWorkspace:
         np.copysign(size, opening, self.signed)
 
     def _press(self) -> None:
-        """Move the block on step by step, its first k cells under the fingertip, and their pulp with them."""
+        """Move the block step by step, with the pulp over its first k cells, those under the fingertip."""
         height, near = self.height, self.near
         first, mean, last, lost, relaxed = self.first, self.mean, self.last, self.lost, self.relaxed
         m, offset, per_m, most, zero, one, half, tiny = self.constants
@@ -356,25 +357,25 @@ class StepWorkspace:
             np.minimum(height, highest, out=height)
             stopped = risen != near
             if any_true(stopped):
-                # The mean found above is that of a pin that no end stop holds.
+                # The mean above is that of a pin that does not reach an end stop.
                 end = near * m - offset - self._seen(2 * len(self.steps) + s + 1)
                 _tension(end, zero, most, last)
                 np.putmask(mean, stopped, half * (first + last))
-            # Where the fingertip is not touched all through the step the mean is that of no tension.
+            # Without contact during the whole step the mean tension is 0.
             np.maximum(mean, zero, out=mean)
-            # Of a tension that falls steeply a straight line would make a filter that pulls.
+            # With a linear tension that falls steeply a filter would become negative.
             propagate()
             np.maximum(self.propagated, self.none, out=self.moved)
         self.pulp[:] = self.filters
 
     def _seen(self, row: int) -> Floats:
-        """Return what one row of the plan's `path` makes of the fingertip's underside."""
+        """Return the result of a row of the plan's `path` for the fingertip's underside."""
         seen: Floats = apply_map(self.plan.path[row : row + 1], self.under)[0]
         return seen
 
     def _find_near_overflow(self, s: int, beyond: Flags) -> Flags:
-        """Clear the cells (5, k[, b]) beyond the limits of step s that only a flow would take there."""
-        # Through a shut valve none turns turbulent: its pin is locked, at any load that does not overflow.
+        """Clear the cells (5, k[, b]) beyond the limits of step s if their limit is that of laminar flow."""
+        # A shut valve has no flow: its pin is locked at any load that does not overflow.
         shut = ~self.opening[self.plan.nodes[s], : len(self.near)].any(axis=0)
         beyond[:3] &= ~shut | (self.guarded[:3] >= 0.5 * LARGE)
         return beyond
@@ -382,9 +383,9 @@ class StepWorkspace:
     def _move_near_overflow(
         self, s: int, beyond: Flags, exponent: Floats, deviation: Floats, idle: Flags
     ) -> tuple[Floats, Floats, Floats]:
-        """Return the paths over step s, some of whose cells `solve_pressed` is not for."""
+        """Return the paths over step s, in which some cells exceed the limits of `solve_pressed`."""
         plan, nodes, count = self.plan, self.plan.nodes[s], len(self.steps)
-        # Their path bends with the load, not as it would without; or so much that its mean says nothing.
+        # The curvature of their path depends on the load, or is too large for its mean.
         deviation[beyond.any(axis=0)] = 0.0
         openings = self.opening[nodes, : len(self.near)]
         weights = per_row(plan.weights[nodes], openings.ndim) / plan.cell.actuator.area
@@ -404,7 +405,7 @@ class StepWorkspace:
 
 
 def _tension(exponent: Floats, zero: Floats, most: Floats, out: Floats) -> None:
-    """Work out the elastic force in units of b/m, into `out`; 0 where there is a gap."""
+    """Compute the elastic force in units of b/m, into `out`; 0 in a gap."""
     np.maximum(exponent, zero, out=out)
     np.minimum(out, most, out=out)
     np.expm1(out, out)

@@ -5,9 +5,9 @@ An exponential spring behind a linear flow resistance. All is dimensionless: the
 
     de/ds = slip + decay (pulp - exp(e)),
 
-where `slip` is m times the way the pin and the fingertip approach without load, `decay` the
-hydraulic stiffness, and ``pulp = 1 + S m/b`` the exponent at which the relaxed pulp begins
-to push. ``u = exp(-e)`` obeys the linear equation ``du/ds = decay - growth u`` with
+where `slip` is m times the approach of pin and fingertip without load, `decay` the hydraulic
+stiffness, and ``pulp = 1 + S m/b`` the value of exp(e) at which the relaxed pulp begins to
+push. ``u = exp(-e)`` obeys the linear equation ``du/ds = decay - growth u`` with
 ``growth = slip + decay pulp``: a Bernoulli equation. Where no force acts, ``de/ds = slip``.
 """
 
@@ -22,15 +22,15 @@ from ..base.arrays import Floats
 from ..model.contact import LARGEST_EXPONENT
 from ..model.physics import Cell
 
-#: Above this exponent sums have to be done on logarithms: `solve_carefully` instead of `solve_pressed`.
+#: Above this exponent, logarithms of sums are computed: `solve_carefully` instead of `solve_pressed`.
 LARGE = 300.0
 #: Replaces zero in 0/0 limits.
 TINY = 1e-200
-#: Below this logarithm log(1 + q) is q, to the last bit.
+#: Logarithm of q below which log(1 + q) is q, to the last bit.
 _ROUNDED_AWAY = -36.8
-#: Stands for zero where a way so short is divided by, and what comes of it is multiplied by a growth.
+#: Replaces a slip of zero in a quotient that is then multiplied by a growth.
 _STILL = 1e-100
-#: Load at which a flow's slope is looked for at least, Pa.
+#: Least load at which the slope of a flow is computed, Pa.
 LEAST = 1.0
 _ALL_BUT_GONE = float(np.nextafter(-1.0, 0.0))
 
@@ -38,8 +38,9 @@ _ALL_BUT_GONE = float(np.nextafter(-1.0, 0.0))
 def solve_pressed(grown: Floats, growth: Floats, decay: Floats) -> Floats:
     """Return the relief of cells that stay under load: ``e(1) - e(0) = growth - relief``.
 
-    It is ``log(1 + q)``, ``q = decay grown (exp(growth) - 1)/growth``, `grown` being ``exp(e(0))``; relief /
-    decay is the mean of exp(e). Growth and decay may not be zero (`TINY` will do), no exponent pass `LARGE`.
+    It is ``log(1 + q)``, ``q = decay grown (exp(growth) - 1)/growth``, with `grown` = ``exp(e(0))``; relief
+    / decay is the mean of exp(e). Growth and decay must not be zero (use `TINY`), nor an exponent above
+    `LARGE`.
     """
     q: Floats = np.expm1(growth)
     q /= growth
@@ -52,10 +53,10 @@ def solve_pressed(grown: Floats, growth: Floats, decay: Floats) -> Floats:
 def solve_carefully(
     exponent: Floats, growth: Floats, slip: Floats, decay: Floats, pulp: Floats
 ) -> tuple[Floats, Floats]:
-    """Return the load's part of the way, and the mean of exp(e), of cells that stay under load, at any size.
+    """Return the change of e by the load, and the mean of exp(e), of cells that stay under load, of any size.
 
-    `decay` not below `TINY`, `growth` not zero (`TINY` will do). The first, ``e(1) - e(0) - slip``, is never
-    above 0 where e(0) is above ``log(pulp)``.
+    `decay` must be at least `TINY`, `growth` not zero (use `TINY`). The first, ``e(1) - e(0) - slip``, is at
+    most 0 if e(0) is above ``log(pulp)``.
     """
     size = np.abs(growth)
     part, log_decay = np.log(-np.expm1(-size) / size), np.log(decay)
@@ -66,7 +67,7 @@ def solve_carefully(
     push, log_mean = decay * pulp - relief, log_grown + ratio
     vast = size > LARGE
     if np.count_nonzero(vast):
-        # Relief and growth are both so large that their difference has lost its digits: e(1) without them.
+        # The difference of such large relief and growth has lost its digits: e(1) is computed without them.
         after = np.minimum(growth, 0.0) - np.logaddexp(-np.maximum(growth, 0.0), log_decay + exponent + part)
         np.putmask(push, vast, after - slip)
         lasting = vast & (log_q >= _ROUNDED_AWAY)
@@ -77,23 +78,23 @@ def solve_carefully(
 def solve_crossing(
     exponent: Floats, deviation: Floats, slip: Floats, decay: Floats, pulp: Floats
 ) -> tuple[Floats, Floats]:
-    """Return ``e(1) - e(0) - slip`` and the mean of ``max(exp(e) - 1, 0)`` of cells that meet or leave.
+    """Return ``e(1) - e(0) - slip`` and the mean of ``max(exp(e) - 1, 0)`` as contact begins or ends.
 
-    Below ``log(pulp)`` at the start means meeting, above it leaving; the instant is exact on a straight way,
-    and of second order on a bent one. `deviation`: chord deviation of the path without load, its mean above
-    the straight line between its ends.
+    Contact begins if e(0) is below ``log(pulp)``, and ends if it is above; the instant is exact on a straight
+    path, and of second order on a curved one. `deviation`: chord deviation of the path without load, its mean
+    above the straight line between its ends.
     """
     growth = replace_zeros(slip + decay * pulp)
     slip = np.where(np.abs(slip) < _STILL, _STILL, slip)
     threshold = np.log(pulp)
     share = _loaded_share(threshold - exponent, slip, growth)
-    # A parabola's mean height over the loaded part, from its mean over all of it.
+    # Mean height of a parabola over the loaded part, from its mean over the whole step.
     exponent = exponent + deviation * share * (3.0 - 2.0 * share)
     share = _loaded_share(threshold - exponent, slip, growth)
     start = np.maximum(exponent, threshold)
-    few = np.maximum(share * decay, TINY)
-    push, mean = solve_carefully(start, replace_zeros(share * growth), share * slip, few, pulp)
-    # Without load the exponent goes straight, up to the threshold or down from it; below 0 is a gap.
+    loaded_decay = np.maximum(share * decay, TINY)
+    push, mean = solve_carefully(start, replace_zeros(share * growth), share * slip, loaded_decay, pulp)
+    # Without load the exponent is linear, up to the threshold or down from it; below 0 is a gap.
     apart = np.maximum(np.abs((1.0 - share) * slip), TINY)
     closed = np.minimum(apart, np.maximum(threshold, 0.0))
     alone = (pulp * -np.expm1(-closed) - closed) / apart
@@ -101,8 +102,8 @@ def solve_crossing(
 
 
 def _loaded_share(gap: Floats, slip: Floats, growth: Floats) -> Floats:
-    """Return the share of the step in which a cell is loaded; `gap` is the way up to the threshold."""
-    # Leaving: u grows from exp(-e(0)) to 1/pulp; the linear equation tells when.
+    """Return the share of the step in which a cell is loaded; `gap`: threshold less e(0)."""
+    # At the end of contact u has grown from exp(-e(0)) to 1/pulp, by the linear equation.
     shrunk = np.expm1(np.minimum(gap, 0.0)) / slip
     leaving = np.log1p(np.maximum(growth * shrunk, _ALL_BUT_GONE)) / growth
     share: Floats = np.where(gap >= 0.0, 1.0 - gap / slip, leaving)
@@ -120,28 +121,28 @@ class StepStart(NamedTuple):
     cell: Cell
     openings: Floats
     pressure: Floats
-    """(g, ..): Of the valves, at the step's Gauss points, and at their far side, Pa."""
+    """(g, ..): Openings of the valves at the step's Gauss points, and pressures behind them, Pa."""
     weights: Floats
-    """(g, 1) or (g, 1, b): Of these points, over the piston's area, s/m²."""
+    """(g, 1) or (g, 1, b): Weights of these points over the piston's area, s/m²."""
     exponent: Floats
     """At the start of the step, see `closed_form`."""
     deviation: Floats
     """Chord deviation of the path without load, see `closed_form.solve_crossing`."""
     finger_deviation: Floats
-    """The fingertip's part in it, with its sign changed."""
+    """The fingertip's part of it, with the opposite sign."""
     lift: Floats
     """Rise of the fingertip, in 1/m."""
     relaxed: Floats
     """exp(e) at which the pulp begins to push."""
     idle: NDArray[np.bool_]
-    """Cells that it does not push at the start."""
+    """Cells that the pulp does not push at the start."""
 
     def conductance(self, load: Floats) -> Floats:
         """Return the secant conductance under a load, Pa, at each Gauss point."""
         return self.cell.flow.conductance(self.openings, self.pressure - load)
 
     def rises(self, load: Floats | float) -> Floats:
-        """Return what flows through each Gauss point's share of the step under a load, Pa, as a rise, m."""
+        """Return the rise, m, by the flow at each Gauss point, times its weight, under a load, Pa."""
         drop = self.pressure - load
         rises: Floats = self.weights * (self.cell.flow.conductance(self.openings, drop) * drop)
         return rises
@@ -152,9 +153,9 @@ def find_loaded_path(
 ) -> tuple[Floats, Floats, Floats]:
     """Return the paths of cells over a step in which some of them are near overflow.
 
-    It is the rise of the pin, m, but for its stops; the exponent at the end; and the mean of the tension over
-    the step, in units of b/m. The contact's exponent m is in 1/m, the pressure `to_load` of a unit of tension
-    in Pa; `share` is that of the tension that pushes, the rest being lost to relaxation within the step.
+    They are the rise of the pin, m, without its end stops; the exponent at the end; and the mean tension over
+    the step, in units of b/m. The contact's exponent m is in 1/m, the pressure `to_load` per unit of tension
+    in Pa; `share` of the tension pushes, and the rest is lost to relaxation within the step.
     """
     decay, free = _mid_load(m, to_load * share, start)
     slip = m * free - start.lift
@@ -172,36 +173,36 @@ def find_loaded_path(
 
 
 def _mid_load(m: Floats | float, to_load: Floats | float, start: StepStart) -> tuple[Floats, Floats]:
-    """Return decay and free rise, m: flows along the chord from no load to that predicted in mid step."""
+    """Return decay and free rise, m, by the chord of the flow from no load to that predicted in mid step."""
     grown = middle = _exponential(start.exponent)
     alone = start.rises(0.0)
     free = alone.sum(axis=0)
     slip = m * free - start.lift
     for _ in range(2):
         load = to_load * np.maximum(middle - start.relaxed, 0.0)
-        # A pin that has yet to meet the fingertip comes to rest against the pressure that drives it.
+        # A pin that is still to meet the fingertip stops at the pressure that drives it.
         load = np.where(start.idle, np.minimum(load, np.abs(start.pressure)), load) + LEAST
         decay = m * to_load * ((alone - start.rises(load)) / load).sum(axis=0) + TINY
         push, _ = _press(start.exponent, slip, decay, start.relaxed)
-        way = np.where(grown > start.relaxed, slip + push, slip)
-        middle = 0.5 * (grown + _exponential(start.exponent + way))
+        change = np.where(grown > start.relaxed, slip + push, slip)
+        middle = 0.5 * (grown + _exponential(start.exponent + change))
     return decay, free
 
 
 def _press(exponent: Floats, slip: Floats, decay: Floats, relaxed: Floats) -> tuple[Floats, Floats]:
-    """Return the load's part of the way, and the mean of exp(e), of cells that stay under load."""
+    """Return the change of e by the load, and the mean of exp(e), of cells that stay under load."""
     return solve_carefully(exponent, replace_zeros(slip + decay * relaxed), slip, decay, relaxed)
 
 
 def _limit(m: Floats | float, to_load: Floats | float, start: StepStart, rise: Floats) -> Floats:
-    """Return a rise, m, held within what the valve can do.
+    """Return a rise, m, limited to the flow of the valve.
 
-    Upwards that is the flow without load. Downwards it is the flow under the largest load there is; and no
-    finger pushes a pin deeper than it comes, what the pin falls by itself aside.
+    Upwards that is the flow without load, downwards the flow under the largest load; and no finger pushes a
+    pin below itself, apart from what the pin falls without load.
     """
     alone = start.rises(0.0)
     highest, fall = np.maximum(alone, 0.0).sum(axis=0), np.minimum(alone, 0.0).sum(axis=0)
-    # Along the parabola of the fingertip's way, at its middle and its end.
+    # The fingertip's parabola at its middle and its end.
     middle = 0.5 * start.lift + 1.5 * start.finger_deviation
     deepest = np.maximum(start.exponent - np.minimum(np.minimum(middle, start.lift), 0.0), 0.0)
     most = _exponential(deepest + m * highest)
@@ -211,6 +212,6 @@ def _limit(m: Floats | float, to_load: Floats | float, start: StepStart, rise: F
 
 
 def _exponential(exponent: Floats) -> Floats:
-    """Return exp(e), 1 where there is a gap."""
+    """Return exp(e); 1 in a gap."""
     grown: Floats = np.exp(np.minimum(np.maximum(exponent, 0.0), LARGEST_EXPONENT))
     return grown

@@ -1,4 +1,4 @@
-"""Explicit steppers: Euler, Heun and Runge-Kutta 4, marching through the segments of a period."""
+"""Explicit steppers: Euler, Heun and Runge-Kutta 4, segment by segment of a period."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from ..model.delay import Queue
 from ..model.interfaces import Alike, Movement, Segment
 from ..model.physics import Cell, Speeds, compute_rates, find_contact_force, find_speeds
 
-#: Rates of a block of cells, from its rows and from the number of the stepper's node.
+#: Rates of a block of cells, from its rows and the number of the stepper's node.
 Rates = Callable[[Floats, int], Floats]
 
-#: Share of the stroke that a step may go wrong by; what goes further is no error but a blow-up.
+#: Largest error of a step, as a share of the stroke; a larger one is instability.
 ASTRAY = 0.01
 
 
@@ -32,22 +32,21 @@ class ExplicitPlan:
 
 
 class Explicit(Alike):
-    """Base of the explicit steppers, which march through the segments of a period.
+    """Base of the explicit steppers, which integrate segment by segment of a period.
 
-    A method that has left its region of stability throws pins from stop to stop, and the stops
-    would hide it. But there are heights no pin can come to, see `Speeds.reach`. A cell that does is
-    given up as infinite, which the check for finite numbers at the end of the period finds, and
-    says when and where.
+    A method outside its region of stability throws pins from stop to stop, and the stops would
+    hide it. But no pin can leave the bounds of `Speeds.reach`. A cell that does becomes infinite,
+    and the check for finite numbers at the end of the period reports when and where.
     """
 
     bridges = False
 
     def plan(self, cell: Cell, queue: Queue, segments: tuple[Segment, ...]) -> ExplicitPlan:
-        """Work out once what all periods share."""
+        """Compute once what all periods share."""
         return ExplicitPlan(cell, queue, segments, find_speeds(cell))
 
     def increment(self, rates: Rates, y: Floats, step: float) -> Floats:
-        """Return how far rows y (r, n) go in one step, s long, by their rates at rows and a node."""
+        """Return the change of rows y (r, n) in one step, s, by their rates at rows and a node."""
         raise NotImplementedError
 
     def prepare(self, plan: ExplicitPlan, rows: Floats, near: int) -> Movement:
@@ -55,7 +54,7 @@ class Explicit(Alike):
         return partial(self.advance, plan, rows)
 
     def advance(self, plan: ExplicitPlan, rows: Floats, under: Floats) -> Floats:
-        """Move rows and commands (r + q, n) on by one control period, in place; see `interfaces.Movement`."""
+        """Move rows and commands (r + q, n) by one control period, in place; see `interfaces.Movement`."""
         cell, stroke = plan.cell, plan.cell.actuator.stroke
         y, commands = rows[: cell.rows], rows[cell.rows :]
         height, thrown = y[0], np.zeros(y.shape[1:], np.bool_)
@@ -87,7 +86,7 @@ class Euler(Explicit):
     nodes = (0.0, 1.0)
 
     def increment(self, rates: Rates, y: Floats, step: float) -> Floats:
-        """Return how far the rows go in one step, s long."""
+        """Return the change of the rows in one step, s."""
         return step * rates(y, 0)
 
 
@@ -99,20 +98,20 @@ class Heun(Explicit):
     nodes = (0.0, 1.0)
 
     def increment(self, rates: Rates, y: Floats, step: float) -> Floats:
-        """Return how far the rows go in one step, s long."""
+        """Return the change of the rows in one step, s."""
         first = rates(y, 0)
         return (0.5 * step) * (first + rates(y + step * first, 1))
 
 
 class RungeKutta4(Explicit):
-    """Explicit, order 4 where the right-hand side is smooth, 2 across a contact or a reversed valve."""
+    """Explicit, order 4 for a smooth right-hand side, 2 across a contact or a reversal of the valve."""
 
     name = "runge_kutta_4"
     order = 4
     nodes = (0.0, 0.5, 1.0)
 
     def increment(self, rates: Rates, y: Floats, step: float) -> Floats:
-        """Return how far the rows go in one step, s long."""
+        """Return the change of the rows in one step, s."""
         first = rates(y, 0)
         second = rates(y + (0.5 * step) * first, 1)
         third = rates(y + (0.5 * step) * second, 1)

@@ -2,7 +2,7 @@
 
 With one exponent m the forces of several fingertips are that of one: ``Σ exp(m (H - U_f)) = exp(m (H - U))``
 with ``U = -(1/m) log Σ exp(-m U_f)``, less what each has lost to relaxation. A fingertip with another m is
-taken as one with that of the strongest, of equal force and stiffness where a part of the step begins.
+replaced by one with the m of the strongest, of equal force and stiffness at the start of a part of the step.
 """
 
 from __future__ import annotations
@@ -16,14 +16,14 @@ from typing import Any
 import numpy as np
 
 from ..base.arrays import Cells, Floats
-from ..model.contact import LARGEST_EXPONENT, ExponentialLaw
+from ..model.contact import LARGEST_EXPONENT
 from ..model.delay import Queue
 from ..model.interfaces import Segment
 from ..model.physics import Cell
 from .bernoulli import LARGEST_DEVIATION, BernoulliExponential, BernoulliPlan
 from .closed_form import LARGE, TINY, StepStart, find_loaded_path
 
-#: Parts of a physics step: which fingertips press changes within it.
+#: Parts of a physics step, within which different fingertips may press.
 PARTS = 2
 #: Mean over a part by values at its start, middle and end.
 SIMPSON = np.array([1.0, 4.0, 1.0]) / 6.0
@@ -33,10 +33,10 @@ NONE = -1e300
 
 @dataclass(frozen=True, eq=False)
 class TogetherPlan:
-    """Constants of cells under several fingertips; called, it moves them through a control period."""
+    """Constants of cells under several fingertips; a call moves them through a control period."""
 
     plans: tuple[BernoulliPlan, ...]
-    """Of each finger, in parts of the physics steps."""
+    """Of each finger, for parts of the physics steps."""
     between: Floats
     """(i, p): From undersides at the period's instants to those at the parts' instants."""
     beside: Cells
@@ -44,15 +44,15 @@ class TogetherPlan:
 
     @cached_property
     def _numbers(self) -> Floats:
-        """Of each finger (5, f): m, 1/m; m x0; force of a unit of tension, N; pressure of it, Pa; exponent
-        from which on a flow may be turbulent."""
-        laws: list[ExponentialLaw] = [plan.cell.touch.contact for plan in self.plans if plan.cell.touch]
-        rows = [
-            (law.exponent, law.exponent * law.offset, law.share * law.stiffness / law.exponent)
-            for law in laws
-        ]
-        more = [(plan.to_load, plan.limits[0]) for plan in self.plans]
-        return np.array([(*row, *last) for row, last in zip(rows, more, strict=True)]).T
+        """Of each finger (5, f): m, 1/m; m x0; force per unit of tension, N; its pressure, Pa; exponent above
+        which a flow may be turbulent."""
+        rows = []
+        for plan in self.plans:
+            assert plan.cell.touch is not None
+            law = plan.cell.touch.contact
+            unit = law.share * law.stiffness / law.exponent
+            rows.append([law.exponent, law.exponent * law.offset, unit, plan.to_load, plan.limits[0]])
+        return np.array(rows).T
 
     @cached_property
     def _maps(self) -> list[tuple[Floats, Floats, Floats]]:
@@ -75,7 +75,7 @@ class TogetherPlan:
         """
         plan, numbers = self.plans[0], self._numbers[:, fingers]
         cell, count = plan.cell, len(plan.segments)
-        # A finger that is named again, to make up the number, presses once.
+        # A finger that is repeated, to fill the columns, presses only once.
         again = np.zeros(fingers.shape, np.bool_)
         again[1:] = fingers[1:] == fingers[0]
         openings = plan.response[: len(plan.weights)].dot(valves)
@@ -83,7 +83,7 @@ class TogetherPlan:
         size = cell.flow.conductance(openings, pressure)
         free = plan.moves[count : 3 * count].dot(np.concatenate([size, np.copysign(size, openings)]))
         openings, pressure = (rows[:, None].repeat(len(fingers) + 1, axis=1) for rows in (openings, pressure))
-        # A polynomial swings about a jump: between two instants a finger is between where it is at them.
+        # A polynomial oscillates at a jump: a finger is limited to its undersides at the instants around.
         ends = under[self.beside]
         below = np.einsum("ip,pcg->icg", self.between, under).clip(ends.min(axis=0), ends.max(axis=0))
         exponent, shift, unit, *_ = numbers
@@ -102,33 +102,32 @@ class TogetherPlan:
             united = pushes | idle & ~again
             size_of = np.where(united, level[0] + np.log(unit * exponent), NONE)
             strongest = size_of.argmax(axis=0), np.arange(height.size)
-            m, own = exponent[strongest], unit[strongest]
-            # Exponentials in units of the strongest one's, at start, middle and end of the fingers' way.
-            sizes = size_of - np.log(own * m) - m * (underside - underside[0])
+            m, strongest_unit = exponent[strongest], unit[strongest]
+            # Exponentials in units of the strongest one, at start, middle and end of the fingers' paths.
+            sizes = size_of - np.log(strongest_unit * m) - m * (underside - underside[0])
             whole = np.logaddexp.reduce(sizes, axis=1)
             share = np.exp(sizes - whole[:, None])
-            ratio = unit / own
-            # Of another m what is left of its force when slope and force are those of an exponential with m.
-            rest = np.where(
-                exponent == m, -ratio, ratio * first - np.exp(np.minimum(sizes[0], LARGEST_EXPONENT))
-            )
+            ratio = unit / strongest_unit
+            # Force of a finger with another m, less that of the exponential with m of the same slope.
+            bounded = np.exp(np.minimum(sizes[0], LARGEST_EXPONENT))
+            rest = np.where(exponent == m, -ratio, ratio * first - bounded)
             relaxed = np.maximum(np.where(united, lost * ratio - rest, 0.0).sum(axis=0), TINY)
-            # Rows of each finger alone, and of those that push at the start as one. What comes to push later
-            # is not in that one, but no pin is higher under all fingers than under any of them.
-            ways = _append(level, whole)
-            bend, lift = (ways[0] - 2.0 * ways[1] + ways[2]) / 3.0, ways[0] - ways[2]
+            # Rows of each finger alone, then of those that push at the start as one. That one lacks fingers
+            # that begin to push later, but no pin is higher under all fingers than under any of them.
+            paths = _append(level, whole)
+            bend, lift = (paths[0] - 2.0 * paths[1] + paths[2]) / 3.0, paths[0] - paths[2]
             rates, _, _, to_load, hard = _append(numbers, numbers[:, *strongest])
             slip, deviation = free[s::count, None] * (rates / plan.numbers[0]) - (lift, bend)
             # See `bernoulli.BernoulliPlan.limits`; a pin behind a shut valve is locked.
             hard = np.where(openings[nodes].any(axis=0), hard, 0.5 * LARGE)
-            beyond = ways[0] + np.maximum(np.maximum(slip, deviation), 0.0) >= hard
+            beyond = paths[0] + np.maximum(np.maximum(slip, deviation), 0.0) >= hard
             deviation[beyond | (deviation >= LARGEST_DEVIATION)] = 0.0
             start = StepStart(
                 cell,
                 openings[nodes],
                 pressure[nodes],
                 plan.weights[nodes, None, None] / cell.actuator.area,
-                ways[0],
+                paths[0],
                 deviation,
                 finger_deviation=bend,
                 lift=lift,
@@ -142,7 +141,7 @@ class TogetherPlan:
             last = _tension(exponent * (after - underside[-1]) - shift)
             straight = 0.5 * (first + last)
             pressed = ((means[-1] + 1.0) * np.einsum("i,icg->cg", SIMPSON, share) + rest) / ratio
-            # Nor is any finger pressed harder than alone.
+            # No finger is pressed harder than alone.
             mean = np.minimum(np.where(pushes, pressed, straight), means[:-1])
             work[-2] = np.maximum(np.where(after == height + rise, mean, straight), 0.0)
             work[-1] = last
@@ -158,34 +157,34 @@ def _append(rows: Any, row: Any) -> Any:
 
 
 def _tension(exponent: Floats) -> Floats:
-    """Return the elastic force in units of b/m; 0 where there is a gap."""
+    """Return the elastic force in units of b/m; 0 in a gap."""
     tension: Floats = np.expm1(np.clip(exponent, 0.0, LARGEST_EXPONENT))
     return tension
 
 
 def plan_together(cells: Sequence[Cell], queue: Queue, segments: tuple[Segment, ...]) -> TogetherPlan:
-    """Work out once what all periods share, for the cells of all fingers."""
+    """Compute once what all periods share, for the cells of all fingers."""
     count = segments[-1].nodes[-1] + 1
     parts: list[Segment] = []
     rows: list[Floats] = []
     beside: list[tuple[int, int]] = []
     for segment in segments:
         # A polynomial through the underside at the instants of a step.
-        places = np.linspace(0.0, 1.0, len(segment.nodes))
-        powers = np.arange(len(places))
-        to_powers = np.linalg.inv(places[:, None] ** powers)
+        nodes = np.linspace(0.0, 1.0, len(segment.nodes))
+        powers = np.arange(len(nodes))
+        to_powers = np.linalg.inv(nodes[:, None] ** powers)
         for part in range(PARTS):
             first = len(rows)
             at = (part + np.array([0.0, 0.5, 1.0])) / PARTS
             for row in (at[:, None] ** powers) @ to_powers:
                 rows.append(np.zeros(count))
                 rows[-1][list(segment.nodes)] = row
-            for instant in at * (len(places) - 1):
+            for instant in at * (len(nodes) - 1):
                 beside.append((segment.nodes[math.floor(instant)], segment.nodes[math.ceil(instant)]))
             length = segment.length / PARTS
             parts.append(Segment(segment.start + part * length, length, (first, first + 1, first + 2)))
     stepper = BernoulliExponential()
-    made: dict[int, BernoulliPlan] = {}
+    plans: dict[int, BernoulliPlan] = {}
     for cell in cells:
-        made[id(cell)] = made.get(id(cell)) or stepper.plan(cell, queue, tuple(parts))
-    return TogetherPlan(tuple(made[id(cell)] for cell in cells), np.array(rows), np.array(beside).T)
+        plans[id(cell)] = plans.get(id(cell)) or stepper.plan(cell, queue, tuple(parts))
+    return TogetherPlan(tuple(plans[id(cell)] for cell in cells), np.array(rows), np.array(beside).T)

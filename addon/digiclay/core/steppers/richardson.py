@@ -1,8 +1,8 @@
 """Richardson extrapolation of the closed-form step: one step and two halves.
 
-The closed-form step's error falls with the square of its length, so
-``(4 fine - coarse) / 3`` is free of its leading term, and ``(fine - coarse) / 3`` is what the
-finer one still had. It is done over a control period, in which the commands are held.
+The error of the closed-form step falls with the square of its length, so that
+``(4 fine - coarse) / 3`` is free of its leading term, and ``(fine - coarse) / 3`` is the error
+of the finer one. The extrapolation is over a control period, in which the commands are held.
 """
 
 from __future__ import annotations
@@ -68,14 +68,14 @@ class Richardson(Alike):
 
 
 def extrapolate(cell: Cell, fine: Floats, coarse: Floats, reach: tuple[Floats, Floats]) -> None:
-    """Take the leading error out of rows (r, n[, b]), in place, within the heights there can be."""
-    own = fine[: cell.rows]
-    np.add(own, (own - coarse[: cell.rows]) / 3.0, out=own)
+    """Remove the leading error from rows (r, n[, b]), in place, within the reachable heights."""
+    rows = fine[: cell.rows]
+    np.add(rows, (rows - coarse[: cell.rows]) / 3.0, out=rows)
     bound(cell, fine, reach)
 
 
 def bound(cell: Cell, rows: Floats, reach: tuple[Floats, Floats]) -> None:
-    """Keep extrapolated rows within what there can be, in place, where two levels have little in common."""
+    """Limit extrapolated rows to reachable values, in place, for levels that differ much."""
     height, pulp = rows[0], rows[cell.pulp_rows]
     np.clip(height, *reach, out=height)
     np.clip(height, 0.0, cell.actuator.stroke, out=height)
@@ -83,7 +83,7 @@ def bound(cell: Cell, rows: Floats, reach: tuple[Floats, Floats]) -> None:
 
 
 def halve_segments(segments: tuple[Segment, ...]) -> tuple[Segment, ...]:
-    """Cut segments that have an instant in the middle of each half in two."""
+    """Return the halves of segments that have an instant in the middle of each half."""
     return tuple(
         Segment(part.start + part.length * i / 2, part.length / 2, part.nodes[2 * i : 2 * i + 3])
         for part in segments
