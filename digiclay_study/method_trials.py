@@ -25,7 +25,7 @@ from digiclay.core.studies.speed_limits import (
     find_largest_speed,
     find_unintended_losses,
     judge,
-    place_way,
+    make_trial,
 )
 
 #: Time, s; x, y and height above the bed at rest, mm; turn, pitch and roll of the fingertip, rad.
@@ -236,10 +236,10 @@ def place_trial(scene: Scene, trajectory: str, *, errors: bool = False) -> tuple
     measure = partial(measure_trial, errors=errors)
     if trajectory in LIMITS:
         way = LIMITS[trajectory]
-        place_way(scene, way, HIGH)
+        make_trial(scene, way, HIGH)
         return scene, partial(search_limit, way=way)
     if trajectory in PHASES:
-        placed, start, end = place_way(scene, *PHASES[trajectory])
+        placed, start, end = make_trial(scene, *PHASES[trajectory])
         return lift_off(placed), partial(measure, phase=(start, end))
     recorded = replace(scene, recorder=Recorder())
     if trajectory == SESSION:

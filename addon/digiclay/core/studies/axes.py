@@ -18,9 +18,9 @@ from ..scene.toml_table import FINGERS
 
 #: Result of a point: its ``figures``, or the ``error`` it ended in.
 Record = dict[str, Any]
-#: Measurement of a scene, given a function that says whether to stop; None after a stop.
+#: Measurement of a scene, given a function that tells whether to stop; None after a stop.
 Measure = Callable[[Scene, Callable[[], bool] | None], Record | None]
-#: More points than this are refused: a slip of the keyboard, not a sweep.
+#: Most points: more are a typing error, not a sweep.
 MOST = 10_000
 
 
@@ -30,7 +30,7 @@ class Axis:
 
     #: Section and key, ``control.force_gain``.
     key: str
-    #: Its values as a scene file would say them.
+    #: Its values as in a scene file.
     words: tuple[str, ...]
     #: Whether they are evenly spaced on a logarithmic scale.
     logarithmic: bool = False
@@ -44,7 +44,7 @@ class Point:
     index: int
     #: A value on each axis.
     words: tuple[str, ...]
-    #: None where the values do not go together; `error` says why.
+    #: None if the values are not compatible; `error` has the reason.
     scene: Scene | None
     error: str = ""
     #: By default the figures of the session, see `evaluation.evaluate`.
@@ -58,9 +58,9 @@ class Column:
     """Axis as numbers."""
 
     key: str
-    #: Of the parameter; empty where it has none.
+    #: Of the parameter; empty if it has none.
     unit: str
-    #: In SI; texts where they are no numbers.
+    #: Numbers in SI units, or texts.
     values: tuple[Any, ...]
     logarithmic: bool
 
@@ -71,7 +71,7 @@ class Column:
 
 
 class Varied(NamedTuple):
-    """Reading of ``--vary``: words, or two ends as they were written, with a unit behind both."""
+    """Reading of ``--vary``: words, or two ends as they were written, with a unit after both."""
 
     key: str
     words: tuple[str, ...] = ()
@@ -82,7 +82,7 @@ class Varied(NamedTuple):
 
 
 def read_varied(text: str, *names: str) -> Varied:
-    """Read what varies: KEY=A,B,C or KEY=LOW:HIGH[:log], with a count if `names` has three for its parts."""
+    """Read a variation: KEY=A,B,C or KEY=LOW:HIGH[:log], with a count if there are three `names` of parts."""
     form = ":".join(names)
     key, _, values = (part.strip() for part in text.partition("="))
     if not key or not values:
@@ -106,14 +106,10 @@ def read_varied(text: str, *names: str) -> Varied:
     require(unit.strip() == other.strip(), f"must have the same unit {at}")
     require(all(map(_is_number, (low, high))), f"must have a number {at}")
     start, stop = float(low), float(high)
-    require(
-        math.isfinite(start) and math.isfinite(stop) and start != stop,
-        f"must have two different finite numbers {at}",
-    )
-    require(
-        not logarithmic or min(start, stop) > 0.0,
-        f"must have numbers above 0 {at} for a logarithmic scale",
-    )
+    different = math.isfinite(start) and math.isfinite(stop) and start != stop
+    require(different, f"must have two different finite numbers {at}")
+    positive = min(start, stop) > 0.0
+    require(positive or not logarithmic, f"must have numbers above 0 {at} for a logarithmic scale")
     return Varied(key, (), (low, high), unit.strip(), "".join(parts[2 : len(names)]), logarithmic)
 
 
@@ -139,13 +135,12 @@ def read_axis(text: str) -> Axis:
     values = spread(float(low), float(high), int(varied.steps)).tolist()
     # Twelve digits: 0.3, and not 0.30000000000000004.
     numbers = [low, *(f"{value:.12g}" for value in values[1:-1]), high]
-    return Axis(
-        varied.key, tuple(f"{number} {varied.unit}".strip() for number in numbers), varied.logarithmic
-    )
+    words = tuple(f"{number} {varied.unit}".strip() for number in numbers)
+    return Axis(varied.key, words, varied.logarithmic)
 
 
 def refuse_twice(keys: Sequence[str], settings: Sequence[Setting]) -> None:
-    """Refuse a parameter that is varied twice, or that another option changes as well."""
+    """Refuse a parameter that is varied twice, or that another option changes too."""
     for key in keys:
         if keys.count(key) > 1:
             raise ParameterError(f"--vary {key}", "", "must be given once", f"{keys.count(key)} times")
@@ -161,13 +156,13 @@ def make_points(
     axes: Sequence[Axis],
     progress: Callable[[int, int], None] | None = None,
 ) -> list[Point]:
-    """Make the scenes of all points of a sweep; refuse a value with which no point has a scene."""
+    """Make the scenes of all points of a sweep; refuse a value for which no point has a scene."""
     keys = [axis.key for axis in axes]
     refuse_twice(keys, settings)
     count = math.prod(len(axis.words) for axis in axes)
     if count > MOST:
         raise ParameterError("--vary", "", f"must come to {MOST} points at most", f"{count} points")
-    load(path, settings)  # an error without the axes is reported first
+    load(path, settings)  # reports an error of the file itself first
     rows = list(itertools.product(*(axis.words for axis in axes)))
     points = place_points(path, settings, keys, rows, progress=progress)
     for number, axis in enumerate(axes):
@@ -187,7 +182,7 @@ def place_points(
     first: int = 0,
     progress: Callable[[int, int], None] | None = None,
 ) -> list[Point]:
-    """Make the scenes of points anywhere; values that do not go together make a point with an error."""
+    """Make the scenes of given points; incompatible values make a point with an error."""
     table, parts, points = read_table(path), ReadParts(), []
     for index, words in enumerate(rows, first):
         varied = [Setting(key, word, "--vary") for key, word in zip(keys, words, strict=True)]
@@ -201,7 +196,7 @@ def place_points(
 
 
 def make_columns(points: Sequence[Point], axes: Sequence[Axis]) -> list[Column]:
-    """Return the axes in numbers: what the scenes made of their words. `points`: of the whole sweep."""
+    """Return the axes in numbers, from the scenes of all points of a sweep."""
     columns = []
     for number, axis in enumerate(axes):
         scenes = {point.words[number]: point.scene for point in reversed(points) if point.scene}
@@ -212,7 +207,7 @@ def make_columns(points: Sequence[Point], axes: Sequence[Axis]) -> list[Column]:
 
 
 def _find_parts(scene: Scene, key: str) -> tuple[list[Any], str]:
-    """Return the parts that have a parameter, of one finger or all, and its name; `key`: as of a setting."""
+    """Return the parts with a parameter, of one finger or all, and its name; `key`: as of a setting."""
     first, *rest = split_key(key)
     if first == FINGERS and len(rest) == 3:
         parts = enumerate(scene.list_parts(rest[1]), 1)
@@ -221,48 +216,48 @@ def _find_parts(scene: Scene, key: str) -> tuple[list[Any], str]:
 
 
 def find_quantity(scene: Scene, key: str) -> Quantity | None:
-    """Return how a parameter of a scene is declared; None where it is not."""
+    """Return the declaration of a parameter of a scene, or None."""
     parts, name = _find_parts(scene, key)
-    known = (list_quantities(part).get(name) for part in parts if isinstance(part, Parameters))
-    return next(known, None)
+    declared = (list_quantities(part).get(name) for part in parts if isinstance(part, Parameters))
+    return next(declared, None)
 
 
 def find_numbers(scene: Scene, key: str) -> list[Any]:
-    """Return the values of a parameter that are numbers, each once: fingers may have their own."""
+    """Return the different values of a parameter that are numbers: those of fingers may differ."""
     parts, name = _find_parts(scene, key)
     values = dict.fromkeys(getattr(part, name, None) for part in parts if name)
     return [value for value in values if isinstance(value, (int, float)) and not isinstance(value, bool)]
 
 
 def find_value(scene: Scene, key: str, word: str) -> Any:
-    """Return what a scene made of a word, if it is a number, the same for all fingers; else the word."""
+    """Return the value of a word in a scene if it is a number, the same for all fingers; else the word."""
     numbers = find_numbers(scene, key)
     return numbers[0] if len(numbers) == 1 else word
 
 
-#: So many different words at most count as the ends of a parameter.
+#: Most different words of a parameter that all count as its ends.
 WORDS = 8
 
 
 def find_ends(points: Sequence[Point], keys: Sequence[str]) -> list[Point]:
     """Return the points at the ends of each parameter, or with each of its words, in their order.
 
-    Of several at an end: the two that are lowest and highest in the other parameters, corners of a grid.
+    Of several at an end: those with the lowest and highest other parameters, the corners of a grid.
     """
     sound = [(point, point.scene) for point in points if point.scene]
     if not sound:
         return []
-    places = np.empty((len(keys), len(sound)))
+    ranks = np.empty((len(keys), len(sound)))
     ends: list[Sequence[int]] = []
     for number, key in enumerate(keys):
         values = np.array([find_value(scene, key, point.words[number]) for point, scene in sound])
-        different, places[number] = np.unique(values, return_inverse=True)
+        different, ranks[number] = np.unique(values, return_inverse=True)
         last = len(different) - 1
         ends.append(range(last + 1) if values.dtype.kind == "U" and last < WORDS else (0, last))
-    height = (places / np.maximum(places.max(axis=1, keepdims=True), 1)).sum(axis=0)
+    height = (ranks / np.maximum(ranks.max(axis=1, keepdims=True), 1)).sum(axis=0)
     chosen: set[int] = set()
-    for row, own in zip(places, ends, strict=True):
-        for end in own:
-            there = np.flatnonzero(row == end)
-            chosen |= {int(there[height[there].argmin()]), int(there[height[there].argmax()])}
+    for row, ends_of_row in zip(ranks, ends, strict=True):
+        for end in ends_of_row:
+            at_end = np.flatnonzero(row == end)
+            chosen |= {int(at_end[height[at_end].argmin()]), int(at_end[height[at_end].argmax()])}
     return [sound[index][0] for index in sorted(chosen)]

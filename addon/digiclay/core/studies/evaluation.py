@@ -18,26 +18,23 @@ from ..session.run_scene import Result, run
 from .axes import Measure, Point, Record
 from .series import Results, describe_error
 
-#: Evaluation of bundles in any order, until all are done or a stop is requested. A record is None for a point
-#: that was stopped; a bundle that no worker survives raises. OutputError when no worker is left.
+#: Evaluation of bundles in any order, until all are done or a stop is requested. The record of a stopped
+#: point is None; a bundle during which its worker dies raises. OutputError when no worker is left.
 Pool = Callable[[Sequence[Sequence[Point]]], Results[Sequence[Point], Sequence[Record | None]]]
 
-#: Metrics by which a session can be judged.
-FIGURES = {
-    **METRICS, **{name: RUN[name] for name in ("simulated", "run_time", "real_time_factor")}, **ERRORS
-}  # fmt: skip
-#: Figures that are others each time.
+#: Metrics of a session.
+FIGURES = METRICS | {name: RUN[name] for name in ("simulated", "run_time", "real_time_factor")} | ERRORS
+#: Figures that differ in every run.
 TIMES = ("run_time", "real_time_factor")
 #: Short names of figures.
 SHORT = {"lag": "lag_mean", "oscillation": "force_oscillation", "relief": "ridge_error"}
-#: Fewer points than this are as quick one at a time.
+#: Least points of a batch: fewer are as quick one at a time.
 LEAST = 4
-#: From twice as many points on there are two batches: a larger one gains little, and busies one core only.
+#: Twice this number of points makes two batches: a larger one gains little, and uses a single core.
 RUNS = 32
-#: Bytes a batch may take for what the metrics need of its runs, and bytes that is a row: a run's history goes
-#: by unseen.
+#: Most bytes of a batch for the metrics of its runs, and bytes per row: the history of a run is not stored.
 BUDGET, BYTES_A_ROW = 2**30, 41
-#: Where a record says why its point was run by itself although it stood in a batch.
+#: Key in a record of the reason why its point ran alone although it belongs to a batch.
 ALONE = "alone"
 #: What a record says beside its figures, where there is anything to say.
 NOTED = ("errors_absent", "lost")
@@ -66,7 +63,7 @@ class Bundles:
     batches: tuple[tuple[Point, ...], ...]
     #: Of one point each.
     alone: tuple[tuple[Point, ...], ...]
-    #: Why some run alone, and what makes errors doubtful, one line a reason.
+    #: Why points run alone, and why errors are doubtful, one line per reason.
     why: tuple[str, ...]
 
     @property
@@ -75,43 +72,43 @@ class Bundles:
         return (*self.batches, *self.alone)
 
     def describe(self) -> list[str]:
-        """Return how the points run, as lines for a person."""
+        """Return lines that tell how the points run."""
         count, noun = sum(map(len, self.batches)), "batch" if len(self.batches) == 1 else "batches"
         lines = [f"{count} points run in {len(self.batches)} {noun}"] if self.batches else []
         return [*lines, *self.why]
 
 
 def judge_all(points: Iterable[Point]) -> list[Point]:
-    """Return points of which the errors are estimated."""
+    """Return the points with estimation of errors."""
     return [replace(point, errors=True) for point in points]
 
 
 def has_errors(record: Record) -> bool:
-    """Return whether the errors of a point were estimated, or it failed."""
+    """Return whether the errors of a point were estimated, or the point failed."""
     return "error" in record or record["figures"].keys() >= ERRORS.keys()
 
 
 def describe_effort(records: Mapping[int, Record]) -> str:
     """Return the run time of points and their largest errors, and where these were estimated."""
     figures = {index: record["figures"] for index, record in sorted(records.items()) if "figures" in record}
-    judged = {index: found for index, found in figures.items() if found.get("height_error") is not None}
-    spent = sum(found.get("run_time") or 0.0 for found in figures.values())
+    judged = {index: row for index, row in figures.items() if row.get("height_error") is not None}
+    spent = sum(row.get("run_time") or 0.0 for row in figures.values())
     absent = (record["errors_absent"] for record in records.values() if record.get("errors_absent"))
     worst: dict[str, object] = {"errors_absent": next(absent, "")}
     where = ""
     if judged:
-        worst = {name: max(found[name] for found in judged.values()) for name in ERRORS}
+        worst = {name: max(row[name] for row in judged.values()) for name in ERRORS}
         named = "" if len(judged) == len(figures) else f": {', '.join(map(str, judged))}"
         where = f" at most, estimated at {len(judged)} of {len(figures)} points{named}"
     return f"{len(figures)} runs took {spent:.2g} s; {describe_errors(worst)}{where}"
 
 
 def make_bundles(points: Sequence[Point]) -> Bundles:
-    """Put points of one structure together, as many as make a batch; in the order of the points.
+    """Return all points of a sweep in bundles; those of a batch have the same structure, in their order.
 
-    The bundles depend on the points alone, not on what is done already or on the number of workers: the same
-    sweep has the same results to the last bit. `points`: all of the sweep. Where errors are estimated, the
-    references of a batch must be of one structure too.
+    The bundles depend only on the points, not on finished ones or the number of workers: the same sweep has
+    the same results to the last bit. If errors are estimated, the references of a batch must have the same
+    structure too.
     """
     alike: dict[object, list[Point]] = {}
     findings = Findings()
@@ -151,14 +148,14 @@ def make_bundles(points: Sequence[Point]) -> Bundles:
 
 
 def _find_reason(scene: Scene) -> str:
-    """Return why a run stands in no batch; empty: it may."""
+    """Return why a run cannot be in a batch, or ``""``."""
     if len(scene.fingers) != 1:
         return "they do not have a single finger"
     return "" if find_method(scene.method).batched else f"a batch of {scene.method} takes as long"
 
 
 def _limit_runs(scene: Scene | None) -> int:
-    """Return how many runs like this one may be in a batch."""
+    """Return the most runs like this one in a batch."""
     assert scene is not None
     rows = scene.recorder.rows(scene.periods) if scene.recorder else 1
     return BUDGET // (rows * BYTES_A_ROW)
@@ -170,12 +167,12 @@ def _count(count: int, noun: str) -> str:
 
 
 def _explain(why: Mapping[str, int]) -> tuple[str, ...]:
-    """Return a line a reason for points that run one at a time; `why` counts them."""
+    """Return a line per reason for points that run one at a time; `why` counts them."""
     return tuple(f"{_count(count, 'point')} one at a time: {reason}" for reason, count in why.items())
 
 
 def explain_failed_batches(records: Mapping[int, Record]) -> tuple[str, ...]:
-    """Return a line a reason for points that were run one by one because their batch failed."""
+    """Return a line per reason for points that ran one by one because their batch failed."""
     return _explain(Counter(record[ALONE] for record in records.values() if record.get(ALONE)))
 
 
@@ -186,7 +183,7 @@ def evaluate(
     errors: bool = False,
     measure: Measure | None = None,
 ) -> Record | None:
-    """Return the record of a session, or what `measure` makes of its scene; None when it was stopped."""
+    """Return the record of a session, or that of `measure` for its scene; None when it was stopped."""
     try:
         if measure is not None:
             return measure(scene, stopped)
@@ -198,26 +195,26 @@ def evaluate(
 
 
 def _make_record(result: Result, *, errors: bool) -> Record:
-    """Return the record of a finished session; `ERRORS` only if they were requested."""
+    """Return the record of a finished session, with `ERRORS` only if they were requested."""
     names = [name for name in FIGURES if errors or name not in ERRORS]
     notes = {name: found for name in NOTED if (found := result.metrics.get(name))}
     return {"figures": {name: result.metrics.get(name) for name in names}, **notes}
 
 
 class BatchWarning(RuntimeWarning):
-    """Failure of a whole batch by no fault of the user."""
+    """Failure of a whole batch that is not the user's error."""
 
 
 def evaluate_bundle(
     bundle: Sequence[Point], stopped: Callable[[], bool] | None = None
 ) -> list[Record | None]:
-    """Run a bundle, with all errors or none; return records of its points, None for one that was stopped.
+    """Run a bundle, with all errors or none; return the records of its points, None for a stopped one.
 
-    When a batch fails as a whole, its points are run one by one, and each record states why as ``alone``;
-    `BatchWarning` if it was neither lack of memory nor an error a user can cause.
+    When a batch fails as a whole, its points run one by one, and each record has the reason as ``alone``;
+    `BatchWarning` if it was neither lack of memory nor an error that a user can cause.
     """
     scenes = [point.scene for point in bundle if point.scene]
-    if not scenes:  # values that do not go together are in no batch
+    if not scenes:  # incompatible values are in no batch
         return [{"error": point.error} for point in bundle]
     records: list[Record | None] = [None] * len(scenes)
     errors, why = bundle[0].errors, ""
@@ -230,7 +227,7 @@ def evaluate_bundle(
                     records[number] = _make_record(result, errors=errors)
         except MemoryError:
             why = "there is not enough memory for a batch"
-        except Exception as error:  # each point raises it again by itself, and is recorded with it
+        except Exception as error:  # each point then raises it alone, for its record
             why = describe_error(error)
             if not isinstance(error, DigiclayError):
                 warnings.warn(f"A batch of {len(scenes)} runs failed: {why}", BatchWarning, stacklevel=2)

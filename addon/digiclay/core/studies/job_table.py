@@ -1,7 +1,7 @@
 """Jobs of a JOBS file: scenes × methods × settings, each self-contained.
 
-A job's folder holds ``scene.toml``, every parameter of its session, and ``job.toml``, what is
-made of the run. With that folder and this package the job can be done on any machine.
+A job's folder has ``scene.toml``, all parameters of its session, and ``job.toml``, the
+outputs of the run. With that folder and this package the job can run on any machine.
 """
 
 import itertools
@@ -24,15 +24,15 @@ from ..scene.schema import Scene
 from ..session.render_settings import Film, Still, Turntable
 from ..shapes.fitting import fit_shape, pack
 
-#: Pictures a job can leave, by their section.
+#: Pictures of a job, by their section.
 PICTURES: dict[str, type[Parameters]] = {"still": Still, "turntable": Turntable, "film": Film}
-#: Those that can be drawn frame by frame after the run; each is the file of its name with ``.mp4``.
+#: Those that are rendered frame by frame after the run, to a file of this name with ``.mp4``.
 MOVING = ("turntable", "film")
-#: Sections of a job.toml: what is exported, and the pictures.
+#: Sections of a job.toml: the mesh, and the pictures.
 SECTIONS: dict[str, type[Parameters]] = {"mesh": Model, **PICTURES}
 #: The keys of a job.toml.
 KEYS = ("export", "errors", *SECTIONS)
-#: Keys of pictures in older files, and what they are called now.
+#: Former names of keys, and their present ones.
 FORMER = {"colour": "color"}
 
 
@@ -44,9 +44,9 @@ class Outputs:
     export: tuple[str, ...] = ()
     #: Whether the run's errors are estimated, which takes twice its time.
     errors: bool = True
-    #: What is made of the final surface in these formats.
+    #: Mesh of the final surface in these formats.
     mesh: Model = field(default_factory=Model)
-    #: Pictures, where they are wanted.
+    #: Pictures; None: not wanted.
     still: Still | None = None
     turntable: Turntable | None = None
     film: Film | None = None
@@ -65,14 +65,14 @@ class Outputs:
             if part is None:
                 continue
             lines.append(f"\n[{section}]")
-            for key, known in list_quantities(part).items():
-                note = f"{known.unit}: {known.doc}" if known.unit else known.doc
+            for key, declared in list_quantities(part).items():
+                note = f"{declared.unit}: {declared.doc}" if declared.unit else declared.doc
                 lines.append(f"{key} = {format_value(getattr(part, key))}  # {note}")
         return "\n".join(lines) + "\n"
 
 
 def make_outputs(table: Mapping[str, Any]) -> Outputs:
-    """Read what is made of each run from a table of `KEYS`."""
+    """Read the outputs of each run from a table of `KEYS`."""
     refuse_unknown("", table, KEYS)
     export = table.get("export", [])
     if not isinstance(export, list) or not all(isinstance(kind, str) for kind in export):
@@ -86,21 +86,21 @@ def make_outputs(table: Mapping[str, Any]) -> Outputs:
     for section, kind in SECTIONS.items():
         if section not in table:
             continue
-        own = table[section]
-        if not isinstance(own, dict):
-            raise ParameterError(section, "", f"must be a section, [{section}]", show_value(own))
-        named = {key if FORMER.get(key, key) in own else FORMER[key]: value for key, value in own.items()}
+        given = table[section]
+        if not isinstance(given, dict):
+            raise ParameterError(section, "", f"must be a section, [{section}]", show_value(given))
+        named = {key if FORMER.get(key, key) in given else FORMER[key]: given[key] for key in given}
         parts[section] = read_part(section, kind, {}, named)
     return Outputs(tuple(export), errors, **parts)
 
 
 #: The files of a job.
 SCENE, JOB = "scene.toml", "job.toml"
-#: More jobs than this are a slip of the keyboard.
+#: Most jobs: more are a typing error.
 MOST = 10_000
-#: Where the sample batches are.
+#: Folder of the sample batches.
 BATCHES = SAMPLES.parent / "batches"
-#: What decides which jobs there are; all other keys say what is made of each.
+#: Keys that define the jobs; all others define their outputs.
 WHICH = ("scenes", "methods", "settings")
 
 
@@ -110,7 +110,7 @@ class Job:
 
     #: Of its folder.
     name: str
-    #: None where the values do not go together; `error` says why.
+    #: None if the values are not compatible; `error` has the reason.
     scene: Scene | None
     error: str = ""
 
@@ -127,20 +127,20 @@ class JobSeries:
 def read_jobs(path: Path, more: Sequence[str] = ()) -> JobSeries:
     """Read a JOBS file.
 
-    Every scene is combined with every method and every setting. A combination whose values do
-    not go together makes a job with an error; what no job could have is refused.
+    Every scene is combined with every method and every setting. A combination of incompatible
+    values makes a job with an error; a value that no job can have is refused.
     """
     table = read_table(path)
     try:
         refuse_unknown("", table, (*WHICH, *KEYS))
-        made = make_outputs({key: table[key] for key in table if key not in WHICH})
+        outputs = make_outputs({key: table[key] for key in table if key not in WHICH})
         words, methods, changes = _read_scenes(table), _read_methods(table, more), _read_settings(table)
         count = len(words) * len(methods) * len(changes)
         if count > MOST:
             raise ParameterError("scenes", "", f"must come to {MOST} jobs at most", f"{count} jobs")
         files = [_find_scene(path, word) for word in words]
         for file in files:
-            load(file)  # what is wrong without any change is reported first
+            load(file)  # reports an error of the file itself first
         _refuse_twice("scenes", words, [os.path.abspath(file) for file in files])
         _refuse_twice("methods", methods, methods)
         parts = list(itertools.product(files, methods, changes.items()))
@@ -149,7 +149,7 @@ def read_jobs(path: Path, more: Sequence[str] = ()) -> JobSeries:
         jobs = tuple(_make_job(name, *part) for name, part in zip(names, parts, strict=True))
     except ParameterError as error:
         raise SceneError(f"{path}: {error}") from None
-    return JobSeries(find_name(path), jobs, made)
+    return JobSeries(find_name(path), jobs, outputs)
 
 
 def find_jobs_file(word: str) -> Path:
@@ -175,7 +175,7 @@ def _read_scenes(table: Mapping[str, Any]) -> list[str]:
 
 
 def _read_methods(table: Mapping[str, Any], more: Sequence[str]) -> list[str]:
-    """Return the methods every scene is run with; an empty one is the scene's own."""
+    """Return the methods for every scene; an empty one is that of the scene."""
     if "methods" not in table:
         return list(more) or [""]
     methods = table["methods"]
@@ -187,7 +187,7 @@ def _read_methods(table: Mapping[str, Any], more: Sequence[str]) -> list[str]:
 
 
 def _read_settings(table: Mapping[str, Any]) -> dict[str, list[Setting]]:
-    """Return the settings by their labels; without any, one that changes nothing."""
+    """Return the settings by their labels; by default one that changes nothing."""
     if "settings" not in table:
         return {"": []}
     given = table["settings"]
@@ -216,7 +216,7 @@ def _flatten(table: Mapping[str, Any], above: str = "") -> list[tuple[str, Any]]
 
 
 def _find_scene(jobs: Path, word: str) -> Path:
-    """Return the file of a scene: beside the JOBS file, or as anywhere else."""
+    """Return the file of a scene: beside the JOBS file, or as `scene_source.find`."""
     beside = jobs.parent / word
     return find(str(beside)) if os.path.exists(beside) else find(word)
 
@@ -234,12 +234,12 @@ def embed_heights(scene: Scene) -> Scene:
     """Return a scene with the heights of its shape in it, so that it needs no other file."""
     if scene.shape is None or scene.shape.heights:
         return scene
-    laid = fit_shape(scene.shape, make_grid(scene.layout), scene.actuator)
-    return replace(scene, shape=replace(scene.shape, heights=pack(laid.heights)))
+    fitted = fit_shape(scene.shape, make_grid(scene.layout), scene.actuator)
+    return replace(scene, shape=replace(scene.shape, heights=pack(fitted.heights)))
 
 
 def _refuse_twice(key: str, words: Sequence[str], meant: Sequence[str]) -> None:
-    """Refuse a list in which two words mean the same: it would make the same jobs twice."""
-    for place, one in enumerate(meant):
-        if one in meant[:place]:
-            raise ParameterError(key, "", "must not name one thing twice", f"{words[place]} twice")
+    """Refuse a list in which two words mean the same, which would make the same jobs twice."""
+    for number, meaning in enumerate(meant):
+        if meaning in meant[:number]:
+            raise ParameterError(key, "", "must not name one thing twice", f"{words[number]} twice")

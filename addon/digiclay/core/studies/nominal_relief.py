@@ -1,11 +1,10 @@
 """Nominal relief of a session, and the deviation of the formed one.
 
-It is what the method's own blister, carried along the fingertip's path, leaves behind:
-``H_j = H_rest + max_t p(d_j(t)) (z(t) + c - H_rest)`` for a boss, with the least instead of the greatest for
-a crease; p is the blister's profile, d_j the distance from cell j to the fingertip, z the height of the
-fingertip's lowest point, and c how deep the pins press into it. Method II counts its blister from the nearest
-cell under the fingertip: there d_j is less by how far the middles of the cells of a disc reach that has as
-many cells as follow, the disc's radius less half a pitch.
+It is the relief that the method's blister, moved along the fingertip's path, leaves behind: ``H_j = H_rest +
+max_t p(d_j(t)) (z(t) + c - H_rest)`` for a boss, with the minimum for a crease; p is the blister's profile,
+d_j the distance from cell j to the fingertip, z the height of the fingertip's lowest point, and c the
+indentation by the pins. The blister of Method II begins at the nearest cell under the fingertip: there d_j
+is less by the radius of a disc of as many cells as follow, less half a pitch.
 """
 
 from collections.abc import Mapping
@@ -20,17 +19,17 @@ from ..control.blister import Blister
 from ..metrics.summary import compute_cell_area, find_contact_rows, find_stretches, split_fingers
 from ..scene.schema import Scene
 
-#: Rows of a history of which one is taken.
+#: One of this many rows of a history is evaluated.
 THINNED = 4
 
 
 class ReliefError(NamedTuple):
     """Deviation of a formed relief from the nominal one, over the cells that the blister has covered.
 
-    Where the fingertip pressed first or left is no relief: cells within a blister of it are left out.
+    Cells within a blister of where contact began or ended have no relief, and are left out.
     """
 
-    #: m; None where no cell was covered, or the method has no blister.
+    #: m; None if no cell was covered, or the method has no blister.
     rms: float | None
     largest: float | None
 
@@ -38,36 +37,37 @@ class ReliefError(NamedTuple):
 def find_nominal(
     scene: Scene, history: Mapping[str, NDArray[Any]], following: NDArray[Any], pressed: float = 0.0
 ) -> Floats:
-    """Return the nominal heights over the bed at rest, shape (n,), m."""
+    """Return the nominal heights over the bed at rest, (n,), m."""
     assert scene.blister is not None
-    rest, place, tip = scene.actuator.rest_height, history["position"], history["fingertip"]
-    patch = measure_reach(scene, place, following)
-    boss, crease = np.zeros(len(place)), np.zeros(len(place))
-    for center, over, wide in zip(tip[:, :2], tip[:, 2] + pressed - rest, patch, strict=True):
-        swept = evaluate_share(scene.blister, np.hypot(*(place - center).T) - wide) * over
+    position, tip = history["position"], history["fingertip"]
+    rise = tip[:, 2] + pressed - scene.actuator.rest_height
+    patch = measure_reach(scene, position, following)
+    boss, crease = np.zeros((2, len(position)))
+    for center, over, wide in zip(tip[:, :2], rise, patch, strict=True):
+        swept = evaluate_share(scene.blister, np.hypot(*(position - center).T) - wide) * over
         np.maximum(boss, swept, out=boss)
         np.minimum(crease, swept, out=crease)
-    # What was pressed in first and raised afterwards is a boss.
+    # Cells that were first pressed in and then raised belong to a boss.
     return np.where(boss > 0.0, boss, crease)
 
 
 def measure_relief(scene: Scene, history: Mapping[str, NDArray[Any]], pressed: float | None) -> ReliefError:
-    """Return how far the final heights are from the nominal ones, of all fingers together."""
+    """Return the deviation of the final heights from the nominal ones, of all fingers together."""
     if scene.blister is None or pressed is None:
         return ReliefError(None, None)
     nominal = np.zeros(scene.cells)
     clear = np.ones(scene.cells, dtype=bool)
-    for own in split_fingers(history):
-        following = np.count_nonzero(own["mode"] == Mode.FORCE_FOLLOW, axis=1)
-        touching = find_contact_rows(own["total_force"]) & (following > 0)
+    for part in split_fingers(history):
+        following = np.count_nonzero(part["mode"] == Mode.FORCE_FOLLOW, axis=1)
+        touching = find_contact_rows(part["total_force"]) & (following > 0)
         rows = np.flatnonzero(touching)[::THINNED]
-        path = {"fingertip": own["fingertip"][rows], "position": own["position"]}
-        found = find_nominal(scene, path, following[rows], pressed)
-        boss = np.maximum(nominal, found)
-        nominal = np.where(boss > 0.0, boss, np.minimum(nominal, found))
+        path = {"fingertip": part["fingertip"][rows], "position": part["position"]}
+        by_finger = find_nominal(scene, path, following[rows], pressed)
+        boss = np.maximum(nominal, by_finger)
+        nominal = np.where(boss > 0.0, boss, np.minimum(nominal, by_finger))
         for stretch in find_stretches(touching):
             for row in (stretch.start, stretch.stop - 1):
-                away = own["position"] - own["fingertip"][row, :2]
+                away = part["position"] - part["fingertip"][row, :2]
                 clear &= np.hypot(*away.T) > scene.blister.radius
     covered = (nominal != 0.0) & clear
     if not np.any(covered):
@@ -77,7 +77,7 @@ def measure_relief(scene: Scene, history: Mapping[str, NDArray[Any]], pressed: f
 
 
 def measure_reach(scene: Scene, position: Floats, following: NDArray[Any]) -> Floats:
-    """Return how far the middles of the cells under the fingertip reach, (t,), m; 0 but for Method II."""
+    """Return the radius of the cells' axes under the fingertip, (t,), m; 0 except for Method II."""
     if scene.method != "cell_states":
         return np.zeros(len(following))
     side = np.sqrt(compute_cell_area(position) or 0.0)
@@ -87,5 +87,5 @@ def measure_reach(scene: Scene, position: Floats, following: NDArray[Any]) -> Fl
 def evaluate_share(blister: Blister, distance: Floats) -> Floats:
     """Return the profile p(d), 0 outside the blister. `distance`: from its middle, m."""
     inside = np.maximum(distance, 0.0)
-    share: Floats = np.where(inside < blister.radius, np.maximum(blister.evaluate_profile(inside), 0.0), 0.0)
-    return share
+    profile = np.maximum(blister.evaluate_profile(inside), 0.0)
+    return np.where(inside < blister.radius, profile, 0.0)

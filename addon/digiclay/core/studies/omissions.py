@@ -1,10 +1,9 @@
 """Omission of model parts within a budget of height error, tried and measured.
 
-Each omission is tried by itself, the controller acting on what it then sees, in step with the
-full scene. Those that fit are added one after another, the one that saves most work for its
-error first, and the whole is measured again each time: errors neither add nor cancel in a
-closed loop. What is kept in the end was measured as it is, with the error of its integration
-on top.
+Each omission is tried alone, in step with the full scene, in closed loop. Those that fit are
+added one after another, in the order of saved work per error, and the whole is measured again
+each time, since errors in a closed loop do not simply add. The final scene has been measured
+as a whole, and the error of its integration is added.
 """
 
 import math
@@ -25,7 +24,7 @@ from ..scene.schema import Scene
 from ..session.accuracy import estimate_errors
 from ..session.run_scene import run
 
-#: Parts that can be left out, and its description.
+#: Parts that can be omitted, and their descriptions.
 PARTS = {
     "conduit": "no conduit behind the valve",
     "valve_lag": "valves that follow at once",
@@ -33,20 +32,20 @@ PARTS = {
     "relaxation": "a fingertip that does not relax",
     "sensors": "perfect sensors",
 }
-#: Those of them that own no row of the state a stepper works on.
+#: Those of them without a row of a stepper's state.
 WITHOUT_ROWS = ("conduit", "sensors")
-#: Shares of the budget a cell may stay off its commanded height: it comes to rest earlier.
+#: Dead bands of the heights, as shares of the budget, with which cells come to rest earlier.
 BANDS = (0.5, 0.25)
 
 
 class Omission(NamedTuple):
     """Part or refinement that a scene can omit."""
 
-    #: Of one kind only one can be left out.
+    #: Only one omission of a kind is possible.
     kind: str
-    #: What the scene then has.
+    #: Description of the scene with it.
     text: str
-    #: Makes a scene without it.
+    #: Returns a scene with the omission.
     leave_out: Callable[[Scene], Scene]
 
 
@@ -54,14 +53,13 @@ class Tried(NamedTuple):
     """Effect of an omission."""
 
     text: str
-    #: Largest difference of a height from the full scene, m; infinite when the trial was broken off
-    #: because it left the budget.
+    #: Largest difference of a height from the full scene, m; infinite for a trial that was aborted because it
+    #: exceeded the budget.
     departure: float
-    #: Shares of the full scene's work, and of its measured time, that are left; NaN when the trial was broken
-    #: off.
+    #: Remaining shares of the full scene's work and of its measured time; NaN for an aborted trial.
     work: float
     time: float
-    #: Whether the scene does without it.
+    #: Whether the final scene has the omission.
     kept: bool
 
 
@@ -70,14 +68,13 @@ class Fitted:
     """Scene within a budget."""
 
     scene: Scene
-    #: What was allowed; the largest difference of a height from the full scene, the controller acting on
-    #: what it sees; and the estimated error of the integration. The last two together are at most the
-    #: first, m.
+    #: Allowed error, m; largest difference of a height from the full scene in closed loop, m; and estimated
+    #: error of the integration, m. The sum of the last two is at most the first.
     budget: float
     departure: float
     own_error: float
-    #: Shares that are left of the full scene's work, cells times steps times the parts of a cell, by which
-    #: omissions are chosen, since it is the same in every run; and of its measured time.
+    #: Remaining shares of the full scene's work, cells times steps times the parts of a cell, by which
+    #: omissions are chosen because it is the same in every run; and of its measured time.
     work: float
     time: float
     tried: tuple[Tried, ...]
@@ -94,7 +91,7 @@ class Fitted:
 
 
 def propose_omissions(scene: Scene, budget: float) -> Iterator[Omission]:
-    """Give what a scene could do without: parts, physics steps, and cells that creep to their height."""
+    """Yield possible omissions of a scene: parts, physics steps, and cells almost at their heights."""
     simulation = scene.simulation
     steps = simulation.steps
     for fewer in range(1, steps):
@@ -114,47 +111,47 @@ def propose_omissions(scene: Scene, budget: float) -> Iterator[Omission]:
 def find_omissions(
     scene: Scene, budget: float, *, show: Callable[[str], object] = lambda text: None
 ) -> Fitted:
-    """Leave out of a scene what its results can do without."""
+    """Return a scene with all omissions that fit within a budget of height error, m."""
     if not (math.isfinite(budget) and budget > 0.0):
         raise ParameterError("run", "budget", "must be above 0 m", f"{budget:g} m")
     show("the full scene")
-    own = _own_error(scene)
-    if own > budget:
+    error = _estimate_error(scene)
+    if error > budget:
         hint = "Allow more, or take a shorter simulation.physics_step or the stepper 'richardson'."
-        rule = f"must be at least the error of the full scene's own integration, {own * 1e6:.2g} µm"
+        rule = f"must be at least the error of the full scene's own integration, {error * 1e6:.2g} µm"
         raise ParameterError("run", "budget", rule, f"{budget * 1e6:g} µm", hint)
     alone: list[tuple[Omission, Tried]] = []
     for omission in propose_omissions(scene, budget):
         show(omission.text)
-        trial = Tried(omission.text, *_departure(scene, omission.leave_out(scene), budget), False)
+        trial = Tried(omission.text, *_measure(scene, omission.leave_out(scene), budget), False)
         alone.append((omission, trial))
     fits = [pair for pair in alone if pair[1].departure <= budget and pair[1].work < 1.0]
     fits.sort(key=lambda pair: -(1.0 - pair[1].work) / (pair[1].departure + 1e-3 * budget))
-    best = Fitted(scene, budget, 0.0, own, 1.0, 1.0, tuple(tried for _, tried in alone))
+    best = Fitted(scene, budget, 0.0, error, 1.0, 1.0, tuple(tried for _, tried in alone))
     taken: list[Omission] = []
     for omission, _ in fits:
         if any(omission.kind == other.kind for other in taken):
             continue
         show(f"together + {omission.text}")
         less = omission.leave_out(best.scene)
-        departure, work, time = _departure(scene, less, budget)
+        departure, work, time = _measure(scene, less, budget)
         if departure > budget or work >= best.work:
             continue
-        own = _own_error(less)
-        if departure + own <= budget:
+        error = _estimate_error(less)
+        if departure + error <= budget:
             taken.append(omission)
-            best = replace(best, scene=less, departure=departure, own_error=own, work=work, time=time)
-    kept = {omission.text for omission in taken}
-    return replace(best, tried=tuple(trial._replace(kept=trial.text in kept) for trial in best.tried))
+            best = replace(best, scene=less, departure=departure, own_error=error, work=work, time=time)
+    texts = {omission.text for omission in taken}
+    return replace(best, tried=tuple(trial._replace(kept=trial.text in texts) for trial in best.tried))
 
 
 def _change(scene: Scene, section: str, **values: float) -> Scene:
-    """Change parameters of a part, or leave the part out where none are given."""
+    """Return a scene with other parameters of a part, or without the part if none are given."""
     return scene.with_sections(**{section: replace(scene.section(section), **values) if values else None})
 
 
-def _departure(full: Scene, less: Scene, budget: float) -> tuple[float, float, float]:
-    """Run two scenes in step; return how far apart they come, m, and the second's shares of work, time."""
+def _measure(full: Scene, less: Scene, budget: float) -> tuple[float, float, float]:
+    """Run two scenes in step; return their largest difference, m, and shares of work and time."""
     apart, done, took = 0.0, np.zeros(2), np.zeros(2)
     pair = [assemble(full), assemble(less)]
     runs = [periods(system, full.trajectories(), begin(system), full.periods) for system in pair]
@@ -174,13 +171,13 @@ def _departure(full: Scene, less: Scene, budget: float) -> tuple[float, float, f
 
 
 def _weight(scene: Scene, system: System) -> int:
-    """Return the work of a cell in a control period: steps times state rows, and parts that own no row."""
+    """Return the work of a cell in a control period: steps times the number of state rows and other parts."""
     rows: int = system.rows.driven.stop + sum(scene.section(part) is not None for part in WITHOUT_ROWS)
     return rows * scene.simulation.steps
 
 
-def _own_error(scene: Scene) -> float:
-    """Estimate how far the integration of a scene is from the exact solution, m of height."""
+def _estimate_error(scene: Scene) -> float:
+    """Estimate the height error of the integration of a scene, m."""
     recorded = replace(scene, recorder=Recorder())
     errors = estimate_errors(recorded, run(recorded).history)
     assert errors is not None

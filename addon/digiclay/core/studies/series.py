@@ -1,7 +1,7 @@
 """Series: pieces of work in one folder, such as a sweep's points or the jobs of a JOBS file.
 
-Its folder is made once, continued after a stop, and worked in by one process at a time. Each of its
-pieces is kept as soon as it is done.
+Its folder is made once, continued after a stop, and used by one process at a time. The result of each piece
+is stored at once.
 """
 
 import os
@@ -20,7 +20,7 @@ LOCK = ".lock"
 
 Piece = TypeVar("Piece")
 Outcome = TypeVar("Outcome")
-#: Pieces as they are done, each with a function that returns its outcome or raises its error.
+#: Pieces as they finish, each with a function that returns its outcome or raises its error.
 Results = Generator[tuple[Piece, Callable[[], Outcome]], None, None]
 
 
@@ -40,17 +40,17 @@ def open_series(
     description: Mapping[str, Any],
     refuse_another: Callable[[Any], None] | None = None,
 ) -> Iterator[None]:
-    """Make a series' folder, or continue one; no other process may work in it until the block ends.
+    """Make the folder of a series, or continue one; no other process may use it until the block ends.
 
-    A description that cannot be read counts as none where nothing has been done: the disk was full.
+    An unreadable description in a folder without results counts as missing: the disk was full.
     """
     with ExitStack() as until_the_end:
-        with ExitStack() as while_it_is_made, explain_os_error(f"{path} cannot be used"):
-            _make_folder(path, kind, while_it_is_made, until_the_end)
-            there = run_folder.read_json(path / kind.mark)
-            if refuse_another is not None and (there is not None or not _is_bare(path, kind)):
-                refuse_another(there)
-            if there != description:
+        with ExitStack() as during_creation, explain_os_error(f"{path} cannot be used"):
+            _make_folder(path, kind, during_creation, until_the_end)
+            former = run_folder.read_json(path / kind.mark)
+            if refuse_another is not None and (former is not None or not _is_bare(path, kind)):
+                refuse_another(former)
+            if former != description:
                 run_folder.write_whole(path / kind.mark, run_folder.format_json(description))
             for name in kind.folders:
                 run_folder.resolve_inside(path, name).mkdir(exist_ok=True)
@@ -59,13 +59,13 @@ def open_series(
         yield
 
 
-def _make_folder(path: Path, kind: Kind, while_it_is_made: ExitStack, until_the_end: ExitStack) -> None:
-    """Make the folder, if there is none, and lock it."""
+def _make_folder(path: Path, kind: Kind, during_creation: ExitStack, until_the_end: ExitStack) -> None:
+    """Make the folder, if it does not exist, and lock it."""
     if path.exists() and not path.is_dir():
         raise OutputError(f"{path} is a file: choose another folder with --out.")
     if not path.exists() or os.access(path.resolve().parent, os.W_OK):
-        # A run of this name cannot end in between, nor one begin.
-        while_it_is_made.enter_context(run_folder.lock_name(path))
+        # No run of this name can begin or end meanwhile.
+        during_creation.enter_context(run_folder.lock_name(path))
     until_the_end.enter_context(run_folder.remove_if_empty(path.resolve() / kind.mark))
     path.mkdir(parents=True, exist_ok=True)
     if not (path / kind.mark).is_file() and not _is_bare(path, kind):
@@ -74,10 +74,10 @@ def _make_folder(path: Path, kind: Kind, while_it_is_made: ExitStack, until_the_
 
 
 def _is_bare(path: Path, kind: Kind) -> bool:
-    """Return whether nothing has been done in a folder: there is but the frame of a series."""
-    for found in path.iterdir():
-        frame = found.name in (LOCK, kind.mark) or run_folder.is_unfinished(found)
-        if not frame and not (found.name in kind.folders and found.is_dir() and not any(found.iterdir())):
+    """Return whether a folder has no results: only lock, description and empty folders of a series."""
+    for entry in path.iterdir():
+        frame = entry.name in (LOCK, kind.mark) or run_folder.is_unfinished(entry)
+        if not frame and not (entry.name in kind.folders and entry.is_dir() and not any(entry.iterdir())):
             return False
     return True
 
@@ -87,19 +87,19 @@ def finish(
     keep: Callable[[Piece, Outcome], None],
     fail: Callable[[Piece, str], None],
 ) -> None:
-    """Keep the outcome of each piece of a series as it arrives, or report why the piece failed."""
+    """Pass the outcome of each piece of a series to `keep` as it arrives, or its error to `fail`."""
     with closing(results):
         for piece, take in results:
             try:
                 outcome = take()
-            except Exception as error:  # the other pieces are worth having
+            except Exception as error:  # the other pieces are independent of it
                 fail(piece, describe_error(error))
             else:
                 keep(piece, outcome)
 
 
 def describe_error(error: Exception) -> str:
-    """Return in one line what went wrong; an error that no user can cause is named by its kind."""
+    """Return an error in one line; one that no user can cause begins with its type."""
     if isinstance(error, DigiclayError):
         return one_line(error)
     if isinstance(error, MemoryError):

@@ -23,9 +23,9 @@ from ..scene.recorder import Recorder
 from ..scene.schema import Scene
 from ..session.run_scene import Result, run, select_rows
 
-#: How long the fingertip rests at the ends of a phase, s.
+#: Rest of the fingertip at the ends of a phase, s.
 REST = 0.3
-#: Between which speeds the largest one is searched, m/s.
+#: Range of speeds in which the largest one is searched, m/s.
 LOW, HIGH = 2e-3, 40e-3
 
 
@@ -49,24 +49,24 @@ class Follows:
 
     #: m/s.
     speed: float
-    #: How often contact ended in it or in the 0.3 s after, or was absent from its start on.
+    #: Ends of contact in it or in the 0.3 s after, and 1 if contact was absent at its start.
     losses: int
     #: Share of the time without contact.
     loss_share: float
     #: Largest distance of the blister, m; infinite without contact.
     lag: float
-    #: N, over all rows that ask for a force, those without contact too.
+    #: N, over all rows with a set point, also those without contact.
     rfd: float
 
     def meets(self, criterion: Criterion) -> bool:
-        """Return whether this counts as followed."""
-        kept = self.losses == 0 and self.loss_share == 0.0
-        return kept and self.lag < criterion.lag and self.rfd < criterion.deviation
+        """Return whether the fingertip counts as followed."""
+        in_contact = self.losses == 0 and self.loss_share == 0.0
+        return in_contact and self.lag < criterion.lag and self.rfd < criterion.deviation
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Drag(Parameters):
-    """Press, raise or sink a blister, then drag it level and straight along x."""
+    """Press, raise or lower a blister, then drag it level and straight along x."""
 
     press: float = quantity(4.5e-3, "how deep the first press goes", unit="m", above=0.0)
     height: float = quantity(
@@ -76,7 +76,7 @@ class Drag(Parameters):
     length: float = quantity(42e-3, "how far it drags", unit="m", above=0.0)
 
     def path(self, speed: float, rest: float) -> tuple[Path, float, float]:
-        """Return the fingertip's path, and when it starts and ends to drag, s, for a surface at `rest`, m."""
+        """Return the fingertip's path, and start and end of the drag, s, for a surface at `rest`, m."""
         right, down, level = 0.5 * self.length, rest - self.press, rest + self.height
         start = 1.3 + max(abs(level - down) / self.approach, REST) + REST
         end = start + self.length / speed
@@ -94,15 +94,15 @@ class Drag(Parameters):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Lift(Parameters):
-    """Press, then lift straight up, gently at first and at last; its speed is the greatest on the way."""
+    """Press, then lift straight up with a gentle start and end; its speed is the largest in between."""
 
     press: float = quantity(4.5e-3, "how deep the first press goes", unit="m", above=0.0)
     rise: float = quantity(18e-3, "how far it lifts", unit="m", above=0.0)
 
     def path(self, speed: float, rest: float) -> tuple[Path, float, float]:
-        """Return the fingertip's path, and when it starts and ends to lift, s, for a surface at `rest`, m."""
+        """Return the fingertip's path, and start and end of the lift, s, for a surface at `rest`, m."""
         down, start = rest - self.press, 2.0
-        # A cubic that starts and ends at rest is 1.5 times as fast in the middle as on the whole.
+        # A cubic that starts and ends at rest is 1.5 times as fast in the middle as on average.
         end = start + 1.5 * self.rise / speed
         points = (
             (0.0, 0.0, rest + 1e-3),
@@ -119,30 +119,30 @@ def _through(points: tuple[tuple[float, float, float], ...], interpolation: str)
     return Path(interpolation, tuple(Waypoint(time=t, position=(x, 0.0, z)) for t, x, z in points))
 
 
-def track(scene: Scene, way: Drag | Lift, speed: float) -> tuple[Follows, Result]:
+def track(scene: Scene, motion: Drag | Lift, speed: float) -> tuple[Follows, Result]:
     """Run a drag or a lift at a speed, m/s, with the device and method of a scene, and judge it."""
-    placed, start, end = place_way(scene, way, speed)
-    done = run(placed)
+    trial, start, end = make_trial(scene, motion, speed)
+    done = run(trial)
     return judge(done, start, end, speed), done
 
 
-def place_way(scene: Scene, way: Drag | Lift, speed: float) -> tuple[Scene, float, float]:
-    """Return a scene whose first fingertip alone drags or lifts, and start and end of the judged phase, s.
+def make_trial(scene: Scene, motion: Drag | Lift, speed: float) -> tuple[Scene, float, float]:
+    """Return a scene in which only the first fingertip drags or lifts, and the judged phase: start, end, s.
 
     Refuses a bed that the fingertip would leave.
     """
     wide = (scene.layout.columns - 1) * scene.layout.pitch
-    if isinstance(way, Drag) and wide < way.length:
-        rule = f"must make the bed at least as wide as the drag, {way.length:g} m"
+    if isinstance(motion, Drag) and wide < motion.length:
+        rule = f"must make the bed at least as wide as the drag, {motion.length:g} m"
         raise ParameterError("layout", "columns", rule, f"{wide:g} m")
-    path, start, end = way.path(speed, scene.actuator.rest_height)
+    path, start, end = motion.path(speed, scene.actuator.rest_height)
     shorter = replace(scene.simulation, duration=0.0)
     alone = replace(scene, fingers=scene.fingers[:1])
     return alone.with_sections(trajectory=path, simulation=shorter, recorder=Recorder()), start, end
 
 
 def judge(done: Result, start: float, end: float, speed: float) -> Follows:
-    """Judge a phase of a run. `start`, `end`, s; `speed`: that it was run with, m/s."""
+    """Judge a phase of a run at a speed, m/s, from `start` to `end`, s."""
     part = select_rows(done.history, start, end)
     sums, total = sum_cells(part), part["total_force"]
     ends = find_contact_ends(done.history["time"], done.history["total_force"])
@@ -156,7 +156,7 @@ def judge(done: Result, start: float, end: float, speed: float) -> Follows:
 
 
 def bisect(holds: Callable[[float], bool], low: float, high: float, resolution: float) -> float | None:
-    """Return the largest value known to hold, to within a resolution, by bisection."""
+    """Return the largest value that holds, to within a resolution, by bisection; None: not even `low`."""
     if not holds(low):
         return None
     if holds(high):
@@ -169,7 +169,7 @@ def bisect(holds: Callable[[float], bool], low: float, high: float, resolution: 
 
 def find_largest_speed(
     scene: Scene,
-    way: Drag | Lift,
+    motion: Drag | Lift,
     criterion: Criterion,
     *,
     low: float = LOW,
@@ -180,7 +180,7 @@ def find_largest_speed(
     """Return the largest speed, m/s, at which a fingertip is followed, by bisection; see `bisect`."""
 
     def holds(speed: float) -> bool:
-        judged, _ = track(scene, way, speed)
+        judged, _ = track(scene, motion, speed)
         report(judged)
         return judged.meets(criterion)
 
@@ -188,21 +188,22 @@ def find_largest_speed(
 
 
 def describe_end(speed: float | None, low: float = LOW, high: float = HIGH) -> str:
-    """Return the end of a search where it is all that was found of a largest speed, mm/s; else ``""``."""
+    """Return the end of the range, mm/s, if the largest speed is beyond it; else ``""``."""
     if speed is None:
         return f"below {low * 1e3:g}"
     return f"at least {high * 1e3:g}" if speed >= high else ""
 
 
 def find_free_speed(scene: Scene) -> float:
-    """Return how fast a pin without load rises through an open valve, m/s."""
+    """Return the speed of a pin without load that rises behind an open valve, m/s."""
     return float(assemble(scene).fastest)
 
 
 def find_unintended_losses(done: Result) -> list[float]:
-    """Return when contact of a fingertip ended, s, though it rose no faster than a pin can just then."""
-    limit, moments, losses = find_free_speed(done.scene), done.history["time"], list[float]()
-    for own in split_fingers(done.history):
-        found = find_losses(moments, own["total_force"], own["fingertip"][:, 2], limit)
-        losses += [loss.start for loss in found]
-    return losses
+    """Return when contact of a fingertip ended, s, although it rose no faster than a pin can."""
+    limit, moments = find_free_speed(done.scene), done.history["time"]
+    starts: list[float] = []
+    for part in split_fingers(done.history):
+        losses = find_losses(moments, part["total_force"], part["fingertip"][:, 2], limit)
+        starts += [loss.start for loss in losses]
+    return starts

@@ -1,4 +1,4 @@
-"""Folder of a series of points: its definition, one small file a finished point, and the table of all."""
+"""Folder of a series of points: its definition, a small file per finished point, and the table of all."""
 
 import csv
 import hashlib
@@ -25,7 +25,7 @@ from .series import Kind, open_series
 
 #: The folder of the points.
 POINTS = "points"
-#: Figures of every table, beside those asked for.
+#: Figures of every table, besides the requested ones.
 EFFORT = ("run_time", "height_error", "force_error")
 #: The comment at the end of a line of a scene file.
 NOTE = re.compile(r'  # [^"\n]*$', re.MULTILINE)
@@ -41,14 +41,14 @@ class Folder:
         """Return the finished points by index."""
         records = {}
         for path in self.path.glob(f"{POINTS}/*.json"):
-            record = read_json(path)  # a file that cannot be read is a point to be done again
+            record = read_json(path)  # a point with an unreadable file is evaluated again
             if not path.stem.isdecimal() or record is None or not record.keys() & {"figures", "error"}:
                 continue
             records[int(path.stem)] = record
         return records
 
     def keep(self, point: Point, keys: Sequence[str], record: Record) -> None:
-        """Write the file of a finished point, whole or not at all. `keys`: the varied parameters."""
+        """Write the file of a finished point, complete or not at all. `keys`: the varied parameters."""
         values = dict(zip(keys, point.words, strict=True))
         write_whole(self.path / POINTS / f"{point.index:06d}.json", format_json({"values": values, **record}))
 
@@ -64,8 +64,8 @@ def hash_points(points: Sequence[Point]) -> str:
     written: dict[tuple[Any, ...], list[str]] = {}
 
     def write(section: str, part: Any, method: str = "") -> list[str]:
-        # Points have most parts in common, and all of them are there until the end: a part is its address.
-        # Its comments are taken out of all of its lines at once, which is much faster than line by line.
+        # Points share most parts, which all exist until the end: the address of a part identifies it.
+        # Removing the comments of all its lines at once is much faster than line by line.
         key = section, method, id(part)
         if key not in written:
             lines = "\n".join(write_part(section, part, method))
@@ -75,7 +75,7 @@ def hash_points(points: Sequence[Point]) -> str:
     for point in points:
         scenes.update((format_scene(point.scene, write) if point.scene else point.error).encode())
         if point.scene is not None:
-            scenes.update(find_method(point.scene.method).digest.encode())  # nothing, of a built-in one
+            scenes.update(find_method(point.scene.method).digest.encode())  # empty for a built-in one
     return scenes.hexdigest()
 
 
@@ -87,7 +87,7 @@ def open_points(
     describe: Callable[[Mapping[str, Any]], str],
     accept: Callable[[Mapping[str, Any], Folder], bool] = lambda there, folder: False,
 ) -> Iterator[Folder]:
-    """Make the folder of a series of points, or continue one of the same description, locked meanwhile."""
+    """Make the folder of a series of points, or continue one of the same description, and lock it."""
     folder, mark = Folder(path), f"{name}.json"
 
     def refuse_another(there: Any) -> None:
@@ -106,7 +106,7 @@ def open_points(
 def open_sweep(
     path: Path, points: Sequence[Point], axes: Sequence[Axis], version: str
 ) -> AbstractContextManager[Folder]:
-    """Open the folder of a sweep, see `open_points`; another version of digiclay may have other figures."""
+    """Open the folder of a sweep, see `open_points`; other versions of digiclay may have other figures."""
     plan = {
         "digiclay": version,
         "axes": [{"key": axis.key, "values": list(axis.words)} for axis in axes],
@@ -125,28 +125,28 @@ def open_sweep(
 
 
 def _agrees(records: Mapping[int, Record], points: Sequence[Point]) -> bool:
-    """Return whether the first point that is kept comes to the same figures once more.
+    """Return whether the first stored point has the same figures when evaluated again.
 
     Older descriptions identify scenes by a number that depends on the wording of their comments.
     """
     for index, record in sorted(records.items()):
         scene = points[index].scene if index < len(points) else None
         if scene is not None and "figures" in record:
-            kept, again = record["figures"], (evaluate(scene) or {}).get("figures", {})
-            names = kept.keys() - {*TIMES, *ERRORS}
-            return all(_is_close(kept[name], again.get(name)) for name in names)
+            stored, again = record["figures"], (evaluate(scene) or {}).get("figures", {})
+            names = stored.keys() - {*TIMES, *ERRORS}
+            return all(_is_close(stored[name], again.get(name)) for name in names)
     return not records
 
 
-def _is_close(one: float | None, other: float | None) -> bool:
-    """Return whether a figure is the same but for rounding."""
-    if one is None or other is None:
-        return one is other
-    return math.isclose(one, other, rel_tol=1e-6, abs_tol=1e-12)
+def _is_close(figure: float | None, other: float | None) -> bool:
+    """Return whether two figures agree except for rounding."""
+    if figure is None or other is None:
+        return figure is other
+    return math.isclose(figure, other, rel_tol=1e-6, abs_tol=1e-12)
 
 
 def make_grid(records: Mapping[int, Record], axes: Sequence[Axis], name: str) -> NDArray[np.float64]:
-    """Return a figure of `evaluation.FIGURES` at all points, a dimension an axis; NaN where it is absent."""
+    """Return a figure of `evaluation.FIGURES` at all points, a dimension per axis; NaN: absent."""
     shape = [len(axis.words) for axis in axes]
     values = np.full(int(np.prod(shape)), np.nan)
     for index, record in records.items():
