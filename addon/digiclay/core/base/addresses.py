@@ -4,7 +4,7 @@ import ipaddress
 
 
 def is_loopback(host: str) -> bool:
-    """Return whether a host is this machine alone; other names are not looked up."""
+    """Return whether a host is this machine; other names are not looked up."""
     try:
         return ipaddress.ip_address(host).is_loopback
     except ValueError:
@@ -12,7 +12,7 @@ def is_loopback(host: str) -> bool:
 
 
 def describe_exposure(host: str, sent: str) -> str:
-    """Return a warning of what is sent without encryption; "" on this machine alone."""
+    """Return a warning about unencrypted data; `sent`: its name and verb; "" for this machine."""
     if is_loopback(host):
         return ""
     return f"Other machines can reach {host}, and {sent} sent without encryption."

@@ -1,7 +1,7 @@
 """Arrays of a few hundred cells, (n,), or of the cells of b runs, (n, b): constants, tests and linear maps.
 
-At that size it is numpy's calls that cost. A number that differs from run to run is an array (b,),
-which numpy puts against the last axis; a linear map (o, i) that does is an array (o, i, b).
+At that size the calls of numpy cost most. A number that differs from run to run is an array (b,),
+which numpy broadcasts along the last axis; a linear map (o, i) that differs is an array (o, i, b).
 """
 
 from collections.abc import Callable
@@ -22,23 +22,23 @@ Indices = NDArray[np.int64]
 #: Corners of triangles (f, 3), numbers of vertices.
 Faces = NDArray[np.int32]
 
-#: Lengths, m, forces, N, times, s, and ranks that differ by no more are equal. What the lattice, symmetry or
-#: the clock makes equal differs by rounding, 1e-12 at most, which is other on another processor: it decides
-#: nothing. Of equal ones the first is taken.
+#: Largest difference of equal lengths, m, forces, N, times, s, and ranks. Values that are equal by the
+#: lattice, symmetry or the clock differ by rounding, at most 1e-12, which depends on the processor and must
+#: not decide. Of equal values the first is taken.
 TIE = 1e-9
 PARTS = 2.0**30
 #: Smallest normal number: keeps 0 / 0 from being NaN.
 TINY = float(np.finfo(float).tiny)
-#: Shapes for which one set of `Constants` is kept.
+#: Most shapes of a set of `Constants`.
 MOST_SHAPES = 64
 
 
 class Constants(dict[tuple[int, ...], tuple[Any, ...]]):
-    """Numbers such that arrays of a shape can be calculated with them: ``Constants((0.0, 1.0))[shape]``.
+    """Numbers for calculations with arrays of a shape: ``Constants((0.0, 1.0))[shape]``.
 
-    Numpy takes two operands of one shape twice as fast as an array and a number, so for the
-    cells of one run, (n,), each becomes an array of elements of a kind; these are kept, shared and
-    read-only. Numbers that differ from run to run are arrays (b,).
+    Numpy combines two operands of one shape twice as fast as an array and a number, so for the
+    cells of one run, (n,), each becomes an array of elements of a kind, cached and read-only.
+    Numbers that differ from run to run are arrays (b,).
     """
 
     def __init__(self, numbers: tuple[Any, ...], kind: type = np.float64) -> None:
@@ -46,23 +46,23 @@ class Constants(dict[tuple[int, ...], tuple[Any, ...]]):
         self._numbers, self._kind = numbers, kind
 
     def __missing__(self, shape: tuple[int, ...]) -> tuple[Any, ...]:
-        """Make the numbers for arrays of a shape, (n,) or (n, b), that has not been asked for."""
+        """Make the numbers for arrays of a new shape, (n,) or (n, b)."""
         if len(self) >= MOST_SHAPES:
             self.clear()
-        made = self._numbers
+        numbers = self._numbers
         if len(shape) == 1:
-            rows: NDArray[Any] = np.array(made, self._kind).repeat(*shape).reshape(len(made), *shape)
+            rows: NDArray[Any] = np.array(numbers, self._kind).repeat(*shape).reshape(len(numbers), *shape)
             rows.flags.writeable = False
-            made = tuple(rows)
+            numbers = tuple(rows)
         elif self._kind is not np.float64:
-            made = tuple(self._kind(one) for one in made)
-        self[shape] = made
-        return made
+            numbers = tuple(map(self._kind, numbers))
+        self[shape] = numbers
+        return numbers
 
 
 def settle(values: Any) -> Any:
-    """Return numbers, or one, to about `TIE`: those that are equal but for rounding become the same."""
-    # Halfway between two parts of a power of two no number lies that is written with a few digits.
+    """Return numbers rounded to about `TIE`: those that are equal except for rounding become identical."""
+    # To multiples of a power of two: no number of a few digits is halfway between two of them.
     return np.rint(values * PARTS) / PARTS
 
 
@@ -77,28 +77,28 @@ def any_true(test: NDArray[np.bool_]) -> bool:
 
 
 def count_true(test: NDArray[np.bool_]) -> Any:
-    """Return for how many cells a test, (n,), holds; for a test (n, b) a list, one number a run."""
+    """Return for how many cells a test (n,) holds; for a test (n, b) a list, one number per run."""
     return test.tobytes().count(1) if test.ndim == 1 else np.count_nonzero(test, axis=0).tolist()
 
 
 class Copies(NamedTuple):
-    """Cells (g,) that several of f rows have, and their p entries, in the order of rows."""
+    """Cells (g,) that are in several of f rows, and their p entries, in the order of rows."""
 
     cells: Cells
     row: Cells
     which: Cells
     number: Cells
-    """(p,): Of the entries: their rows, which of these cells, and numbers among the entries of all cells."""
+    """(p,): Of the entries: rows, indices among these cells, and numbers among the entries of all cells."""
     entries: Cells
-    """(c, g): Which are each cell's; the first one makes up the number."""
+    """(c, g): Entries of each cell; the first one fills up columns of fewer."""
 
 
 def find_copies(inside: Flags) -> Copies:
-    """Return which cells several rows have, (f, n)."""
+    """Return the cells that are in several rows (f, n)."""
     (cells,) = (np.add.reduce(inside, axis=0, dtype=np.intp) > 1).nonzero()
-    own = inside[:, cells]
-    row, which = own.nonzero()
-    number, rank = np.cumsum(inside).reshape(inside.shape), np.cumsum(own, axis=0)
+    shared = inside[:, cells]
+    row, which = shared.nonzero()
+    number, rank = np.cumsum(inside).reshape(inside.shape), np.cumsum(shared, axis=0)
     entries = np.empty((rank.max(initial=1), cells.size), np.intp)
     order = np.arange(row.size)
     entries[:, which[::-1]] = order[::-1]
@@ -112,21 +112,22 @@ def per_row(values: Floats, dimensions: int) -> Floats:
 
 
 def apply_map(linear: Floats, rows: Floats) -> Floats:
-    """Return what a linear map (o, i[, b]) makes of rows (i, n[, b]), shape (o, n[, b])."""
-    made: Floats = np.empty((len(linear), *rows.shape[1:]))
-    prepare_map(linear, rows, made)()
-    return made
+    """Return the result (o, n[, b]) of a linear map (o, i[, b]) for rows (i, n[, b])."""
+    out: Floats = np.empty((len(linear), *rows.shape[1:]))
+    prepare_map(linear, rows, out)()
+    return out
 
 
 def prepare_map(linear: Floats, rows: Floats, out: Floats) -> Callable[[], Any]:
-    """Return a function that applies a map to rows, as they are then, into contiguous `out`: `apply_map`."""
+    """Return a function that maps the rows at its call into contiguous `out`; see `apply_map`."""
     if linear.ndim == 3:
         return partial(_by_run, linear, rows, out)
-    flat, made = (rows, out) if rows.ndim == 2 else (rows.reshape(len(rows), -1), out.reshape(len(out), -1))
-    return partial(np.matmul, linear, flat, made)
+    if rows.ndim > 2:
+        rows, out = rows.reshape(len(rows), -1), out.reshape(len(out), -1)
+    return partial(np.matmul, linear, rows, out)
 
 
 def _by_run(linear: Floats, rows: Floats, out: Floats) -> None:
-    """Work out each run's own linear map; row by row, over all of them numpy takes four times as long."""
-    for one, made in zip(linear, out, strict=True):
-        np.einsum("ib,inb->nb", one, rows, out=made)
+    """Apply the linear map of each run; row by row, which is four times as fast as all rows at once."""
+    for weights, row in zip(linear, out, strict=True):
+        np.einsum("ib,inb->nb", weights, rows, out=row)

@@ -8,9 +8,9 @@ LONGEST, VALUE = 400, 160
 
 
 def one_line(text: object, most: int = LONGEST) -> str:
-    """Return a text as one line of a sane length, without what would steer a terminal.
+    """Return a text as one line of limited length, without control characters.
 
-    Of a longer one its beginning is shown, which says what is wrong, and its end, which helps.
+    A longer one is cut to its beginning, which has the error, and its end, which has the remedy.
     """
     line = " ".join(str(text).split())
     line = "".join(letter if letter.isprintable() else "\N{REPLACEMENT CHARACTER}" for letter in line)
@@ -19,16 +19,16 @@ def one_line(text: object, most: int = LONGEST) -> str:
 
 
 class DigiclayError(Exception):
-    """Base of all errors that a user can cause; its text is one complete line of a sane length."""
+    """Base of all errors that a user can cause; its text is one line of limited length."""
 
     def __init__(self, text: object = "") -> None:
         super().__init__(one_line(text))
 
 
 class ParameterError(DigiclayError, ValueError):
-    """Parameter outside its rule, which starts with ``must``; the value has its unit, the hint what is meant.
+    """Parameter that breaks a rule, which begins with ``must``; the value has its unit, the hint a remedy.
 
-    The owner is the part as users know it (``"Valve"``); the field is empty when the rule joins several.
+    The owner is the part as users know it (``"Valve"``); the field is empty for a rule on several.
     """
 
     def __init__(self, owner: str, field: str, rule: str, value: str, hint: str = "") -> None:
@@ -52,7 +52,7 @@ class OutputError(DigiclayError):
 
 @contextmanager
 def explain_os_error(rule: str, kind: type[DigiclayError] = OutputError) -> Iterator[None]:
-    """Raise an error of the system within the block as one of ours: the rule, and why."""
+    """Raise an OSError within the block as an error of ours: the rule, and the reason."""
     try:
         yield
     except OSError as error:
@@ -68,7 +68,7 @@ class StateError(DigiclayError):
 
 
 class DivergenceError(DigiclayError, ArithmeticError):
-    """Integration with values beyond all bounds: time, s, first cell, its quantity and value."""
+    """Integration with values that are not finite: time, s, first cell, its quantity and value."""
 
     def __init__(self, time: float, cell: int, quantity: str, value: float, remedy: str) -> None:
         self.time, self.cell, self.quantity, self.value, self.remedy = time, cell, quantity, value, remedy

@@ -1,7 +1,7 @@
 """Control modes of a cell: one table of codes, names, meanings and colors.
 
-The codes are what ``history.npz`` stores and what the view maps to materials. The
-colors are Okabe and Ito's palette, told apart by people with any color vision.
+``history.npz`` stores the codes, and the view maps them to materials. The colors are Okabe
+and Ito's palette, which people with any color vision can distinguish.
 """
 
 from enum import IntEnum
@@ -21,7 +21,7 @@ class Mode(IntEnum):
     LOCKED = 8
 
 
-#: The same as plain numbers: numpy takes an enumeration's member ten times as long.
+#: The same as plain numbers, which numpy converts ten times as fast as members of an enumeration.
 REST, HOLD, EDGE, BLISTER, SPRING, FORCE_FOLLOW, CRITICAL, FROZEN, LOCKED = map(int, Mode)
 
 MEANINGS: dict[Mode, str] = {

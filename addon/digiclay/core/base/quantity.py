@@ -2,7 +2,7 @@
 
 A part's parameters are a frozen dataclass that derives from `Parameters` and declares
 its fields with `quantity`. Validation, messages, scene files, the table in the docs and
-Blender's properties are all made from these declarations.
+Blender's properties are derived from these declarations.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ import numpy as np
 
 from .errors import DigiclayError, ParameterError
 
-#: Factor to SI and the SI unit it belongs to, for values written as ``"3 mm"``.
+#: Factor to the SI unit, and the SI unit, for values written as ``"3 mm"``.
 UNITS: dict[str, tuple[float, str]] = {
     "m": (1.0, "m"), "cm": (1e-2, "m"), "mm": (1e-3, "m"), "um": (1e-6, "m"), "µm": (1e-6, "m"),
     "s": (1.0, "s"), "ms": (1e-3, "s"), "us": (1e-6, "s"), "µs": (1e-6, "s"),
@@ -30,16 +30,16 @@ UNITS: dict[str, tuple[float, str]] = {
     "kg/m3": (1.0, "kg/m3"), "m2/s": (1.0, "m2/s"), "mm2/s": (1e-6, "m2/s"), "cSt": (1e-6, "m2/s"),
 }  # fmt: skip
 
-#: How small, unless it is 0, and how large a number of a unit can be: far beyond all devices, and near enough
-#: to 1 that products of some of them stay finite and do not vanish.
+#: Smallest, unless 0, and largest number of a unit: far beyond all devices, and close enough to 1 that
+#: products of several neither overflow nor vanish.
 EXTENTS: dict[str, tuple[float, float]] = {
     "m": (1e-12, 1e3), "s": (1e-9, 1e6), "Pa": (1e-6, 1e10), "N": (1e-12, 1e6), "N/m": (1e-6, 1e9),
     "1/m": (1e-6, 1e9), "1/N": (1e-6, 1e9), "m/s": (1e-12, 1e6), "m/s2": (1e-9, 1e9), "kg/m3": (1e-3, 1e6),
     "m2/s": (1e-12, 1e3), "N s/m": (1e-9, 1e9), "": (1e-9, 1e9),
 }  # fmt: skip
-#: Bounds of a parameter: what a value within one fulfils.
+#: Bounds of a parameter: the comparison that a valid value satisfies.
 BOUNDS = {"above": operator.gt, "at_least": operator.ge, "below": operator.lt, "at_most": operator.le}
-#: A number, and what stands behind it.
+#: A number, and the text after it.
 WRITTEN = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|[+-]?(?:nan|inf)(?= |$))\s*(.*)")
 
 
@@ -48,9 +48,9 @@ class Quantity(NamedTuple):
 
     Bounds are in the parameter's own unit; ``above`` and ``below`` are exclusive,
     ``at_least`` and ``at_most`` inclusive. `source` is P (paper), D (derived), C (chosen) or
-    the key of a reference in docs/nomenclature.md; several are set apart by commas. A `later` one is
-    unknown to older versions: it is written only where it is not the default, so that these read the rest.
-    `whole` is the meaning of twice the value, which a person reads in place of a semi-axis.
+    the key of a reference in docs/nomenclature.md; several are separated by commas. A `later` one is
+    unknown to older versions, and is only written if it is not the default, so that these read the rest.
+    `whole` is the meaning of twice the value, which is shown in place of a semi-axis.
     """
 
     doc: str
@@ -66,7 +66,7 @@ class Quantity(NamedTuple):
     whole: str = ""
 
     def show(self, value: object) -> str:
-        """Write `value` the way messages do, with the unit."""
+        """Return a value as in messages, with the unit."""
         if isinstance(value, str):
             return repr(value)
         if isinstance(value, int) and abs(value) > 10**18:
@@ -75,11 +75,11 @@ class Quantity(NamedTuple):
         return f"{text} {self.unit}".rstrip()
 
     def list_bounds(self) -> list[tuple[str, float]]:
-        """Return the declared bounds, each behind its name in `BOUNDS`."""
+        """Return the declared bounds, with their names in `BOUNDS`."""
         return [(word, getattr(self, word)) for word in BOUNDS if getattr(self, word) is not None]
 
     def broken_rule(self, value: Any) -> str:
-        """Return the first bound `value` breaks, worded as a rule, or ``""``."""
+        """Return the first rule that a value breaks, or ``""``."""
         if self.choices and value not in self.choices:
             return "must be one of " + ", ".join(self.choices)
         if not isinstance(value, (int, float)):
@@ -92,7 +92,7 @@ class Quantity(NamedTuple):
         return self._out_of_extent(value)
 
     def _out_of_extent(self, value: float) -> str:
-        """Return the rule broken by a number within its bounds that is beyond all devices, or ``""``."""
+        """Return the rule that a number beyond all devices breaks, or ``""``."""
         least, most = EXTENTS[self.unit]
         if self.at_most is None and self.below is None and value > most:
             return f"must be at most {self.show(most)}"
@@ -103,9 +103,9 @@ class Quantity(NamedTuple):
         return ""
 
 
-def quantity(default: Any, doc: str, **known: Any) -> Any:
-    """Declare a dataclass field together with its `Quantity`. `known`: the other fields of `Quantity`."""
-    return dataclasses.field(default=default, metadata={"quantity": Quantity(doc, **known)})
+def quantity(default: Any, doc: str, **fields: Any) -> Any:
+    """Declare a dataclass field with its `Quantity`; `fields`: the other fields of that."""
+    return dataclasses.field(default=default, metadata={"quantity": Quantity(doc, **fields)})
 
 
 def list_quantities(parameters: type[Parameters] | Parameters) -> dict[str, Quantity]:
@@ -115,9 +115,9 @@ def list_quantities(parameters: type[Parameters] | Parameters) -> dict[str, Quan
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Parameters:
-    """Base of every part's parameters: frozen, and valid once built; ParameterError tells what is wrong.
+    """Base of every part's parameters: frozen and valid, or refused with ParameterError.
 
-    What is alike in all is here: made for each class, it would take a twentieth of a short command.
+    It has the methods that dataclasses would make for each class, in a twentieth of a short command's time.
     """
 
     def _list_values(self) -> tuple[Any, ...]:
@@ -165,19 +165,19 @@ class Parameters:
         """Check the rules that join several fields; parts override this."""
 
     def list_idle(self) -> frozenset[str]:
-        """Return the parameters without effect under the choices made: unless changed, no file has them."""
+        """Return the parameters without effect under the other choices: files have them only if changed."""
         return frozenset()
 
 
 def refuse_overrides(kind: type, base: type, names: tuple[str, ...], reason: str) -> None:
-    """Refuse a class that overrides attributes of its base which others are computed beside."""
+    """Refuse a class that overrides attributes of its base which other code bypasses."""
     for name in names:
         if getattr(kind, name) is not getattr(base, name):
             raise ParameterError(kind.__name__, name, f"must be that of {base.__name__}: {reason}", "another")
 
 
 def _typed(owner: Parameters, name: str, value: Any, default: Any) -> Any:
-    """Return `value` in the type of `default`; whole numbers pass for floats."""
+    """Return `value` in the type of `default`; whole numbers are valid floats."""
     kind = type(default)
     if isinstance(value, (np.generic, np.ndarray)):
         value = value.tolist()
@@ -204,19 +204,19 @@ def _finite(value: float) -> bool:
 
 
 def normalize(text: str) -> str:
-    """Return a quantity with plain signs for those that look alike: the Greek mu, ``²``, no-break spaces."""
+    """Return a quantity with plain signs in place of similar ones: the Greek mu, ``²``, no-break spaces."""
     return unicodedata.normalize("NFKC", text).replace("\N{GREEK SMALL LETTER MU}", "\N{MICRO SIGN}")
 
 
 def parse(text: str, unit: str) -> float:
-    """Read a quantity with one of the `UNITS`, such as ``"3 mm"``, into an SI unit.
+    """Return a quantity with one of the `UNITS`, such as ``"3 mm"``, in an SI unit.
 
-    Raises ValueError when the number or the unit cannot be read, or the unit measures something else.
+    Raises ValueError when the number or the unit cannot be read, or the unit is of another quantity.
     """
-    read = WRITTEN.fullmatch(normalize(text).strip())
-    if not read:
+    match = WRITTEN.fullmatch(normalize(text).strip())
+    if not match:
         raise ValueError(f"must be a number, or a text such as '3 {unit}'")
-    value, name = float(read[1]), read[2]
+    value, name = float(match[1]), match[2]
     factor, si = UNITS.get(name, (0.0, ""))
     if not si:
         names = [key for key, (_, measured) in UNITS.items() if measured == unit]
@@ -226,8 +226,8 @@ def parse(text: str, unit: str) -> float:
     return value * factor
 
 
-def find_nearest_name(name: str, known: list[str], alike: float = 0.5) -> str:
-    """Return the name a misspelt one is nearest to, or ``""``; `alike`, 0 to 1: least share in common."""
-    import difflib  # of which no command without a mistake has need
+def find_nearest_name(name: str, names: list[str], alike: float = 0.5) -> str:
+    """Return the name most similar to a misspelt one, or ``""``; `alike`, 0 to 1: least similarity."""
+    import difflib  # only needed after a mistake
 
-    return next(iter(difflib.get_close_matches(name, known, n=1, cutoff=alike)), "")
+    return next(iter(difflib.get_close_matches(name, names, n=1, cutoff=alike)), "")

@@ -2,7 +2,7 @@
 
 The slope at a knot is the weighted harmonic mean of the slopes on both sides, and 0 where these differ in
 sign: F. N. Fritsch and J. Butland, A method for constructing local monotone piecewise cubic interpolants,
-SIAM J. Sci. Stat. Comput. 5 (1984) 300. At the ends it is that of a parabola, limited likewise.
+SIAM J. Sci. Stat. Comput. 5 (1984) 300. At the ends it is the limited slope of a parabola.
 """
 
 import numpy as np
@@ -13,7 +13,7 @@ from .arrays import Floats
 def interpolate_monotone(knot: Floats, value: Floats, at: Floats) -> Floats:
     """Return monotone cubic splines (m, s) through knots (k,), rising or falling, of values (k, s).
 
-    Two knots give straight lines; at places (m,) beyond the outer ones the splines continue straight.
+    Two knots give straight lines; beyond the outer knots the splines are straight. `at` (m,).
     """
     if knot[0] > knot[-1]:
         knot, value = knot[::-1], value[::-1]
@@ -23,7 +23,7 @@ def interpolate_monotone(knot: Floats, value: Floats, at: Floats) -> Floats:
     width = (knot[cell + 1] - knot[cell])[:, None]
     right = (inside - knot[cell])[:, None] / width
     left = 1.0 - right
-    # Written from the values' difference, so that equal neighbors give exactly their value.
+    # In terms of the difference of values, so that equal neighbors give exactly their value.
     step = value[cell + 1] - value[cell]
     bent = width * left * right * (left * slope[cell] - right * slope[cell + 1])
     curve = value[cell] + right * right * (1.0 + 2.0 * left) * step + bent

@@ -1,6 +1,6 @@
 """Assembly of a scene's system: a part or a null part at each interface.
 
-Modules of parts that a scene may leave out are imported where the part is put in.
+Modules of optional parts are imported only where a scene has the part.
 """
 
 from __future__ import annotations
@@ -36,47 +36,47 @@ TOGETHER = ("steppers.press_together", "plan_together")
 
 
 class Motion(NamedTuple):
-    """Part of a system that depends neither on the bed, the control nor the sensors: how a cell moves."""
+    """Cells and stepper of a system, which depend neither on the bed, the control nor the sensors."""
 
     cell: Cell
     line: Queue
-    """Commands on their way."""
+    """Queued commands."""
     stepper: Stepper
     plan: Any
-    """The stepper's."""
+    """Of the stepper."""
     steps: tuple[Segment, ...]
     instants: Floats
     """See `engine.system.make_segments`."""
 
 
 def make_motion(scene: Scene) -> Motion:
-    """Build a scene's cells and the plan of their steps."""
+    """Return the cells of a scene and the plan of their steps."""
     kind = import_part(*STEPPERS[scene.simulation.stepper])
     stepper: Stepper = kind(scene.simulation.tolerance) if scene.simulation.stepper == "adaptive" else kind()
     period = scene.simulation.control_period
     lag = scene.valve_lag or InstantValve()
     cell = Cell(scene.actuator, _make_flow(scene), scene.supply, lag, _make_touch(scene))
     line = split_delay(scene.delay, period) if scene.delay else Queue()
-    # An opening that lags has a kink where the next command comes through; one that does not, a jump.
+    # At the next command an opening with lag has a kink, and one without a jump.
     cut = 0.0 if stepper.bridges and cell.lag.rows else line.cut
     steps, instants = make_segments(stepper, cut, period, scene.simulation.steps)
     return Motion(cell, line, stepper, stepper.plan(cell, line, steps), steps, instants)
 
 
 def count_rows(scene: Scene, bed: Grid, motion: Motion) -> Rows:
-    """Return the rows of the state of a scene's system; `bed` and `motion`: its own."""
+    """Return the rows of the state of a scene's system; `bed` and `motion`: those of the scene."""
     return _make_control(scene, bed, motion)[2]
 
 
 def _make_control(scene: Scene, bed: Grid, motion: Motion) -> tuple[Controller, Sensors, Rows]:
-    """Build the control method and the sensors, and count the rows of each part's memory."""
+    """Return the control method and the sensors, and the rows of all parts."""
     controller = _make_controller(scene, bed, (motion.cell,))
     sensors = _make_sensors(scene, motion.cell, motion.line)
     return controller, sensors, Rows(motion.cell.rows, motion.line.length, controller.rows, sensors.rows)
 
 
 def assemble(scene: Scene) -> System:
-    """Build the system of a scene."""
+    """Return the system of a scene."""
     if len(scene.fingers) != 1:
         return _assemble_hands(scene)
     motion, period = make_motion(scene), scene.simulation.control_period
@@ -105,40 +105,39 @@ def assemble(scene: Scene) -> System:
 
 
 def _assemble_hands(scene: Scene) -> System:
-    """Build the system of a scene with several fingers."""
+    """Return the system of a scene with several fingers."""
     from ..engine.pairs import HandSelection, HandSystem
     from ..model.fingers import MOST_FINGERS, join_touches
 
     if not 0 < len(scene.fingers) <= MOST_FINGERS:
         raise ParameterError("scene", "fingers", f"must be 1 to {MOST_FINGERS}", str(len(scene.fingers)))
     scene = replace(scene, fingers=_pad_relaxations(scene.fingers))
-    made: dict[Any, tuple[Motion, System]] = {}
+    different: dict[Any, Motion] = {}
+    motions = []
     for finger in scene.fingers:
         parts = finger.fingertip, finger.contact, finger.relaxation
-        if parts not in made:
-            alone = replace(scene, fingers=(finger,))
-            made[parts] = make_motion(alone), assemble(replace(alone, control=None, shape=None))
-    motions = [made[finger.fingertip, finger.contact, finger.relaxation][0] for finger in scene.fingers]
-    first, system = motions[0], next(iter(made.values()))[1]
-    touches = [motion.cell.touch for motion in motions]
-    kept = [touch for touch in touches if touch]
-    if 0 < len(kept) < len(touches):
+        if parts not in different:
+            different[parts] = make_motion(replace(scene, fingers=(finger,)))
+        motions.append(different[parts])
+    first, system = motions[0], assemble(replace(scene, fingers=scene.fingers[:1], control=None, shape=None))
+    touches = [motion.cell.touch for motion in motions if motion.cell.touch]
+    if 0 < len(touches) < len(motions):
         rule = "must all have a fingertip, or none of them"
-        raise ParameterError("scene", "fingers", rule, f"{len(kept)} of {len(touches)} with one")
-    cell = replace(first.cell, touch=join_touches(kept) if kept else None)
+        raise ParameterError("scene", "fingers", rule, f"{len(touches)} of {len(motions)} with one")
+    cell = replace(first.cell, touch=join_touches(touches) if touches else None)
     cells = tuple(motion.cell for motion in motions)
     controller = _make_controller(scene, system.grid, cells)
     rows = Rows(cell.rows, first.line.length, controller.rows, system.sensors.rows, len(cells))
     common = {field.name: getattr(system, field.name) for field in fields(system)}
     selection = HandSelection(system.grid, rows, cell, system.period, system.fastest)
-    own = {"cell": cell, "controller": controller, "selection": selection, "rows": rows}
-    together = import_part(*TOGETHER)(cells, first.line, first.steps) if kept else None
+    joint = {"cell": cell, "controller": controller, "selection": selection, "rows": rows}
+    together = import_part(*TOGETHER)(cells, first.line, first.steps) if touches else None
     plans = tuple(motion.plan for motion in motions)
-    return HandSystem(**common | own, cells=cells, plans=plans, press_together=together)
+    return HandSystem(**common | joint, cells=cells, plans=plans, press_together=together)
 
 
 def _pad_relaxations(fingers: tuple[Finger, ...]) -> tuple[Finger, ...]:
-    """Return fingers whose pulps have as many filters each; those that are added lose no force."""
+    """Return fingers whose pulps have equally many filters; those that are added lose no force."""
     most = max(len(finger.relaxation.times) if finger.relaxation else 0 for finger in fingers)
     if not most:
         return fingers
@@ -146,9 +145,10 @@ def _pad_relaxations(fingers: tuple[Finger, ...]) -> tuple[Finger, ...]:
 
     padded = []
     for finger in fingers:
-        times, weights = (
-            ((), (1.0,)) if not finger.relaxation else (finger.relaxation.times, finger.relaxation.weights)
-        )
+        times: tuple[float, ...] = ()
+        weights: tuple[float, ...] = (1.0,)
+        if finger.relaxation:
+            times, weights = finger.relaxation.times, finger.relaxation.weights
         more = most - len(times)
         relaxation = Relaxation((*times, *(1.0,) * more), (*weights, *(0.0,) * more))
         padded.append(replace(finger, relaxation=relaxation))
@@ -156,7 +156,7 @@ def _pad_relaxations(fingers: tuple[Finger, ...]) -> tuple[Finger, ...]:
 
 
 def _make_flow(scene: Scene) -> Flow:
-    """Return the valve, behind it the conduit if there is one."""
+    """Return the flow law of the valve, with the conduit if there is one."""
     valve: Orifice = select_law("valve", scene.valve).flow_law(scene.fluid)
     if scene.conduit is None:
         return valve
@@ -196,7 +196,7 @@ def _make_sensors(scene: Scene, cell: Cell, line: Queue) -> Sensors:
 
 
 def _make_controller(scene: Scene, bed: Grid, cells: tuple[Cell, ...]) -> Controller:
-    """Return the control method for the cells of all fingers, before it the display of a shape."""
+    """Return the control method for the cells of all fingers, after the display of a shape, if any."""
     cell = cells[0]
     if scene.control is None and scene.shape is None:
         return Uncontrolled()
@@ -212,7 +212,7 @@ def _make_controller(scene: Scene, bed: Grid, cells: tuple[Cell, ...]) -> Contro
         device = replace(device, heights=fit_shape(scene.shape, bed, cell.actuator).heights)
     controller: Controller | None = None
     if scene.control:
-        controller = _build_method(scene, [replace(device, cell=own) for own in cells])
+        controller = _build_method(scene, [replace(device, cell=of_finger) for of_finger in cells])
     if scene.shape and not (controller and scene.method == "shape_display"):
         from ..control.displays import make_handover
 
@@ -225,9 +225,9 @@ def _make_controller(scene: Scene, bed: Grid, cells: tuple[Cell, ...]) -> Contro
 def _build_method(scene: Scene, devices: list[DeviceInfo]) -> Controller:
     """Return the control method for the devices of all fingers."""
     method = find_method(scene.method)
-    # Fingers that are alike have one controller.
-    made = {id(device.cell): method.build(scene.control, device) for device in devices}
-    controllers: list[Controller] = [made[id(device.cell)] for device in devices]
+    # Equal fingers share a controller.
+    different = {id(device.cell): method.build(scene.control, device) for device in devices}
+    controllers: list[Controller] = [different[id(device.cell)] for device in devices]
     touches = [device.cell.touch for device in devices]
     if len(controllers) == 1 or not all(touches):
         return controllers[0]
@@ -237,8 +237,8 @@ def _build_method(scene: Scene, devices: list[DeviceInfo]) -> Controller:
     from ..control.servo import BatchControl
     from ..control.side_by_side import join_controllers
 
-    inner = [own.inner if isinstance(own, Guarded) else own for own in controllers]
-    following = tuple(own for own in inner if isinstance(own, FollowingControl))
+    inner = [each.inner if isinstance(each, Guarded) else each for each in controllers]
+    following = tuple(each for each in inner if isinstance(each, FollowingControl))
     if not following:
         return controllers[0]
     tips = [touch.fingertip for touch in touches if touch]

@@ -14,7 +14,7 @@ from ..model.layout import Grid
 from ..model.trajectory import Path, Waypoint
 from .schema import Scene
 
-#: What the fingertip does, in s and m above the height at which it first touches.
+#: Paths of the fingertip, in s and m above the height of first contact.
 GESTURES: dict[str, tuple[tuple[float, float], ...]] = {
     "pull": (
         (0.0, 20e-3), (0.6, 2e-3), (1.6, -5e-3), (1.8, -5e-3), (2.2, -4e-3), (4.2, 6e-3), (4.5, 6e-3),
@@ -23,14 +23,14 @@ GESTURES: dict[str, tuple[tuple[float, float], ...]] = {
     "press": ((0.0, 20e-3), (0.6, 2e-3), (2.0, -5e-3), (2.4, -5e-3), (2.7, 30e-3), (3.4, 30e-3)),
     "away": ((0.0, 20e-3), (0.5, 20e-3)),
 }  # fmt: skip
-#: Of the highest cells, those within this share of the relief are as good as the highest.
+#: Cells within this share of the relief below the highest one belong to the summit.
 NEARLY = 0.1
-#: Time for the last micrometers, and for a margin, s.
+#: Time for the last micrometers and a margin, s.
 MARGIN = 0.5
 
 
 def find_display(system: System) -> ShapeDisplayControl | None:
-    """Return what displays the shape of a scene, or None."""
+    """Return the display of a scene's shape, or None."""
     controller = system.controller
     if isinstance(controller, Handover):
         return controller.display
@@ -38,37 +38,37 @@ def find_display(system: System) -> ShapeDisplayControl | None:
 
 
 def compute_display_time(display: ShapeDisplayControl) -> float:
-    """Return the time within which a free bed has displayed its shape, s, rounded up to a tenth.
+    """Return the time in which a free bed displays its shape, s, rounded up to a tenth.
 
-    A move takes the way at the slower reservoir's speed, and the time its height control needs to come
-    within the dead band; no longer than its patience.
+    A move lasts as long as its distance takes at the slower reservoir's speed, plus the settling of the
+    height control to the dead band; at most its patience.
     """
     shape, drive = display.parameters, display.drive
-    way = float(np.abs(display.heights - display.actuator.rest_height).max(initial=0.0))
+    distance = float(np.abs(display.heights - display.actuator.rest_height).max(initial=0.0))
     if shape.refresh != "one_time":
-        way /= shape.surfaces
+        distance /= shape.surfaces
     speed = min(float(drive.up[-1]), float(drive.down[-1]))
-    settling = drive.settling_time * math.log(max(way / max(drive.dead_band, 1e-9), 1.0) + 1.0)
-    move = min(way / speed + settling + 0.05, shape.patience)
+    settling = drive.settling_time * math.log(max(distance / max(drive.dead_band, 1e-9), 1.0) + 1.0)
+    move = min(distance / speed + settling + 0.05, shape.patience)
     return math.ceil(10.0 * (MARGIN + len(display.moves) * move)) / 10.0
 
 
 def find_summit(grid: Grid, heights: Floats) -> tuple[float, float]:
-    """Return the place of the highest cells that is nearest to the bed's middle, m. `heights` (n,), m."""
+    """Return the position, m, nearest to the bed's middle, of the highest cells; `heights` (n,), m."""
     high = np.flatnonzero(heights >= heights.max() - NEARLY * np.ptp(heights))
     cell = int(high[np.argmin(np.hypot(grid.x[high], grid.y[high]))])
     return float(grid.x[cell]), float(grid.y[cell])
 
 
 def find_touch_height(grid: Grid, heights: Floats, finger: Fingertip, x: float, y: float) -> float:
-    """Return the height at which a level finger coming down over a place, m, first touches tops (n,), m."""
+    """Return the height at which a level finger that descends at a point, m, first touches tops (n,), m."""
     outline = finger.outline(np.array([[x, y, 0.0, *LEVEL]]))
     under = compute_underside(*compute_forms(outline), grid.compute_basis(np.arange(grid.count)))
     return float(np.max(heights - under[0]))
 
 
 def make_forming_scene(scene: Scene, system: System, gesture: str) -> Scene:
-    """Return a scene whose finger waits until the shape stands, and then forms its highest part.
+    """Return a scene whose finger waits until the shape is displayed, and then forms its highest part.
 
     `gesture`: a key of `GESTURES`. Raises ParameterError when the scene has no shape, or no finger.
     """
@@ -81,7 +81,7 @@ def make_forming_scene(scene: Scene, system: System, gesture: str) -> Scene:
     touch = find_touch_height(system.grid, display.heights, system.cell.touch.fingertip, x, y)
     ready = compute_display_time(display)
     points = [(ready + time, touch + above) for time, above in GESTURES[gesture]]
-    way = tuple(Waypoint(time=time, position=(x, y, z)) for time, z in [(0.0, points[0][1]), *points])
-    # Its own duration is that of the path.
+    waypoints = [(0.0, points[0][1]), *points]
+    path = tuple(Waypoint(time=time, position=(x, y, z)) for time, z in waypoints)
     simulation = replace(scene.simulation, duration=points[-1][0])
-    return scene.with_sections(trajectory=Path("smooth", way), simulation=simulation)
+    return scene.with_sections(trajectory=Path("smooth", path), simulation=simulation)

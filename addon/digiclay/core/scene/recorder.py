@@ -15,7 +15,7 @@ from ..base.arrays import Floats, Modes
 from ..base.quantity import Parameters, quantity
 from ..engine.state import ActiveSet, Rows, State
 
-#: Most rows that wait to be written together.
+#: Most rows that are written together.
 CHUNK = 64
 
 
@@ -26,12 +26,12 @@ class Recorder(Parameters):
     every: int = quantity(1, "control periods per row of the history", at_least=1)
 
     def rows(self, periods: int) -> int:
-        """Return the number of rows of a session of so many control periods."""
+        """Return the number of rows of a session of a number of control periods."""
         return 1 + -(-periods // self.every)
 
 
 class Stretch(NamedTuple):
-    """The rows of some periods in which the same w cells take part, of one run or, in a last axis, of b."""
+    """Rows of periods with the same w active cells, of one run or, in another last axis, of b runs."""
 
     cells: NDArray[np.intp]
     """(w,)."""
@@ -39,19 +39,19 @@ class Stretch(NamedTuple):
     """(t, 2, w): Heights and forces in t rows."""
     command: Floats
     mode: Modes
-    """(s, w): Those given in the periods that start with s rows."""
+    """(s, w): Commands and modes of the periods that begin with s rows."""
     last: Floats
     last_mode: Modes
-    """(2, w) and (w,): Heights and forces, and modes, after the last of the periods."""
+    """(2, w) and (w,): Heights and forces, and modes, after the last period."""
 
     def split(self) -> list[Stretch]:
-        """Return the stretches of b runs, each in memory of its own."""
+        """Return the stretches of b runs, each in its own memory."""
         by_run = [np.ascontiguousarray(np.moveaxis(array, -1, 0)) for array in self]
         return [Stretch(*arrays) for arrays in zip(*by_run, strict=True)]
 
 
 class Recording:
-    """Takes rows from states, and gives them to `keep` in stretches, in their order."""
+    """Collects rows from states, and passes them to `keep` in stretches, in their order."""
 
     def __init__(self, recorder: Recorder, rows: Rows, keep: Callable[[Stretch], None]) -> None:
         self.every = recorder.every
@@ -62,7 +62,7 @@ class Recording:
         self._given: list[tuple[Floats, Modes]] = []
 
     def observe(self, state: State) -> None:
-        """Take in the state after a control period."""
+        """Record the state after a control period."""
         active = state.active
         if active is not self._active or len(self._given) >= CHUNK:
             self.flush()
@@ -73,14 +73,14 @@ class Recording:
             self._felt.append(active.block.take(self._felt_rows, axis=0))
 
     def flush(self) -> None:
-        """Hand on the rows that wait; a set of cells that was given up is as its last period left it."""
+        """Pass on the collected rows; a former set of cells is still as its last period left it."""
         active = self._active
         if active is None:
             return
         shape, given = active.cells.shape, self._given
         felt = np.array(self._felt).reshape(len(self._felt), 2, *shape)
-        command = np.array([one for one, _ in given]).reshape(len(given), *shape)
-        mode = np.array([one for _, one in given], np.int8).reshape(len(given), *shape)
+        command = np.array([command for command, _ in given]).reshape(len(given), *shape)
+        mode = np.array([mode for _, mode in given], np.int8).reshape(len(given), *shape)
         last = active.block.take(self._felt_rows, axis=0)
         self._keep(Stretch(active.cells, felt, command, mode, last, active.mode.copy()))
         self._active, self._felt, self._given = None, [], []
@@ -89,28 +89,27 @@ class Recording:
 class HistoryWriter:
     """Rows of one session, preallocated for at most `count` of them.
 
-    Row i is the state at its time; the command and the mode in it are those given in the control
-    period that starts then. Nothing is commanded after the last row: its command is 0, and its
-    mode that of the period before.
+    Row i is the state at its time; its command and mode are those of the control period that
+    begins then. No period follows the last row: its command is 0, and its mode that of the
+    previous period.
     """
 
     def __init__(self, count: int, cells: int) -> None:
         self.count = count
-        # Not filled: numpy gives memory that is to be filled later in large pages, of which the first
-        # touch costs a quarter.
+        # Uninitialized: numpy then gets memory in large pages, which cost a quarter at their first use.
         self._felt, self._command = np.empty((2, count, cells)), np.empty((count, cells))
         self._mode = np.empty((count, cells), np.int8)
         self._now, self._mode_now = np.zeros((2, cells)), np.empty(cells, np.int8)
         self._done = self._given = 0
 
     def begin(self, height: Floats, mode: Modes) -> None:
-        """Begin anew with heights and modes (n,) before a session, in which no force acts."""
+        """Begin again with heights and modes (n,) before a session, without forces."""
         self._now[:], self._mode_now[:] = (height, np.zeros_like(height)), mode
         self._felt[:, 0] = self._now
         self._done, self._given = 1, 0
 
     def write(self, stretch: Stretch) -> None:
-        """Write the next stretch of the session; a cell that takes no part stays as it was."""
+        """Write the next stretch of the session; an idle cell keeps its values."""
         cells, felt = stretch.cells, slice(self._done, self._done + len(stretch.felt))
         self._felt[:, felt] = self._now[:, None]
         self._felt[:, felt, cells] = stretch.felt.swapaxes(0, 1)
@@ -121,9 +120,9 @@ class HistoryWriter:
         self._done, self._given = felt.stop, given.stop
 
     def finish(self, period: int, every: int) -> dict[str, NDArray[Any]]:
-        """Return the rows: period (t,), height, force, command, mode (t, n); valid until it begins anew.
+        """Return the rows: period (t,), height, force, command, mode (t, n); valid until `begin`.
 
-        A session cut short between two rows, of `every` periods each, gets one more.
+        A session that ends between two rows, of `every` periods each, gets another one.
         """
         count = 1 - (-period // every)
         self._felt[:, count - 1] = self._now
@@ -134,7 +133,7 @@ class HistoryWriter:
 
 
 class RunRecording(Recording):
-    """The recording of one run of at most so many periods, which is written into its history meanwhile."""
+    """Recording of one run of at most `periods`, which writes its history at the same time."""
 
     def __init__(self, recorder: Recorder, rows: Rows, state: State, periods: int) -> None:
         self._history = HistoryWriter(recorder.rows(periods), state.rows.shape[1])
@@ -144,14 +143,14 @@ class RunRecording(Recording):
         self._last = state
 
     def observe(self, state: State) -> None:
-        """Take in the state after a control period; of several fingers also the force of each."""
+        """Record the state after a control period; of several fingers also the force of each."""
         super().observe(state)
         self._last = state
         if state.active.rows.fingers and state.period % self.every == 0:
             self._pressing.append(state.finger_forces())
 
     def finish(self, period: int) -> dict[str, NDArray[Any]]:
-        """Return the rows up to the period the session ended with, see `HistoryWriter.finish`."""
+        """Return the rows up to the last period of the session, see `HistoryWriter.finish`."""
         self.flush()
         rows = self._history.finish(period, self.every)
         if self._last.active.rows.fingers:
@@ -163,9 +162,9 @@ class RunRecording(Recording):
 def write(history: dict[str, NDArray[Any]], path: Path) -> None:
     """Write a history as an npz file that ``numpy.load`` reads.
 
-    Deflated at the quickest level, because a row repeats most of the one before. The paper's
-    session, 83 MB: 0.08 s and 83 MB plain, 0.26 s and 10 MB so, 0.48 s and 9.6 MB at the
-    default level.
+    Deflated at the fastest level, because a row repeats most of the previous one. The paper's
+    session, 83 MB: 0.08 s and 83 MB stored, 0.26 s and 10 MB at this level, 0.48 s and 9.6 MB
+    at the default level.
     """
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
         for name, array in history.items():

@@ -14,7 +14,7 @@ from ..files.tables import LARGEST, ReadParts, parse_tables
 from .schema import FINGER_SECTIONS, Scene
 from .toml_table import ABSENT, FINGERS, merge_one_finger, resolve
 
-#: Where the sample scenes are.
+#: Folder of the sample scenes.
 SAMPLES = Path(__file__).parents[2] / "sample_shapes" / "sessions"
 
 
@@ -24,7 +24,7 @@ def list_samples() -> list[str]:
 
 
 def find(word: str) -> Path:
-    """Return the file of a scene, of a sample's name, a file, or the folder of a run; SceneError: none."""
+    """Return the file of a scene by a sample's name, a file, or a run's folder; SceneError if absent."""
     samples = list_files(SAMPLES, ".toml")
     if word not in samples and os.path.isdir(word):
         word = os.path.join(word, "scene.toml")
@@ -39,16 +39,16 @@ class Setting(NamedTuple):
     value: str
     """TOML; a text needs no quotes."""
     option: str = "--set"
-    """What messages call it."""
+    """Its name in messages."""
 
 
 def load(path: Path, settings: Sequence[Setting] = ()) -> Scene:
-    """Read a scene file with settings; SceneError: one line, of file or option, key, rule and value."""
+    """Read a scene file with settings; SceneError in one line: file or option, key, rule and value."""
     return make_scene(path, read_table(path), settings)
 
 
 def load_recorded(path: Path) -> Scene:
-    """Read the scene of a finished run; without its control, when its method is not loaded."""
+    """Read the scene of a finished run, without its control if its method is not loaded."""
     table = read_table(path)
     control = table.get("control")
     method = control.get("method") if isinstance(control, dict) else None
@@ -60,21 +60,24 @@ def load_recorded(path: Path) -> Scene:
 def make_scene(
     path: Path, table: Mapping[str, Any], settings: Sequence[Setting] = (), cache: ReadParts | None = None
 ) -> Scene:
-    """Make a scene of the `read_table` of its file, overridden by settings; SceneError as `load`.
+    """Return a scene from the `read_table` of its file, overridden by settings; SceneError as `load`.
 
-    A shape may lie beside the file. `cache`: parts of scenes of the same file, which are not read again.
+    A shape may be beside the file. `cache`: parts of scenes of the same file, which are not read again.
     """
     try:
         merged = merge_one_finger(_find_beside(table, path.parent))
         return resolve(_override(merged, settings), path.stem, cache)
     except ParameterError as error:
         if settings:
-            make_scene(path, table)  # a file that is wrong by itself is reported first
-        key = ".".join(split_key(f"{error.owner}.{error.field}"))
-        blamed = [one.option for one in settings if f".{key}".endswith(f".{'.'.join(split_key(one.key))}")]
-        own = path.name if path.parent == SAMPLES else str(path)
-        origin = (blamed or [one.option for one in settings] or [own])[-1]
-        raise SceneError(f"{origin}: {error}") from None
+            make_scene(path, table)  # reports an error of the file itself first
+        key = split_key(f"{error.owner}.{error.field}")
+        origins = [path.name if path.parent == SAMPLES else str(path)]
+        origins += [setting.option for setting in settings]
+        for setting in settings:
+            changed = split_key(setting.key)
+            if key[-len(changed) :] == changed:
+                origins.append(setting.option)
+        raise SceneError(f"{origins[-1]}: {error}") from None
 
 
 def read_table(path: Path) -> dict[str, Any]:
@@ -83,7 +86,6 @@ def read_table(path: Path) -> dict[str, Any]:
         size = path.stat().st_size
         if size > LARGEST:
             raise SceneError(f"{path} must have at most {LARGEST // 1_000_000} MB (got {size / 1e6:.0f} MB).")
-        # A byte order mark at the beginning is no part of the text.
         text = path.read_text(encoding="utf-8-sig")
         return parse_tables(text)
     except OSError as error:
@@ -93,14 +95,14 @@ def read_table(path: Path) -> dict[str, Any]:
     except RecursionError:
         raise SceneError(f"{path}: lists or tables are nested too deeply.") from None
     except ValueError as error:
-        rule, _, place = str(error).partition(" (at ")
-        line = re.match(r"line (\d+)", place)
+        rule, _, position = str(error).partition(" (at ")
+        line = re.match(r"line (\d+)", position)
         number = line[1] if line else str(max(1, len(text.splitlines())))
         raise SceneError(f"{path}, line {number}: {rule}.") from None
 
 
 def _find_beside(table: Mapping[str, Any], folder: Path) -> Mapping[str, Any]:
-    """Find a shape's file that lies beside the scene file, or in a folder there."""
+    """Return the table with the path of a shape's file beside the scene file, or in a folder there."""
     shape = table.get("shape")
     name = shape.get("file") if isinstance(shape, dict) else None
     if isinstance(name, str) and Path(name).suffix and "\0" not in name and (folder / name).is_file():
@@ -109,7 +111,7 @@ def _find_beside(table: Mapping[str, Any], folder: Path) -> Mapping[str, Any]:
 
 
 def _override(table: Mapping[str, Any], settings: Sequence[Setting]) -> dict[str, Any]:
-    """Return the tables of a scene file with settings in them."""
+    """Return the tables of a scene file, overridden by settings."""
     whole = dict(table)
     for key, text, _ in settings:
         keys, value = split_key(key), _read_value(text)
@@ -130,7 +132,7 @@ def split_key(key: str) -> list[str]:
 
 
 def _replace(table: Any, keys: Sequence[str], value: Any, above: str = "") -> Any:
-    """Return a table with a value at nested keys below others; those of a list are numbers from 1 on."""
+    """Return a table with a value at nested keys, in a list numbers from 1 on; `above`: outer keys."""
     if not keys:
         return value
     key, *rest = keys
@@ -139,15 +141,16 @@ def _replace(table: Any, keys: Sequence[str], value: Any, above: str = "") -> An
         if not (key.isascii() and key.isdecimal() and 0 < int(key) <= len(table)):
             rule = f"must be a number from 1 to {len(table)} here"
             raise ParameterError(below[:-1], "", rule, repr(key))
-        place = int(key) - 1
-        return [*table[:place], _replace(table[place], rest, value, below), *table[place + 1 :]]
-    own = table if isinstance(table, dict) else {}
-    return {**own, key: _replace(own.get(key), rest, value, below)}
+        changed = list(table)
+        changed[int(key) - 1] = _replace(table[int(key) - 1], rest, value, below)
+        return changed
+    former = table if isinstance(table, dict) else {}
+    return {**former, key: _replace(former.get(key), rest, value, below)}
 
 
 @lru_cache(maxsize=1024)
 def _read_value(text: str) -> Any:
-    """Read the value of a setting: TOML, or else a bare text."""
+    """Return the value of a setting: TOML, or else a bare text."""
     try:
         read = parse_tables(f"value = {text}")
     except (ValueError, RecursionError):

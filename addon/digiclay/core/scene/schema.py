@@ -30,8 +30,8 @@ if TYPE_CHECKING:  # a part that is left out is never imported, see `import_part
     from ..shapes.request import Shape
     from .recorder import Recorder
 
-#: Parts a scene is made of: module and class. The control's depend on its method, see
-#: `find_method`, and those of valve and contact on their law, see `LAWS`.
+#: Parts of a scene: module and class. That of the control depends on its method, see
+#: `find_method`, those of valve and contact on their laws, see `LAWS`.
 PARTS: dict[str, tuple[str, str]] = {
     "layout": ("model.layout", "Layout"),
     "actuator": ("model.actuator", "Actuator"),
@@ -48,20 +48,34 @@ PARTS: dict[str, tuple[str, str]] = {
     "simulation": ("scene.schema", "Simulation"),
     "recorder": ("scene.recorder", "Recorder"),
 }
-#: The sections of a scene that are parts, in the order they are written.
+#: Sections of a scene that are parts, in the order of a scene file.
 SECTIONS = (
-    "layout", "actuator", "supply", "fluid", "valve", "conduit", "valve_lag", "delay", "fingertip", "contact",
-    "relaxation", "sensors", "control", "blister", "shape", "simulation", "recorder",
-)  # fmt: skip
-#: Sections that a scene has once a finger.
+    "layout",
+    "actuator",
+    "supply",
+    "fluid",
+    "valve",
+    "conduit",
+    "valve_lag",
+    "delay",
+    "fingertip",
+    "contact",
+    "relaxation",
+    "sensors",
+    "control",
+    "blister",
+    "shape",
+    "simulation",
+    "recorder",
+)
+#: Sections that cannot be absent by themselves; all other parts are optional.
+REQUIRED = ("layout", "actuator", "supply", "fluid", "valve", "contact", "blister", "simulation")
+OPTIONAL = tuple(name for name in SECTIONS if name not in REQUIRED)
+#: Sections of a finger.
 FINGER_SECTIONS = ("fingertip", "contact", "relaxation", "trajectory")
-#: Parts a scene may leave out.
-OPTIONAL = (
-    "conduit", "valve_lag", "delay", "fingertip", "relaxation", "sensors", "control", "shape", "recorder",
-)  # fmt: skip
-#: Parts a scene leaves out unless it names them.
+#: Optional parts that a scene has only if it names them.
 UNASKED = ("sensors", "shape")
-#: Parts that are left out together with another.
+#: Parts that are omitted together with another one.
 NEEDS = {"contact": "fingertip", "relaxation": "fingertip", "blister": "control"}
 #: Steppers: module and class.
 STEPPERS: dict[str, tuple[str, str]] = {
@@ -72,15 +86,15 @@ STEPPERS: dict[str, tuple[str, str]] = {
     "heun": ("steppers.explicit", "Heun"),
     "runge_kutta_4": ("steppers.explicit", "RungeKutta4"),
 }
-#: Most physics steps in a control period, and most control periods on their way to a valve.
+#: Most physics steps in a control period, and most queued control periods of a valve.
 MOST_STEPS = 1000
-#: Most physics steps in a control period of steppers that cut each further: their plans grow with the square,
+#: Most physics steps in a control period of steppers that divide each step: their plans grow with the square,
 #: to a gigabyte.
 MOST_CUT = {"adaptive": 10, "richardson": 500}
 
 
 def import_parameters(section: str, method: str) -> type[Parameters]:
-    """Import the class that holds the parameters of a section. `method`: the control method."""
+    """Import the class of a section's parameters; `method`: the control method."""
     if section in LAWS:
         return law_parameters(section)
     if section == "control":
@@ -104,7 +118,7 @@ class Simulation(Parameters):
     )
 
     def check(self) -> None:
-        """A control period has not too many physics steps."""
+        """Refuse too many physics steps in a control period."""
         most = MOST_CUT.get(self.stepper, MOST_STEPS)
         if self.steps > most:
             rule = f"must be at least a {most}th of simulation.control_period, {self.control_period:g} s"
@@ -113,25 +127,25 @@ class Simulation(Parameters):
 
     @property
     def steps(self) -> int:
-        """Physics steps of a control period, all of one length."""
+        """Physics steps of a control period, of equal length."""
         return max(1, math.ceil(self.control_period / self.physics_step * (1.0 - 1e-9)))
 
     def refined(self, parts: int) -> Simulation:
-        """Return the same with every physics step cut into equal parts."""
+        """Return the same with every physics step divided into equal parts."""
         return replace(self, physics_step=self.control_period / (self.steps * parts))
 
 
 @lru_cache(maxsize=64)
 def _set_duration(simulation: Simulation, duration: float) -> Simulation:
-    """Return a simulation with a duration; the points of a sweep get one and the same."""
+    """Return a simulation with a duration; the points of a sweep share one."""
     return replace(simulation, duration=duration)
 
 
 @dataclass(frozen=True)
 class Finger:
-    """A finger: its tip, how its pulp yields and relaxes, and its path.
+    """A finger: its tip, contact law and relaxation of the pulp, and its path.
 
-    Without a fingertip it touches nothing; its path is recorded, and the session lasts as long.
+    Without a fingertip it touches nothing, but its path is recorded, and determines the duration.
     """
 
     fingertip: Fingertip | None
@@ -144,8 +158,8 @@ class Finger:
 class Scene:
     """Complete definition of a session; equal scenes give equal sessions, bit for bit.
 
-    A part that is None is left out: it costs nothing, and its module is not imported. Raises ParameterError
-    when parts do not go together; its owner is the section's name.
+    A part that is None is omitted: it costs nothing, and its module is not imported. Raises ParameterError
+    when parts are not compatible; its owner is the section's name.
     """
 
     layout: Layout
@@ -199,25 +213,25 @@ class Scene:
         return self.layout.rows * self.layout.columns
 
     def trajectories(self) -> tuple[Trajectory, ...]:
-        """Return the paths of the fingers as something that has poses."""
+        """Return the trajectories of the fingers."""
         return tuple(finger.trajectory.trajectory() for finger in self.fingers)
 
     def list_parts(self, name: str) -> tuple[Any, ...]:
-        """Return the content of a section, of each finger where fingers have it; None for an omitted part."""
+        """Return the content of a section, of each finger if it is theirs; None for an omitted part."""
         owners = self.fingers if name in FINGER_SECTIONS else (self,)
         return tuple(getattr(owner, name, None) for owner in owners)
 
     def section(self, name: str) -> Any:
-        """Return the content of a section in the scene file of one finger; None for an omitted part."""
+        """Return the content of a section of a scene with one finger; None for an omitted part."""
         return require_one(self.list_parts(name))
 
     def with_sections(self, **parts: Any) -> Scene:
-        """Return the scene with other parts, by the names of sections; those of fingers in all of them."""
-        own = {name: parts.pop(name) for name in FINGER_SECTIONS if name in parts}
-        return replace(self, fingers=tuple(replace(finger, **own) for finger in self.fingers), **parts)
+        """Return the scene with other parts, by the names of sections; those of a finger in all fingers."""
+        of_finger = {name: parts.pop(name) for name in FINGER_SECTIONS if name in parts}
+        return replace(self, fingers=tuple(replace(finger, **of_finger) for finger in self.fingers), **parts)
 
     def with_fingers(self, count: int) -> Scene:
-        """Return the scene with so many fingers: those it has, and further ones like the first."""
+        """Return the scene with at least `count` fingers: its own, and further ones like the first."""
         more = max(0, count - len(self.fingers))
         return replace(self, fingers=(*self.fingers, *self.fingers[:1] * more)) if more else self
 

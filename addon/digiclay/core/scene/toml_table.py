@@ -15,30 +15,30 @@ from .schema import FINGER_SECTIONS, NEEDS, OPTIONAL, SECTIONS, UNASKED, Finger,
 Table = Mapping[str, Any]
 Writer = Callable[..., Iterable[str]]
 
-#: What stands for a part that is left out.
+#: Value of the section of an omitted part.
 ABSENT = "absent"
-#: What a preset changes of the defaults; a .blend keeps its place: new ones are added at the end.
+#: Changes of the defaults by a preset; a .blend stores its number: new ones are added at the end.
 PRESETS: dict[str, dict[str, dict[str, Any]]] = {
     "paper": {},
     "fast": {"valve": {"orifice_diameter": 0.6e-3}},
     "viscous": {"fluid": {"viscosity": 3.2e-6, "density": 908.0}, "valve": {"orifice_diameter": 0.6e-3}},
-    # For hands. The valve of Roberts 2003, from which the paper's has its lift too, works at 1 kHz and above,
-    # against 3 bar and above: its lag is at most 1 / (2π 1 kHz).
+    # For hands. The valve of Roberts 2003, whose lift the paper uses too, works at 1 kHz and above, against
+    # 3 bar and above: its lag is at most 1 / (2π 1 kHz).
     "design": {"valve": {"orifice_diameter": 0.6e-3}, "valve_lag": {"time_constant": 0.16e-3}},
 }
 TEXTS = ("name", "description", "preset")
-#: The list of tables that holds the fingers' sections where there are several.
+#: List of tables with the sections of several fingers.
 FINGERS = "finger"
-#: The sections of a finger that are parts; the other one is its path.
+#: Sections of a finger that are parts; the other one is its path.
 FINGER_PARTS = tuple(section for section in FINGER_SECTIONS if section in SECTIONS)
 TOP_LEVEL = (*TEXTS, *SECTIONS, "trajectory", FINGERS)
 
 
 def resolve(table: Table, name: str = "", cache: ReadParts | None = None) -> Scene:
-    """Make a scene of the tables of a scene file; whatever they leave open gets its default.
+    """Return a scene from the tables of a scene file, with defaults for all they leave open.
 
-    `name`: where the table has none; `cache`: parts of similar tables, which are not read again. Raises
-    ParameterError: its owner is the section.
+    `name`: its default name; `cache`: parts of similar tables, which are not read again. Raises
+    ParameterError, whose owner is the section.
     """
     cache = cache or ReadParts()
     refuse_unknown("", table, TOP_LEVEL)
@@ -61,25 +61,25 @@ def resolve(table: Table, name: str = "", cache: ReadParts | None = None) -> Sce
     if share is not None:
         defaults["contact"] = {**defaults.get("contact", {}), "share": share}
     rest_height = parts["actuator"].rest_height
-    fingers = tuple(_read_finger(owner, own, defaults, rest_height, cache) for owner, own in tables)
+    fingers = tuple(_read_finger(owner, given, defaults, rest_height, cache) for owner, given in tables)
     return Scene(**parts, **texts, fingers=fingers, method=method)
 
 
 def _split_fingers(table: Table) -> list[tuple[str, Table]]:
-    """Return what messages put before the sections of each finger, and the sections.
+    """Return the prefix of each finger's sections in messages, and the sections.
 
-    The sections of one finger stand beside the others; those of several in a list of tables.
+    The sections of one finger are beside the others; those of several in a list of tables.
     """
-    own = {section: table[section] for section in FINGER_SECTIONS if section in table}
+    single = {section: table[section] for section in FINGER_SECTIONS if section in table}
     if FINGERS not in table:
-        return [("", own)]
+        return [("", single)]
     given = table[FINGERS]
     if not isinstance(given, list) or not all(isinstance(finger, dict) for finger in given):
         raise ParameterError(FINGERS, "", f"must be a list of tables, [[{FINGERS}]]", show_value(given))
-    if own:
-        section = next(iter(own))
+    if single:
+        section = next(iter(single))
         rule = f"must be left out where there is [[{FINGERS}]]: give it there"
-        raise ParameterError(section, "", rule, show_value(own[section]))
+        raise ParameterError(section, "", rule, show_value(single[section]))
     owners = [f"{FINGERS} #{number}." for number in range(1, len(given) + 1)]
     for owner, finger in zip(owners, given, strict=True):
         refuse_unknown(owner.removesuffix("."), finger, FINGER_SECTIONS)
@@ -87,9 +87,9 @@ def _split_fingers(table: Table) -> list[tuple[str, Table]]:
 
 
 def merge_one_finger(table: Table) -> dict[str, Any]:
-    """Return the tables with the sections of the only finger beside the others, where settings name them.
+    """Return the tables with the sections of the only finger beside the others, where settings change them.
 
-    What is no list of one table, or would be given twice, is left for `resolve` to refuse.
+    `resolve` refuses what is not a list of one table, or would be given twice.
     """
     given = table.get(FINGERS)
     if not (isinstance(given, list) and len(given) == 1 and isinstance(given[0], dict)):
@@ -106,25 +106,24 @@ def _read_parts(
     method: str = "",
     owner: str = "",
 ) -> dict[str, Any]:
-    """Make the parts of some sections; `owner` stands before their names in messages."""
+    """Return the parts of sections; `owner`: prefix of their names in messages."""
     parts: dict[str, Any] = dict.fromkeys(tables)
-    for section, own in tables.items():
-        if own is None or (section in NEEDS and tables[NEEDS[section]] is None):
+    for section, given in tables.items():
+        if given is None or (section in NEEDS and tables[NEEDS[section]] is None):
             continue
-        if section != "blister" or _forms_blister(method, own):
+        if section != "blister" or _forms_blister(method, given):
             kind, usual = import_parameters(section, method), defaults.get(section, {})
-            parts[section] = cache.read(read_part, owner + section, kind, usual, own)
+            parts[section] = cache.read(read_part, owner + section, kind, usual, given)
     return parts
 
 
 def _read_finger(
     owner: str, table: Table, defaults: Mapping[str, Table], rest_height: float, cache: ReadParts
 ) -> Finger:
-    """Make a finger of its sections; `owner` stands before their names in messages."""
+    """Return a finger from its sections; `owner`: prefix of their names in messages."""
     tables = {section: _read_section(section, table.get(section, {}), owner) for section in FINGER_PARTS}
     parts = _read_parts(tables, defaults, cache, owner=owner)
-    own = table.get("trajectory", {})
-    path = cache.read(_read_path, f"{owner}trajectory", own, rest_height)
+    path = cache.read(_read_path, f"{owner}trajectory", table.get("trajectory", {}), rest_height)
     return Finger(**parts, trajectory=path)
 
 
@@ -132,8 +131,8 @@ def _check_text(key: str, value: Any) -> str:
     """Return a value that must be a text."""
     if not isinstance(value, str):
         raise ParameterError(key, "", "must be a text", show_value(value))
-    one_line = value.replace("\n", "").replace("\t", "") if key == "description" else value
-    if not one_line.isprintable():
+    printed = value.replace("\n", "").replace("\t", "") if key == "description" else value
+    if not printed.isprintable():
         raise ParameterError(key, "", "must be printable", show_value(value))
     return value
 
@@ -148,12 +147,12 @@ def _read_section(section: str, value: Any, owner: str = "") -> dict[str, Any] |
     raise ParameterError(owner + section, "", rule, show_value(value))
 
 
-def _forms_blister(method: str, own: Table) -> bool:
-    """Return whether a method forms a blister; refuse a section [blister] where it does not."""
+def _forms_blister(method: str, section: Table) -> bool:
+    """Return whether a method forms a blister; refuse a section [blister] if it does not."""
     formed = find_method(method).blister is not None
-    if not formed and own:
+    if not formed and section:
         rule = f"must be left out: the method {method} forms no blister"
-        raise ParameterError("blister", "", rule, show_value(own))
+        raise ParameterError("blister", "", rule, show_value(section))
     return formed
 
 
@@ -180,7 +179,7 @@ def _read_path(owner: str, table: Any, rest_height: float) -> Path:
 
 
 def _read_waypoint(owner: str, row: Table) -> Waypoint:
-    """Read one waypoint; where it is and when has no sensible default."""
+    """Read a waypoint, whose time and position have no default."""
     refuse_unknown(owner, row, tuple(list_quantities(Waypoint)))
     for key in ("time", "position"):
         if key not in row:
@@ -189,19 +188,18 @@ def _read_waypoint(owner: str, row: Table) -> Waypoint:
 
 
 def format_scene(scene: Scene, write: Writer | None = None) -> str:
-    """Write a scene as a scene file that resolves to an equal one, in SI units; `write`: as `write_part`."""
+    """Return a scene file, in SI units, that resolves to an equal scene; `write`: as `write_part`."""
     return "\n".join(_write_lines(scene, write or write_part)) + "\n"
 
 
 def _write_lines(scene: Scene, write: Writer) -> Iterator[str]:
-    """Return the lines of a scene file; one finger is written in the form of versions without more."""
+    """Yield the lines of a scene file; a single finger is written as by versions without several."""
     alone = len(scene.fingers) == 1
     sections = [name for name in SECTIONS if alone or name not in FINGER_SECTIONS]
     yield "# Every parameter of the scene, in SI units."
     yield from (f"{key} = {format_value(getattr(scene, key))}" for key in TEXTS)
-    yield from (
-        f'{name} = "{ABSENT}"' for name in OPTIONAL if name in sections and scene.section(name) is None
-    )
+    absent = [name for name in sections if name in OPTIONAL and scene.section(name) is None]
+    yield from (f'{name} = "{ABSENT}"' for name in absent)
     if not scene.fingers:
         yield f"{FINGERS} = []"
     for name in sections:
@@ -220,7 +218,7 @@ def _write_lines(scene: Scene, write: Writer) -> Iterator[str]:
 
 
 def write_part(section: str, part: Parameters | Path | None, method: str = "") -> Iterator[str]:
-    """Return the lines of a section, in the control's with its method; none for an omitted part."""
+    """Yield the lines of a section, for the control with its method; none for an omitted part."""
     if part is None:
         return
     if isinstance(part, Path):
@@ -238,7 +236,7 @@ def write_part(section: str, part: Parameters | Path | None, method: str = "") -
 
 
 def _write_path(section: str, path: Path) -> Iterator[str]:
-    """Give the lines of a finger's path."""
+    """Yield the lines of a finger's path."""
     yield f"\n[{section}]"
     yield f"interpolation = {format_value(path.interpolation)}"
     yield "waypoints = ["
