@@ -1,4 +1,4 @@
-"""File lock of one process, which ends with the process; whether a process has ended."""
+"""File lock of one process, which ends with the process; test whether a process has ended."""
 
 import ctypes
 import errno
@@ -14,26 +14,26 @@ from typing import Any, TypeVar
 
 from ..base.errors import BusyError
 
-#: Clocks of a machine and of the drive it writes to differ by less than this, s.
+#: Largest difference of the clocks of a machine and of its drive, s.
 CLOCKS_DIFFER = 60.0
-#: Seconds from 1601, where Windows begins to count, to 1970.
+#: Seconds from 1601, the epoch of Windows, to 1970.
 WINDOWS_EPOCH = 11_644_473_600.0
 
 
 def find_host() -> str:
-    """Return the name of this machine, as it may stand in the name of a file."""
+    """Return the name of this machine in a form for names of files."""
     return re.sub(r"[^A-Za-z0-9_-]", "-", platform.node())[:32] or "unknown"
 
 
 def may_have_made(pid: int, changed: float) -> bool:
-    """Return whether a process of this machine may have made a file last changed then, s since 1970."""
-    # Numbers of processes are used again: one that was started after the last change is another one.
+    """Return whether a process of this machine may have made a file last changed at a time, s since 1970."""
+    # Process numbers are reused: a process that started after the last change is another one.
     since = find_start(pid)
     return since is not None and since <= changed + CLOCKS_DIFFER
 
 
 def find_start(pid: int) -> float | None:
-    """Return when a process was started, s since 1970; 0 where that is unknown, None if it does not run."""
+    """Return the start time of a process, s since 1970; 0 if unknown, None if it does not run."""
     if pid <= 0:
         return None
     if os.name == "nt":
@@ -44,39 +44,38 @@ def find_start(pid: int) -> float | None:
         os.kill(pid, 0)
     except ProcessLookupError:
         return None
-    except (OSError, OverflowError):  # it runs, and belongs to another user
+    except (OSError, OverflowError):  # it runs as another user
         pass
     return _ask_ps(pid)
 
 
 def _find_start_in_linux(pid: int) -> float | None:
-    """Return when a process was started, from /proc."""
+    """Return the start time of a process from /proc."""
     try:
         status = Path(f"/proc/{pid}/stat").read_text(encoding="utf-8", errors="replace")
         booted = re.search(r"^btime (\d+)$", Path("/proc/stat").read_text(encoding="ascii"), re.MULTILINE)
     except OSError:
         return None
-    state, *fields = status.rpartition(")")[2].split()  # the command's name may hold blanks and brackets
-    if state in "ZX":  # it has ended, and its parent has not asked how
+    state, *fields = status.rpartition(")")[2].split()  # the command's name may have blanks and brackets
+    if state in "ZX":  # it has ended, and its parent has not read its status
         return None
     return int(booted[1]) + int(fields[18]) / os.sysconf("SC_CLK_TCK") if booted else 0.0
 
 
 def _ask_ps(pid: int) -> float | None:
-    """Return when a process was started, from ps; macOS has no /proc."""
+    """Return the start time of a process from ps, on macOS, which has no /proc."""
     import subprocess
 
+    command, plain = ["ps", "-o", "lstart=", "-p", str(pid)], os.environ | {"LC_ALL": "C"}
     with suppress(OSError, ValueError, subprocess.SubprocessError):
-        answer = subprocess.run(
-            ["ps", "-o", "lstart=", "-p", str(pid)], capture_output=True, text=True, timeout=10.0,
-            env={**os.environ, "LC_ALL": "C"}, check=False,
-        ).stdout.strip()  # fmt: skip
+        done = subprocess.run(command, capture_output=True, text=True, timeout=10.0, env=plain)
+        answer = done.stdout.strip()
         return time.mktime(time.strptime(answer, "%a %b %d %H:%M:%S %Y")) if answer else None
     return 0.0
 
 
 def _find_start_in_windows(pid: int) -> float | None:
-    """Return when a process was started; ``os.kill`` would end it there."""
+    """Return the start time of a process in Windows, where ``os.kill`` would end it."""
     system: Any = ctypes
     kernel = system.WinDLL("kernel32", use_last_error=True)
     kernel.OpenProcess.restype = system.c_void_p
@@ -88,7 +87,7 @@ def _find_start_in_windows(pid: int) -> float | None:
         times = [system.c_ulonglong() for _ in range(4)]
         if kernel.GetExitCodeProcess(owned, system.byref(code)) and code.value != 259:  # STILL_ACTIVE
             return None
-        if not kernel.GetProcessTimes(owned, *(system.byref(one) for one in times)):
+        if not kernel.GetProcessTimes(owned, *map(system.byref, times)):
             return 0.0
         return float(times[0].value) * 1e-7 - WINDOWS_EPOCH
     finally:
@@ -97,15 +96,13 @@ def _find_start_in_windows(pid: int) -> float | None:
 
 #: Seconds between two attempts.
 PAUSE = 0.05
-#: How often a folder may be gone when a file is to be made in it: more often it takes none, as /proc.
+#: Attempts to make a file in a folder that has just been removed: beyond, it takes no files, as /proc.
 MOST_MISSED = 100
-#: A record without a name is one that is being written, unless it is older than this, s.
+#: A record without a name that is older than this is abandoned, s; a newer one is being written.
 BEING_WRITTEN = 10.0
-#: What a drive says that has no locks, such as some network drives.
-NO_LOCKS = {
-    getattr(errno, name, None) for name in ("ENOLCK", "ENOTSUP", "EOPNOTSUPP", "ENOSYS", "EINVAL")
-} - {None}
-
+#: Errors of a drive without locks, such as some network drives.
+NO_LOCK_NAMES = ("ENOLCK", "ENOTSUP", "EOPNOTSUPP", "ENOSYS", "EINVAL")
+NO_LOCKS = {getattr(errno, name, None) for name in NO_LOCK_NAMES} - {None}
 
 Taken = TypeVar("Taken")
 
@@ -117,7 +114,7 @@ class NoLocksHere(Exception):
 @contextmanager
 def hold_lock(path: Path, refusal: str, patience: float = 0.0) -> Iterator[None]:
     """Hold a lock file, waiting `patience` s; BusyError with `refusal` when another process holds it."""
-    # No crash leaves the system's own lock behind, and no process started meanwhile inherits it.
+    # A lock of the system ends with a crash, and no child process inherits it.
     try:
         taken = _wait_for(lambda: _take(path), patience)
     except NoLocksHere:
@@ -129,7 +126,7 @@ def hold_lock(path: Path, refusal: str, patience: float = 0.0) -> Iterator[None]
     try:
         yield
     finally:
-        if os.name == "nt":  # an open file cannot be removed there; one that another process waits for stays
+        if os.name == "nt":  # which cannot remove an open file; one that another process waits for remains
             os.close(taken)
         with suppress(OSError):
             path.unlink()
@@ -138,7 +135,7 @@ def hold_lock(path: Path, refusal: str, patience: float = 0.0) -> Iterator[None]
 
 
 def _wait_for(attempt: Callable[[], Taken | None], patience: float) -> Taken | None:
-    """Attempt something again and again, for so many seconds; return what came of it."""
+    """Return the first result of repeated attempts within `patience` s, or None."""
     deadline = time.monotonic() + patience
     while (taken := attempt()) is None and time.monotonic() < deadline:
         time.sleep(PAUSE)
@@ -152,7 +149,7 @@ def _take(path: Path) -> int | None:
         flags = os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0)
         try:
             file = os.open(path, flags, 0o666)
-        except FileNotFoundError:  # the process that made the folder has just removed it
+        except FileNotFoundError:  # another process has just removed the folder
             path.parent.mkdir(parents=True, exist_ok=True)
             missed += 1
             if missed > MOST_MISSED:
@@ -167,7 +164,7 @@ def _take(path: Path) -> int | None:
         except BaseException:
             os.close(file)
             raise
-        os.close(file)  # it was taken away between opening and locking: the next one is another file
+        os.close(file)  # it was removed between opening and locking: the next attempt makes another file
 
 
 def _lock(file: int) -> bool:
@@ -192,7 +189,7 @@ def _lock(file: int) -> bool:
 
 
 def _is_at(file: int, path: Path) -> bool:
-    """Return whether an open file is the one that has this name now."""
+    """Return whether an open file is the one of this name."""
     try:
         return os.path.samestat(os.fstat(file), os.stat(path))
     except FileNotFoundError:
@@ -201,11 +198,11 @@ def _is_at(file: int, path: Path) -> bool:
 
 @contextmanager
 def hold_record(path: Path, refusal: str, patience: float = 0.0) -> Iterator[None]:
-    """Hold a file that names this process and machine; one whose process is gone does not count."""
+    """Hold a file that names this process and machine; replaces one whose process has ended."""
     if _wait_for(lambda: _record(path), patience) is None:
         owner = _read_owner(path)
         if owner is not None and owner[0] != find_host():
-            # What another machine holds has to be removed by hand when that one has crashed.
+            # After a crash of another machine its file has to be removed by hand.
             refusal += f" It was begun on {owner[0]}; if nothing runs there, remove {path}."
         raise BusyError(refusal)
     try:
@@ -216,7 +213,7 @@ def hold_record(path: Path, refusal: str, patience: float = 0.0) -> Iterator[Non
 
 
 def _record(path: Path) -> bool | None:
-    """Make the record; None when there is one of a process that may still run."""
+    """Make the record; None if there is one of a process that may still run."""
     try:
         changed, owner = path.stat().st_mtime, _read_owner(path)
         if owner is None:
@@ -244,7 +241,7 @@ def _record(path: Path) -> bool | None:
 
 
 def _read_owner(path: Path) -> tuple[str, int] | None:
-    """Return the machine and the process a record names; None where it names none."""
+    """Return the machine and the process of a record, or None."""
     try:
         machine, pid = path.read_text(encoding="utf-8").split()
         return machine, int(pid)

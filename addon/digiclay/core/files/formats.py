@@ -1,4 +1,4 @@
-"""Numpy's files, whose heads are checked before unpacking, and small PNG pictures."""
+"""Files of numpy, whose heads are checked before they are unpacked, and small PNG pictures."""
 
 import math
 import struct
@@ -13,17 +13,17 @@ from typing import IO, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-#: All that is raised over a zip that is damaged.
+#: Errors of a damaged zip.
 BROKEN_ZIP = (zipfile.BadZipFile, zlib.error, struct.error, NotImplementedError, RuntimeError)
-#: All that numpy's readers raise over a head that makes no sense.
+#: Errors of numpy's readers for a malformed head.
 BROKEN = (
-    ValueError, TypeError, KeyError, SyntaxError, RecursionError, MemoryError, OverflowError, EOFError,
-    tokenize.TokenError, Warning,
-)  # fmt: skip
+    *(ValueError, TypeError, KeyError, SyntaxError, tokenize.TokenError, Warning),
+    *(RecursionError, MemoryError, OverflowError, EOFError),
+)
 
 
 def read_count(value: Any) -> int:
-    """Return a whole number from 0 on, no larger than floating-point numbers hold exactly."""
+    """Return a whole number from 0 on that floating-point numbers represent exactly, or raise ValueError."""
     if not isinstance(value, int) or isinstance(value, bool) or not 0 <= value <= 2**53:
         raise ValueError(f"{str(value)[:20]} is no count")
     return value
@@ -37,12 +37,12 @@ class Head(NamedTuple):
 
     @property
     def size(self) -> int:
-        """Bytes of its numbers."""
+        """Bytes of the array."""
         return math.prod(self.shape) * self.kind.itemsize
 
 
 def read_heads(archive: zipfile.ZipFile, names: Sequence[str]) -> dict[str, Head]:
-    """Return what arrays of a file .npz are; KeyError without one, ValueError for a head that is untrue."""
+    """Return the heads of arrays of a file .npz; KeyError if one is missing, ValueError if one is wrong."""
     heads = {}
     for name in names:
         entry = archive.getinfo(f"{name}.npy")
@@ -58,7 +58,7 @@ def read_heads(archive: zipfile.ZipFile, names: Sequence[str]) -> dict[str, Head
 
 
 def _head(file: IO[bytes], name: str) -> Head:
-    """Read the head of an array; what numpy would warn of is no head of ours."""
+    """Read the head of an array; refuse one that numpy would warn of."""
     try:
         version = np.lib.format.read_magic(file)  # type: ignore[no-untyped-call]
         readers: dict[Any, Any] = {
@@ -75,14 +75,14 @@ def _head(file: IO[bytes], name: str) -> Head:
 
 
 def read_array(archive: zipfile.ZipFile, name: str) -> NDArray[Any]:
-    """Read an array whose head has been looked at."""
+    """Read an array whose head has been checked."""
     with archive.open(f"{name}.npy") as file:
         read: NDArray[Any] = np.lib.format.read_array(file, allow_pickle=False)  # type: ignore[no-untyped-call]
         return read
 
 
 def map_array(path: Path) -> NDArray[Any]:
-    """Return the array of a file .npy, read as it is used; OSError, or ValueError where it has no numbers."""
+    """Return the memory-mapped array of a file .npy; OSError, or ValueError if it has no numbers."""
     try:
         with warnings.catch_warnings(action="error"):
             read = np.load(path, allow_pickle=False, mmap_mode="r")
@@ -110,5 +110,5 @@ def _chunk(kind: bytes, data: bytes) -> bytes:
 
 
 def is_whole_picture(data: bytes) -> bool:
-    """Return whether a PNG file has its end; Blender does not always tell when a disk is full."""
+    """Return whether a PNG file has its end: Blender does not always report a full disk."""
     return data[-8:-4] == b"IEND"

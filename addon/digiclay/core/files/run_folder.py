@@ -1,4 +1,4 @@
-"""Folders and files: safe names, locked at the start of a run, complete under their name or absent."""
+"""Folders and files: safe names, locks from the start of a run, complete under their names or absent."""
 
 import hashlib
 import json
@@ -15,9 +15,9 @@ from ..base.errors import VALUE, OutputError, SceneError, explain_os_error, one_
 from ..base.quantity import find_nearest_name
 from .file_lock import find_host, hold_lock, may_have_made
 
-#: Bytes of a name in UTF-8; file systems take 255, of which what is unfinished needs some.
+#: Most bytes of a name in UTF-8; file systems permit 255, of which unfinished files need some.
 LONGEST = 120
-#: Names that stand for devices in Windows, whatever follows behind a full stop.
+#: Names of devices in Windows, with any extension.
 DEVICES = r"(?i)(con|prn|aux|nul|com[0-9¹²³]|lpt[0-9¹²³]|conin\$|conout\$)"
 
 
@@ -27,41 +27,41 @@ def make_safe_name(text: str) -> str:
     name = name.lstrip(".-").rstrip(".") or "scene"
     if re.fullmatch(DEVICES, name.partition(".")[0]):
         name = f"_{name}"
-    if len(name.encode(errors="replace")) <= LONGEST:
+    encoded = name.encode(errors="replace")
+    if len(encoded) <= LONGEST:
         return name
-    digest = hashlib.sha256(name.encode(errors="replace")).hexdigest()[:8]
-    kept = name.encode(errors="replace")[: LONGEST - 9].decode(errors="ignore")
-    return f"{kept}-{digest}"
+    beginning = encoded[: LONGEST - 9].decode(errors="ignore")
+    return f"{beginning}-{hashlib.sha256(encoded).hexdigest()[:8]}"
 
 
 def find_name(path: Path, general: str = "scene.toml") -> str:
-    """Return the name of a file's content: its stem, or its folder's name where the file's is `general`."""
+    """Return the name of a file's content: its stem, or its folder's name if the file's is `general`."""
     full = Path(os.path.abspath(path))
     name = full.parent.name if full.name == general else full.stem
     return name if name.strip(". ") else "scene"
 
 
 def fold_name(name: str) -> str:
-    """Return what names have in common that some file systems take for one: ``a`` and ``A``."""
+    """Return a form that is equal for names that some file systems do not distinguish: ``a`` and ``A``."""
     return unicodedata.normalize("NFC", unicodedata.normalize("NFC", name).casefold())
 
 
 def make_unique_names(texts: Sequence[str]) -> list[str]:
-    """Return safe names of texts, in their order; where several would be alike, the later get numbers."""
+    """Return safe names of texts, in their order; the later ones of equal names get numbers."""
     names = [make_safe_name(text) for text in texts]
     taken = {fold_name(name) for name in names}
     given: set[str] = set()
-    for place, name in enumerate(names):
+    for index, name in enumerate(names):
         number, chosen = 1, name
         while fold_name(chosen) in given or (number > 1 and fold_name(chosen) in taken):
             number += 1
             chosen = make_safe_name(f"{name[:LONGEST]}-{number}")
-        names[place] = chosen
+        names[index] = chosen
         given.add(fold_name(chosen))
     return names
 
 
-#: ``.NAME.PID@HOST.KIND``: what becomes NAME, what NAME was, a film's frames. Older versions name no host.
+#: ``.NAME.PID@HOST.KIND``: the new NAME, the former NAME, frames of a film. Older versions name no host.
 UNFINISHED = r"\.(?P<name>.+)\.(?P<pid>\d{1,10})(?:@(?P<host>[\w-]+))?\.(?P<kind>part|old|frames)"
 
 
@@ -76,14 +76,14 @@ def is_unfinished(path: Path) -> bool:
 
 
 def remove_abandoned(folder: Path, name: str = "") -> None:
-    """Remove what ended processes of this machine left unfinished of a name, or of any."""
+    """Remove unfinished files and folders of ended processes of this machine, of a name or of any."""
     try:
         paths = sorted(folder.iterdir())
     except OSError:
         return
     for path in paths:
         match = re.fullmatch(UNFINISHED, path.name)
-        # Nothing here tells whether other machines are still at what they prepare on a shared drive.
+        # Whether processes of other machines still run, on a shared drive, cannot be known here.
         if match is None or (name and match["name"] != name) or match["host"] not in (None, find_host()):
             continue
         with suppress(OSError):
@@ -99,21 +99,21 @@ def remove_abandoned(folder: Path, name: str = "") -> None:
 
 
 def write_whole(path: Path, content: bytes) -> None:
-    """Write a file whole or not at all, under a temporary name first; OutputError when it cannot be."""
+    """Write a file completely or not at all, under a temporary name first; OutputError on failure."""
     with open_whole(path) as file:
         file.write(content)
 
 
 @contextmanager
 def open_whole(path: Path) -> Iterator[BinaryIO]:
-    """Open a file that becomes `path` when the block ends without error; OutputError if it cannot be made."""
+    """Open a file that becomes `path` if the block ends without error; OutputError on failure."""
     part = name_unfinished(path)
     try:
         with part.open("wb") as file:
             yield file
         part.replace(path)
     except BaseException as error:
-        with suppress(OSError):  # what went wrong first is what the user has to hear
+        with suppress(OSError):  # the first error is the one to report
             part.unlink(missing_ok=True)
         if isinstance(error, OSError):
             raise OutputError(f"Cannot write {path}: {error.strerror or error}.") from error
@@ -121,31 +121,31 @@ def open_whole(path: Path) -> Iterator[BinaryIO]:
 
 
 def read_json(path: Path) -> dict[str, Any] | None:
-    """Return the content of a small JSON file; None where it cannot be read."""
+    """Return the table in a small JSON file; None if it cannot be read."""
     try:
-        read = json.loads(path.read_text(encoding="utf-8-sig"))
+        content = json.loads(path.read_text(encoding="utf-8-sig"))
     except (OSError, ValueError, RecursionError):
         return None
-    return read if isinstance(read, dict) else None
+    return content if isinstance(content, dict) else None
 
 
 def format_json(value: object) -> bytes:
-    """Return a value as JSON with a line's end."""
+    """Return a value as JSON with a final line feed."""
     return (json.dumps(value, indent=1, ensure_ascii=False, allow_nan=False) + "\n").encode()
 
 
-#: The file by which a folder is known as a run's.
+#: The file that identifies a run's folder.
 MARK = "metrics.json"
 
 
 class Content(NamedTuple):
-    """What a folder holds that may be replaced: its name, and patterns of files by which it is known."""
+    """Replaceable content of a folder: its name, and patterns of files that identify it."""
 
     name: str
     marks: tuple[str, ...]
 
     def find(self, folder: Path) -> list[Path]:
-        """Return the files by which it is known; none where a folder holds something else."""
+        """Return the files that identify it in a folder, or none."""
         return [path for mark in self.marks for path in folder.glob(mark) if path.is_file()]
 
 
@@ -153,7 +153,7 @@ RUN = Content("run", (MARK,))
 
 
 def check_folder(out: Path, *, overwrite: bool, content: Content = RUN) -> None:
-    """Refuse an output folder that is neither empty nor, with `overwrite`, known by its content."""
+    """Refuse an output folder that is neither empty nor, with `overwrite`, of the given content."""
     with explain_os_error(f"{out} cannot be read"):
         filled = out.exists() and (not out.is_dir() or any(out.iterdir()))
     if filled and not out.is_dir():
@@ -175,14 +175,14 @@ def check_folder(out: Path, *, overwrite: bool, content: Content = RUN) -> None:
 def resolve_inside(folder: Path, *parts: str) -> Path:
     """Return a path in a folder; OutputError for one that leads out of it, by its name or by a link."""
     path = folder.joinpath(*parts)
-    end = path.resolve()
-    if folder.resolve() not in end.parents:
-        raise OutputError(f"{path} leads out of {folder}, to {end}: nothing is written there.")
+    target = path.resolve()
+    if folder.resolve() not in target.parents:
+        raise OutputError(f"{path} leads out of {folder}, to {target}: nothing is written there.")
     return path
 
 
 def make_folder(path: Path) -> Path:
-    """Make a folder and those above it, where there are none; OutputError if it cannot be made."""
+    """Make a folder and those above it, if they do not exist; OutputError on failure."""
     with explain_os_error(f"{path} cannot be made"):
         path.mkdir(parents=True, exist_ok=True)
     return path
@@ -200,7 +200,7 @@ def lock_name(path: Path, patience: float = 0.0) -> AbstractContextManager[None]
 
 
 def describe_claim(path: Path, how: str) -> str:
-    """Return the error for a path that another process has locked; `how`: what that does, *being written*."""
+    """Return the error for a path that another process has locked; `how`: its use, *being written*."""
     return f"{path} is {how} by another digiclay: choose another place with --out, or wait."
 
 
@@ -212,7 +212,7 @@ class Claim(NamedTuple):
 
     @contextmanager
     def write(self) -> Iterator[Path]:
-        """Give a folder to write into; on leaving without error it becomes `out`, else all is as before."""
+        """Yield a folder to write into; it becomes `out` at the end, unless there was an error."""
         target = self.out.resolve()
         staged, former = name_unfinished(target), name_unfinished(target, "old")
         try:
@@ -235,7 +235,7 @@ class Claim(NamedTuple):
 def claim_folder(
     out: Path, *, overwrite: bool, patience: float = 0.0, content: Content = RUN
 ) -> Iterator[Claim]:
-    """Claim a folder before any work, or refuse it: no other process may write it until the block ends."""
+    """Lock a folder before any work, or refuse it: no other process may write it until the block ends."""
     check_folder(out, overwrite=overwrite, content=content)
     target = out.resolve()
     with ExitStack() as until_the_end:
@@ -249,19 +249,19 @@ def claim_folder(
 
 @contextmanager
 def remove_if_empty(target: Path) -> Iterator[None]:
-    """Take away in the end those folders above a path that were not there, unless there is something in."""
-    made = [folder for folder in target.parents if not folder.exists()]
+    """Remove at the end the folders above a path that did not exist before, if they are empty."""
+    new = [folder for folder in target.parents if not folder.exists()]
     try:
         yield
     finally:
-        for folder in made:
-            with suppress(OSError):  # not made after all, or not empty
+        for folder in new:
+            with suppress(OSError):  # missing, or not empty
                 folder.rmdir()
 
 
 @contextmanager
 def claim_files(files: Sequence[Path], patience: float = 0.0) -> Iterator[None]:
-    """Claim files in folders that exist, such as a run's, waiting `patience` s; OutputError if taken."""
+    """Lock files in existing folders, such as a run's, waiting `patience` s; OutputError on failure."""
     with ExitStack() as until_the_end:
         try:
             for folder in dict.fromkeys(file.parent for file in files):
@@ -280,21 +280,21 @@ def claim_files(files: Sequence[Path], patience: float = 0.0) -> Iterator[None]:
 
 @contextmanager
 def write_folder(out: Path, *, overwrite: bool) -> Iterator[Path]:
-    """Claim a folder and give one to write into, which becomes it: see `claim_folder` and `Claim.write`."""
+    """Claim a folder and yield one to write into, which becomes it: see `claim_folder` and `Claim.write`."""
     with claim_folder(out, overwrite=overwrite) as claim, claim.write() as folder:
         yield folder
 
 
 def list_files(folder: Path, *kinds: str) -> dict[str, Path]:
-    """Return the files of a folder that end with one of `kinds`, by their stems."""
+    """Return the files of a folder with one of the extensions `kinds`, by their stems."""
     return {path.stem: path for path in sorted(folder.iterdir()) if path.suffix in kinds}
 
 
 def find_file(word: str, samples: Mapping[str, Path], kind: str) -> Path:
-    """Return the file of a sample's name or a path; SceneError when there is no such file, or sample."""
+    """Return the file of a sample's name or a path; SceneError if there is no such file or sample."""
     if word in samples:
         return samples[word]
-    if os.path.isfile(word):  # unlike Path.is_file it takes any text, however odd or long
+    if os.path.isfile(word):  # unlike Path.is_file it accepts any text, however odd or long
         return Path(word)
     shown = one_line(word, VALUE)
     if os.path.isdir(word):

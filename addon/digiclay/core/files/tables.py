@@ -9,13 +9,13 @@ from typing import Any, TypeVar
 from ..base.errors import ParameterError
 from ..base.quantity import Parameters, find_nearest_name, list_quantities, parse
 
-#: Most bytes of a text: the heights of the largest bed, 20 million cells, packed, take 107 MB of them.
+#: Most bytes of a text: the packed heights of the largest bed, 20 million cells, take 107 MB.
 LARGEST = 128_000_000
-#: Most names of a dotted key, each of which is kept with all before it; most letters of a word or a number.
+#: Most names of a dotted key, each stored with all before it, and most letters of a word or a number.
 PARTS, LETTERS = 16, 1000
 _NAME = r'(?:[A-Za-z0-9_-]++|"(?:[^"\\\n]|\\.)*+"|\'[^\'\n]*+\')'
-#: What a text is made of, as far as it matters here: a key of too many names, a word, texts, a comment.
-#: Nothing is gone over twice: a text without an end reaches as far as it can.
+#: Parts of a text: a key of too many names, a word, texts, a comment. Without backtracking: an unterminated
+#: text extends as far as possible.
 _PIECES = re.compile(
     rf"(?P<key>{_NAME}(?:[ \t]*+\.[ \t]*+{_NAME}){{{PARTS}}})|(?P<word>[A-Za-z0-9_-]++)"
     r'|"""(?:[^"\\]|\\.|"(?!""))*+(?:""")?|\'\'\'(?:[^\']|\'(?!\'\'))*+(?:\'\'\')?'
@@ -25,7 +25,7 @@ _PIECES = re.compile(
 
 
 def parse_tables(text: str) -> dict[str, Any]:
-    """Return the tables of a TOML text; ValueError with ``(at line ...)`` where known, or RecursionError."""
+    """Return the tables of a TOML text; ValueError with ``(at line ...)`` if known, or RecursionError."""
     if len(text) > LARGEST:
         raise ValueError(f"must have at most {LARGEST // 1_000_000} MB (got {len(text) / 1e6:.0f} MB)")
     for piece in _PIECES.finditer(text):
@@ -41,13 +41,13 @@ def parse_tables(text: str) -> dict[str, Any]:
 
 
 def format_value(value: Any) -> str:
-    """Write a text, number, truth value, or a list of them; a float reads back as the same one."""
+    """Return a text, number, truth value, or a list of them, in TOML; a float is restored exactly."""
     if isinstance(value, (list, tuple)):
         return f"[{', '.join(map(format_value, value))}]"
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, str):
-        # JSON's escapes are TOML's; only TOML wants the delete character escaped as well.
+        # The escapes of JSON are those of TOML, which also needs one for the delete character.
         return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
     return repr(value)
 
@@ -57,7 +57,7 @@ Part = TypeVar("Part", bound=Parameters)
 
 
 def refuse_unknown(section: str, table: Table, names: Sequence[str]) -> None:
-    """Refuse keys that mean nothing. `section`: what the message calls it; `names`: known keys."""
+    """Refuse unknown keys. `section`: its name in the message; `names`: known keys."""
     for key, value in table.items():
         if key in names:
             continue
@@ -68,39 +68,39 @@ def refuse_unknown(section: str, table: Table, names: Sequence[str]) -> None:
         raise ParameterError(f"{owner}{name}", "", "must be a known key", show_value(value), asked)
 
 
-def read_part(section: str, kind: type[Part], defaults: Table, own: Table) -> Part:
-    """Build a part from its section `own`; `defaults`: values that differ from the class's own."""
+def read_part(section: str, kind: type[Part], defaults: Table, table: Table) -> Part:
+    """Return a part from the table of its section; `defaults`: values in place of those of the class."""
     quantities = list_quantities(kind)
-    refuse_unknown(section, own, (*quantities, "method") if section == "control" else tuple(quantities))
-    given = {key: _measured(section, key, value, quantities[key].unit) for key, value in own.items()}
+    refuse_unknown(section, table, (*quantities, "method") if section == "control" else tuple(quantities))
+    given = {key: _measured(section, key, value, quantities[key].unit) for key, value in table.items()}
     try:
         return kind(**{**defaults, **given})
     except ParameterError as error:
         rule = error.rule.replace(f"{error.owner}.", f"{section}.")
-        own_value = own.get(error.field)
-        value = show_value(own_value) if isinstance(own_value, str) else shorten(error.value)
+        written = table.get(error.field)
+        value = show_value(written) if isinstance(written, str) else shorten(error.value)
         raise ParameterError(section, error.field, rule, value, error.hint) from None
 
 
 class ReadParts:
-    """Parts that were read so far: what many tables have in common is read once.
+    """Cache of parts: equal sections of many tables are read once.
 
-    Parts are frozen, so that those who get the same one do not disturb each other.
+    Parts are frozen, and can be shared.
     """
 
     def __init__(self) -> None:
         self._parts: dict[tuple[Any, ...], Any] = {}
 
     def read(self, make: Callable[..., Any], *given: Any) -> Any:
-        """Return what a function makes of its arguments, or what it made of equal ones before."""
-        key = make, *(one if isinstance(one, type) else repr(one) for one in given)
+        """Return the result of a function, from the cache for equal arguments."""
+        key = make, *(value if isinstance(value, type) else repr(value) for value in given)
         if key not in self._parts:
             self._parts[key] = make(*given)
         return self._parts[key]
 
 
 def _measured(section: str, key: str, value: Any, unit: str) -> Any:
-    """Turn quantities written with a unit into SI, also within a list."""
+    """Return a value in SI units if it is written with a unit, also within a list."""
     if isinstance(value, list):
         return [_measured(section, key, item, unit) for item in value]
     if not isinstance(value, str) or not unit:
@@ -112,12 +112,12 @@ def _measured(section: str, key: str, value: Any, unit: str) -> Any:
 
 
 def show_value(value: Any) -> str:
-    """Write a value from a file on one short line."""
+    """Return a value from a file as one short line."""
     if isinstance(value, dict):
         return "a section" if value else "an empty section"
     return shorten(repr(value))
 
 
 def shorten(text: str) -> str:
-    """Shorten a text that would not fit on a line."""
+    """Return a text shortened to a line."""
     return text if len(text) <= 60 else f"{text[:57]}..."
