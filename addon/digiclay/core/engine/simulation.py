@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -16,6 +16,11 @@ from ..model.touch import FingerPeriod, trace_finger
 from ..model.trajectory import Trajectory, sample_poses
 from .state import State, make_initial_state
 from .system import System
+
+#: Called after each control period, or piece of work, with the number done and the number of all.
+Progress = Callable[[int, int], None] | None
+#: Called then too; True ends the work.
+Stopped = Callable[[], bool] | None
 
 #: Control periods whose finger poses are computed at a time.
 CHUNK = 256

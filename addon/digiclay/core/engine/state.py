@@ -40,17 +40,17 @@ class Rows:
     @cached_property
     def driven(self) -> slice:
         """Rows of a stepper: the physics and the queued commands."""
-        return slice(0, self.physics + self.queue)
+        return slice(0, self.target)
 
     @cached_property
     def commands(self) -> slice:
         """Rows of the queued commands."""
-        return slice(self.physics, self.physics + self.queue)
+        return slice(self.physics, self.target)
 
     @cached_property
     def command(self) -> int:
         """Row of the newest command."""
-        return self.physics + self.queue - 1
+        return self.target - 1
 
     @cached_property
     def target(self) -> int:
@@ -60,7 +60,7 @@ class Rows:
     @cached_property
     def force(self) -> int:
         """Row of the force."""
-        return self.physics + self.queue + 1
+        return self.target + 1
 
     @cached_property
     def count(self) -> int:
@@ -75,7 +75,7 @@ class Rows:
     @cached_property
     def sensed(self) -> slice:
         """Rows of the sensors."""
-        return slice(self.force + 1 + self.control, self.count - self.fingers)
+        return slice(self.controlled.stop, self.pressing.start)
 
     @cached_property
     def pressing(self) -> slice:

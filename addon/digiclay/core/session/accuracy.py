@@ -8,7 +8,6 @@ session has an `ErrorMonitor`, which follows it for a short stretch at intervals
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
 from functools import lru_cache
 from typing import Any, NamedTuple
@@ -18,7 +17,7 @@ from numpy.typing import NDArray
 
 from ..base.arrays import Floats
 from ..base.errors import DigiclayError, ParameterError
-from ..engine.simulation import begin, periods, repeat_period, trace_fingers
+from ..engine.simulation import Progress, Stopped, begin, periods, repeat_period, trace_fingers
 from ..engine.state import State
 from ..engine.system import System
 from ..model.control_interface import Commands, Measurement
@@ -151,8 +150,8 @@ def estimate_errors(
     scene: Scene,
     history: dict[str, NDArray[Any]],
     *,
-    progress: Callable[[int, int], None] | None = None,
-    stopped: Callable[[], bool] | None = None,
+    progress: Progress = None,
+    stopped: Stopped = None,
 ) -> Errors | None:
     """Estimate the errors of a run with every command; None when `stopped`; see `run_scene.run`."""
     system = assemble(make_reference(scene))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import platform
 import time
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import MappingProxyType
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ..base.arrays import Floats
 from ..base.errors import explain_os_error
-from ..engine.simulation import begin, periods
+from ..engine.simulation import Progress, Stopped, begin, periods
 from ..engine.system import System
 from ..metrics.metric_table import ERRORS, METRICS, RUN, describe_errors, describe_losses, describe_time
 from ..metrics.summary import compute_metrics, find_losses, split_fingers, take_worst
@@ -91,11 +91,7 @@ class Result:
         """Return the result with the reason why its errors are not estimated."""
         return replace(self, metrics={**self.metrics, "errors_absent": why})
 
-    def estimate_errors(
-        self,
-        progress: Callable[[int, int], None] | None = None,
-        stopped: Callable[[], bool] | None = None,
-    ) -> Result | None:
+    def estimate_errors(self, progress: Progress = None, stopped: Stopped = None) -> Result | None:
         """Return the result with its errors, or the reason why it has none; None when `stopped`."""
         if absent := "the session was stopped" if self.incomplete else explain_absence(self.scene):
             return self.without_errors(absent)
@@ -119,8 +115,8 @@ def measure_losses(
     for total_force, height in felt:
         losses = find_losses(time, total_force, height, system.fastest)
         lost.append({"losses": len(losses), "time": sum(loss.time for loss in losses)})
-    # Only what is to hold a force can lose a fingertip.
-    return {"lost": lost} if scene.set_point and any(one["losses"] for one in lost) else {}
+    # Only a method that holds a force can lose a fingertip.
+    return {"lost": lost} if scene.set_point and any(finger["losses"] for finger in lost) else {}
 
 
 def evaluate(
@@ -205,8 +201,8 @@ def select_rows(history: History, start: float, end: float) -> History:
 def run(
     scene: Scene,
     *,
-    progress: Callable[[int, int], None] | None = None,
-    stopped: Callable[[], bool] | None = None,
+    progress: Progress = None,
+    stopped: Stopped = None,
     versions: Mapping[str, str] | None = None,
 ) -> Result:
     """Run a scene from rest to its end.

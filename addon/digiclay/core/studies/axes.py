@@ -11,6 +11,7 @@ import numpy as np
 
 from ..base.errors import ParameterError, SceneError
 from ..base.quantity import Parameters, Quantity, list_quantities, normalize
+from ..engine.simulation import Progress, Stopped
 from ..files.tables import ReadParts
 from ..scene.scene_source import Setting, load, make_scene, read_table, split_key
 from ..scene.schema import Scene
@@ -19,7 +20,7 @@ from ..scene.toml_table import FINGERS
 #: Result of a point: its ``figures``, or the ``error`` it ended in.
 Record = dict[str, Any]
 #: Measurement of a scene, given a function that tells whether to stop; None after a stop.
-Measure = Callable[[Scene, Callable[[], bool] | None], Record | None]
+Measure = Callable[[Scene, Stopped], Record | None]
 #: Most points: more are a typing error, not a sweep.
 MOST = 10_000
 
@@ -154,7 +155,7 @@ def make_points(
     path: Path,
     settings: Sequence[Setting],
     axes: Sequence[Axis],
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress = None,
 ) -> list[Point]:
     """Make the scenes of all points of a sweep; refuse a value for which no point has a scene."""
     keys = [axis.key for axis in axes]
@@ -180,7 +181,7 @@ def place_points(
     rows: Sequence[tuple[str, ...]],
     *,
     first: int = 0,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress = None,
 ) -> list[Point]:
     """Make the scenes of given points; incompatible values make a point with an error."""
     table, parts, points = read_table(path), ReadParts(), []

@@ -11,6 +11,7 @@ from ..base.quantity import find_nearest_name
 from ..batch.run_together import measure_together
 from ..batch.structure import Findings, describe_structure
 from ..control.methods import find_method
+from ..engine.simulation import Stopped
 from ..metrics.metric_table import ERRORS, METRICS, RUN, describe_errors
 from ..scene.schema import Scene
 from ..session.accuracy import describe_bends, make_reference
@@ -178,7 +179,7 @@ def explain_failed_batches(records: Mapping[int, Record]) -> tuple[str, ...]:
 
 def evaluate(
     scene: Scene,
-    stopped: Callable[[], bool] | None = None,
+    stopped: Stopped = None,
     *,
     errors: bool = False,
     measure: Measure | None = None,
@@ -205,9 +206,7 @@ class BatchWarning(RuntimeWarning):
     """Failure of a whole batch that is not the user's error."""
 
 
-def evaluate_bundle(
-    bundle: Sequence[Point], stopped: Callable[[], bool] | None = None
-) -> list[Record | None]:
+def evaluate_bundle(bundle: Sequence[Point], stopped: Stopped = None) -> list[Record | None]:
     """Run a bundle, with all errors or none; return the records of its points, None for a stopped one.
 
     When a batch fails as a whole, its points run one by one, and each record has the reason as ``alone``;
