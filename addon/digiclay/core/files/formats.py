@@ -22,7 +22,7 @@ BROKEN = (
 )
 
 
-def read_count(value: Any) -> int:
+def read_count(value: object) -> int:
     """Return a whole number from 0 on that floating-point numbers represent exactly, or raise ValueError."""
     if not isinstance(value, int) or isinstance(value, bool) or not 0 <= value <= 2**53:
         raise ValueError(f"{str(value)[:20]} is no count")

@@ -40,7 +40,7 @@ def parse_tables(text: str) -> dict[str, Any]:
     return tomllib.loads(text)
 
 
-def format_value(value: Any) -> str:
+def format_value(value: object) -> str:
     """Return a text, number, truth value, or a list of them, in TOML; a float is restored exactly."""
     if isinstance(value, (list, tuple)):
         return f"[{', '.join(map(format_value, value))}]"
@@ -111,7 +111,7 @@ def _measured(section: str, key: str, value: Any, unit: str) -> Any:
         raise ParameterError(section, key, str(error), show_value(value)) from None
 
 
-def show_value(value: Any) -> str:
+def show_value(value: object) -> str:
     """Return a value from a file as one short line."""
     if isinstance(value, dict):
         return "a section" if value else "an empty section"

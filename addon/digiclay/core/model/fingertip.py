@@ -8,7 +8,7 @@ the force on a tall pin that the fingertip meets sideways must grow, not jump.
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
@@ -114,7 +114,7 @@ def compute_reaches(outline: Floats) -> Floats:
     return ends
 
 
-def compute_reach(window: Window, peak: Any) -> Discs | None:
+def compute_reach(window: Window, peak: Floats | float) -> Discs | None:
     """Return the disc, or that of each of b runs, outside which the underside is above `peak`, m.
 
     A paraboloid is below the underside at any tilt, also with the smallest base and bend of several poses.
@@ -166,7 +166,7 @@ def compute_underside(forms: Floats, join: Floats, basis: Floats) -> Floats:
     return join_surfaces(rows[..., :count, :], rows[..., count:, :], join[..., 0, :, :], join[..., 1, :, :])
 
 
-def join_surfaces(inner: Floats, tangent: Floats, least: Any, root: Any) -> Floats:
+def join_surfaces(inner: Floats, tangent: Floats, least: Floats, root: Floats) -> Floats:
     """Return ``tangent + (sqrt(max(inner, least)) - root)²``, m, in `inner`; see `compute_forms`."""
     np.maximum(inner, least, out=inner)
     np.sqrt(inner, inner)

@@ -201,7 +201,7 @@ class Quantized(Stateless):
         return _round_to_step(force, self.force), _round_to_step(height, self.height)
 
 
-def _round_to_step(values: Floats, step: Any) -> Floats:
+def _round_to_step(values: Floats, step: Floats | float) -> Floats:
     """Return values in whole steps; a step, or each run's (b,), of 0 rounds nothing."""
     if not np.any(step):
         return values

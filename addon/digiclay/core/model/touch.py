@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..base.arrays import Constants, Floats, apply_map
+from ..base.arrays import Constants, Flags, Floats, apply_map
 from .contact import ExponentialLaw
 from .fingertip import (
     Fingertip,
@@ -152,7 +152,7 @@ MOST_INDENTATION = 3e-3
 ROWS = 64
 
 
-def is_beyond(force: Any, indentation: Any) -> Any:
+def is_beyond(force: Floats | float, indentation: Floats | float) -> Flags | bool:
     """Return whether total forces, N, or indentations, m, exceed the range of the contact law."""
     return (force > MOST_FORCE) | (indentation > MOST_INDENTATION)
 

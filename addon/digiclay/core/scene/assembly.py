@@ -112,7 +112,7 @@ def _assemble_hands(scene: Scene) -> System:
     if not 0 < len(scene.fingers) <= MOST_FINGERS:
         raise ParameterError("scene", "fingers", f"must be 1 to {MOST_FINGERS}", str(len(scene.fingers)))
     scene = replace(scene, fingers=_pad_relaxations(scene.fingers))
-    different: dict[Any, Motion] = {}
+    different: dict[tuple[object, ...], Motion] = {}
     motions = []
     for finger in scene.fingers:
         parts = finger.fingertip, finger.contact, finger.relaxation

@@ -127,7 +127,7 @@ def _read_finger(
     return Finger(**parts, trajectory=path)
 
 
-def _check_text(key: str, value: Any) -> str:
+def _check_text(key: str, value: object) -> str:
     """Return a value that must be a text."""
     if not isinstance(value, str):
         raise ParameterError(key, "", "must be a text", show_value(value))
@@ -137,7 +137,7 @@ def _check_text(key: str, value: Any) -> str:
     return value
 
 
-def _read_section(section: str, value: Any, owner: str = "") -> dict[str, Any] | None:
+def _read_section(section: str, value: object, owner: str = "") -> dict[str, Any] | None:
     """Return the table of a section, or None for an omitted part."""
     if value == ABSENT and section in OPTIONAL:
         return None
@@ -156,7 +156,7 @@ def _forms_blister(method: str, section: Table) -> bool:
     return formed
 
 
-def _read_path(owner: str, table: Any, rest_height: float) -> Path:
+def _read_path(owner: str, table: object, rest_height: float) -> Path:
     """Read the section of the fingertip path."""
     if not isinstance(table, dict):
         raise ParameterError(owner, "", "must be a section, [trajectory]", show_value(table))

@@ -104,7 +104,7 @@ def exceeds_law(system: System, state: State, pose: Floats) -> bool:
         return False
     row = {"height": near.height[None], "force": near.force[None], "fingertip": pose[None]}
     row["position"] = system.grid.positions[near.cells]
-    return bool(is_beyond(force, find_indentations(fingertip, row))[0])
+    return bool(np.any(is_beyond(force, find_indentations(fingertip, row))))
 
 
 def sample(system: System, state: State, set_point: SetPoint | None, pins: Sequence[int]) -> list[float]:

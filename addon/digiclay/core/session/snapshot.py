@@ -76,7 +76,7 @@ def _rebuild_like(template: Any, stored: Any, arrays: list[NDArray[Any]]) -> Any
     return kind(stored)
 
 
-def _check_number(template: Any, number: Any) -> None:
+def _check_number(template: object, number: object) -> None:
     """Refuse a number that no controller reaches: counts are whole, only what begins infinite may be so."""
     if not isinstance(number, (bool, int, float)) or math.isnan(number):
         raise ValueError("no number")
@@ -359,7 +359,7 @@ def _read_disc(values: Any) -> Disc | None:
     return x, y, radius
 
 
-def _check_same(what: str, stored: Any, here: Any) -> None:
+def _check_same(what: str, stored: object, here: object) -> None:
     """Refuse a state of another system."""
     if stored != here:
         rule = f"must have the same {what} as the bed now, {here} (got {stored})"

@@ -62,7 +62,7 @@ class Column:
     #: Of the parameter; empty if it has none.
     unit: str
     #: Numbers in SI units, or texts.
-    values: tuple[Any, ...]
+    values: tuple[float | str, ...]
     logarithmic: bool
 
     @property
@@ -223,14 +223,14 @@ def find_quantity(scene: Scene, key: str) -> Quantity | None:
     return next(declared, None)
 
 
-def find_numbers(scene: Scene, key: str) -> list[Any]:
+def find_numbers(scene: Scene, key: str) -> list[float]:
     """Return the different values of a parameter that are numbers: those of fingers may differ."""
     parts, name = _find_parts(scene, key)
     values = dict.fromkeys(getattr(part, name, None) for part in parts if name)
     return [value for value in values if isinstance(value, (int, float)) and not isinstance(value, bool)]
 
 
-def find_value(scene: Scene, key: str, word: str) -> Any:
+def find_value(scene: Scene, key: str, word: str) -> float | str:
     """Return the value of a word in a scene if it is a number, the same for all fingers; else the word."""
     numbers = find_numbers(scene, key)
     return numbers[0] if len(numbers) == 1 else word

@@ -173,14 +173,14 @@ class Formed:
         return float(np.hypot(*(self.position[1] - self.position[0])))
 
     @property
-    def _along(self) -> Any:
+    def _along(self) -> float:
         """Step from a pin to the next one in a row, m."""
-        return self.position[1, 0] - self.position[0, 0]
+        return float(self.position[1, 0] - self.position[0, 0])
 
     @property
-    def _across(self) -> Any:
+    def _across(self) -> float:
         """Step from a row to the next one, m."""
-        return self.position[self.columns, 1] - self.position[0, 1]
+        return float(self.position[self.columns, 1] - self.position[0, 1])
 
     @property
     def shift(self) -> float:
@@ -191,7 +191,7 @@ class Formed:
     @property
     def row_spacing(self) -> float:
         """Distance between rows, m."""
-        return float(abs(self._across))
+        return abs(self._across)
 
     def nearest(self, points: Floats) -> Indices:
         """Return the pin in the nearest row that is nearest to each of points (k, 2), m."""

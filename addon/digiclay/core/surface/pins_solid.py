@@ -64,15 +64,15 @@ def make_pins_solid(formed: Formed, base_thickness: float = BASE_THICKNESS) -> t
     keys = np.concatenate([parts.start * above + steps[parts.pin], np.arange(k) * above])
     names, number = np.unique(keys, return_inverse=True)
     number = number.ravel() + 2 * n
-    here, ground = number[: len(parts.start)], number[len(parts.start) :]
+    starts, ground = number[: len(parts.start)], number[len(parts.start) :]
     at, up = np.divmod(names, above)
     middle = np.column_stack([formed.position, height])
     below = np.column_stack([formed.position, np.full(n, level)])
     vertices = np.concatenate([middle, below, np.column_stack([parts.corner[at], level + up * STEP])])
-    ahead = here[_following(parts.pin)]
-    top = np.column_stack([parts.pin, here, ahead]).astype(np.int32)
+    ends = starts[_following(parts.pin)]
+    top = np.column_stack([parts.pin, starts, ends]).astype(np.int32)
     bottom = np.column_stack([parts.pin + n, ground[parts.end], ground[parts.start]]).astype(np.int32)
-    walls, whose = _walls(parts, steps, here, ahead, ground)
+    walls, whose = _walls(parts, steps, starts, ends, ground)
     return vertices, np.concatenate([top, bottom, walls]), np.concatenate([parts.pin, parts.pin, whose])
 
 
@@ -85,7 +85,7 @@ def _following(pin: Indices) -> Indices:
 
 
 def _walls(
-    parts: Parts, steps: Indices, here: Indices, ahead: Indices, ground: Indices
+    parts: Parts, steps: Indices, starts: Indices, ends: Indices, ground: Indices
 ) -> tuple[Faces, Indices]:
     """Return the triangles of the walls of parts above their neighbors, and their pins."""
     # The vertices of a corner are numbered in the order of their heights: a wall uses consecutive ones.
@@ -93,12 +93,12 @@ def _walls(
     side = np.flatnonzero(steps[parts.pin] > other)
     twin = parts.twin[side]
     # The feet of the wall: the neighbor's vertices, or beyond the bed those of the base.
-    left = np.where(twin >= 0, ahead[twin], ground[parts.start[side]])
-    right = np.where(twin >= 0, here[twin], ground[parts.end[side]])
-    i, step = _counted(here[side] - left)
+    left = np.where(twin >= 0, ends[twin], ground[parts.start[side]])
+    right = np.where(twin >= 0, starts[twin], ground[parts.end[side]])
+    i, step = _counted(starts[side] - left)
     lower = np.column_stack([left[i] + step, right[i], left[i] + step + 1]).astype(np.int32)
-    j, step = _counted(ahead[side] - right)
-    upper = np.column_stack([right[j] + step, right[j] + step + 1, here[side][j]]).astype(np.int32)
+    j, step = _counted(ends[side] - right)
+    upper = np.column_stack([right[j] + step, right[j] + step + 1, starts[side][j]]).astype(np.int32)
     return np.concatenate([lower, upper]), parts.pin[side][np.concatenate([i, j])]
 
 
