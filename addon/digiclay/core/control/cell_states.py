@@ -238,8 +238,8 @@ class CellStatesControl:
     ) -> tuple[list[Patch], list[Disc | None]]:
         """Find where the fingertips press, each in its section; see `Controller.locate`."""
         fingers = zip(memories, sections.parts, strict=True)
-        found = [self.locate(memory, touched, part) for memory, part in fingers]
-        return [memory for memory, _ in found], [disc for _, disc in found]
+        located = [self.locate(memory, touched, part) for memory, part in fingers]
+        return [memory for memory, _ in located], [disc for _, disc in located]
 
     def command_all(
         self, memories: list[Patch], seen: Measurement, sections: Whole = WHOLE

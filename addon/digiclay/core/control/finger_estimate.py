@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -79,27 +79,20 @@ def _place_form(x: float, y: float, xx: float, xy: float, yy: float) -> Form:
 
 def _list_surfaces(profile: _Profile, place: Place, radius: Form) -> tuple[Form, Form]:
     """Return what `fingertip.join_surfaces` joins: ``bend (1 - q)``, and ``z - lowest + slope q``."""
-    one, x, y, xx, xy, yy = radius
+    free, x, y, xx, xy, yy = radius
     r, t = -profile.bend, profile.slope
     return (
-        (r * one - r, r * x, r * y, r * xx, r * xy, r * yy),
-        (t * one + place.z - profile.lowest, t * x, t * y, t * xx, t * xy, t * yy),
+        (r * free - r, r * x, r * y, r * xx, r * xy, r * yy),
+        (t * free + place.z - profile.lowest, t * x, t * y, t * xx, t * xy, t * yy),
     )
-
-
-@lru_cache(64)
-def _resize_surfaces(known: _Profile, place: Place) -> tuple[tuple[Form, Form], tuple[float, float]]:
-    """Return the surfaces of a known fingertip at a place, `least` and `root`; asked for twice a period."""
-    profile = known.resize(place.size)
-    return _list_surfaces(profile, place, _find_radius(profile, place)), (profile.least, profile.root)
 
 
 def _list_slopes(profile: _Profile, place: Place, radius: Form) -> tuple[Form, ...]:
     """Return the slopes of q by size, x, y and the two elongations."""
-    one, x, y, xx, xy, yy = radius
+    free, x, y, xx, xy, yy = radius
     mean = profile.mean
     return (
-        (-2.0 * one, -2.0 * x, -2.0 * y, -2.0 * xx, -2.0 * xy, -2.0 * yy),
+        (-2.0 * free, -2.0 * x, -2.0 * y, -2.0 * xx, -2.0 * xy, -2.0 * yy),
         (-x, -2.0 * xx, -xy, 0.0, 0.0, 0.0),
         (-y, -xy, -2.0 * yy, 0.0, 0.0, 0.0),
         _place_form(place.x, place.y, -mean, 0.0, mean),
@@ -186,7 +179,7 @@ class FingerFilter:
         error = seen - at.under
         weighted = at.slopes / variance
         parts = map(sections.cut, (at.slopes, weighted, error))
-        return [self._update(*own) for own in zip(guesses, *parts, strict=True)], error
+        return [self._update(*finger) for finger in zip(guesses, *parts, strict=True)], error
 
     def _update(self, guess: Estimate, slopes: Floats, weighted: Floats, error: Floats) -> Estimate:
         """Return the estimate of one finger after errors (m,), m, of which in place those left remain."""
@@ -240,9 +233,10 @@ class FingerFilter:
         """Return the undersides over cells, (m,), m, of fingertips like the estimated ones at places, m."""
         surfaces, numbers = [], []
         for aim, estimate in zip(aims, like, strict=True):
-            own, joint = _resize_surfaces(self._profile, Place(*aim, *estimate.mean.tolist()[6:]))
-            surfaces.append(own)
-            numbers.append(joint)
+            place = Place(*aim, *estimate.mean.tolist()[6:])
+            profile = self._profile.resize(place.size)
+            surfaces.append(_list_surfaces(profile, place, _find_radius(profile, place)))
+            numbers.append((profile.least, profile.root))
         inner, tangent = sections.multiply(surfaces, basis)
         return join_surfaces(inner, tangent, *sections.spread(numbers))
 
@@ -279,7 +273,7 @@ def invert_six(matrix: Floats) -> Floats:
             for by, u, v, w, x, y in rows
         ]
         rows[step] = head
-    made = np.array(rows)
-    for one, other in reversed(swaps):
-        made[:, [one, other]] = made[:, [other, one]]
-    return made
+    inverse = np.array(rows)
+    for step, pivot in reversed(swaps):
+        inverse[:, [step, pivot]] = inverse[:, [pivot, step]]
+    return inverse

@@ -98,26 +98,26 @@ class FingerObserver:
 
     def observe(self, memories: list[Follower], touched: Measurement, sections: Whole) -> list[Follower]:
         """Observe the pulp of the cells the fingertips may touch, and follow or find them."""
-        at, own, force = self.at, touched.own, touched.force
+        at, rows, force = self.at, touched.own, touched.force
         period = sections.spread([memory.period for memory in memories])
-        late = (period - 1.0) - own[at.stamp]
+        late = (period - 1.0) - rows[at.stamp]
         if np.count_nonzero(late):
-            self.pulp.age(own[at.pulp], late * (own[at.stamp] > 0.0))
-            np.putmask(own[at.later], late, AWAY)
-            np.putmask(own[at.coming], late, AWAY)
-        own[at.stamp] = period
+            self.pulp.age(rows[at.pulp], late * (rows[at.stamp] > 0.0))
+            np.putmask(rows[at.later], late, AWAY)
+            np.putmask(rows[at.coming], late, AWAY)
+        rows[at.stamp] = period
         (felt,) = (force > self.felt).nonzero()
         if memories[0].phase is IDLE:
-            self.pulp.observe(own[at.pulp], force, np.zeros(force.size))
-            own[at.coming] = own[at.later] = AWAY
+            self.pulp.observe(rows[at.pulp], force, np.zeros(force.size))
+            rows[at.coming] = rows[at.later] = AWAY
             bounds = pairwise(sections.find_bounds(felt))
             return [
                 self._find(memory, touched, felt[start:stop]) if stop > start else memory
                 for memory, (start, stop) in zip(memories, bounds, strict=True)
             ]
-        expected = self.pulp.touch.contact.tension(touched.height - own[at.coming])
-        (here,) = self.pulp.observe(own[at.pulp], force, expected).nonzero()
-        own[at.coming] = own[at.later]
+        expected = self.pulp.touch.contact.tension(touched.height - rows[at.coming])
+        (here,) = self.pulp.observe(rows[at.pulp], force, expected).nonzero()
+        rows[at.coming] = rows[at.later]
         return self._follow(memories, touched, (felt, here), sections)
 
     def _follow(
@@ -142,10 +142,10 @@ class FingerObserver:
         x, y = touched.quadratic_basis[1:3, felt].tolist() if any(fits) and felt.size else ((), ())
         for i in [i for i, fit in enumerate(fits) if fit]:
             touched.own[self.at.residual, sections.parts[i]] = 0.0
-            own = slice(counts[i], counts[i + 1])
-            if self._has_jumped(memories[i].estimate, x[own], y[own]):
-                found = memories[i]._replace(losses=memories[i].losses + 1)
-                after[i], fits[i] = self._find(found, touched, felt[own]), False
+            part = slice(counts[i], counts[i + 1])
+            if self._has_jumped(memories[i].estimate, x[part], y[part]):
+                lost = memories[i]._replace(losses=memories[i].losses + 1)
+                after[i], fits[i] = self._find(lost, touched, felt[part]), False
         here, fingers, sections = sections.pick(here, fits)
         if fingers:
             fitted = self._fit([memories[i] for i in fingers], touched, here, sections)
@@ -164,8 +164,10 @@ class FingerObserver:
 
     def _has_jumped(self, guess: Estimate, x: Sequence[float], y: Sequence[float]) -> bool:
         """Tell whether cells are touched, at x, y, m, but none where the fingertip can be."""
-        place = guess.mean.tolist()[:2]
-        return bool(x) and not any(math.dist(place, cell) <= self.farthest for cell in zip(x, y, strict=True))
+        middle = guess.mean.tolist()[:2]
+        return bool(x) and not any(
+            math.dist(middle, cell) <= self.farthest for cell in zip(x, y, strict=True)
+        )
 
     def _find(self, memory: Follower, touched: Measurement, here: Cells) -> Follower:
         """Begin to follow a fingertip that has touched: at the centroid of its forces (equation 13)."""

@@ -40,8 +40,8 @@ class Whole:
 
     def reduce(self, ufunc: np.ufunc, values: Floats) -> Floats:
         """Return what a ufunc makes of the values (..., m) of each finger, (..., f)."""
-        made: Floats = ufunc.reduce(values, -1, None, None, True)
-        return made
+        reduced: Floats = ufunc.reduce(values, -1, None, None, True)
+        return reduced
 
     def add(self, values: Floats) -> list[float]:
         """Return the sum of values (m,) of each finger."""
@@ -72,12 +72,11 @@ class Sections(Whole):
 
     def __init__(self, sizes: Sequence[int]) -> None:
         self.sizes, self.edges = np.array(sizes), np.cumsum([0, *sizes])
-        self.starts = self.edges[:-1]
         self.parts = [slice(*ends) for ends in pairwise(self.edges.tolist())]
 
     def spread(self, numbers: Sequence[Any]) -> Any:
         """See `Whole`; rows of tuples."""
-        if all(one is numbers[0] for one in numbers) and not isinstance(numbers[0], tuple):
+        if all(number is numbers[0] for number in numbers) and not isinstance(numbers[0], tuple):
             return numbers[0]
         return self.repeat(np.array(numbers).T)
 
@@ -91,14 +90,15 @@ class Sections(Whole):
 
     def reduce(self, ufunc: np.ufunc, values: Floats) -> Floats:
         """See `Whole`."""
-        made: Floats = ufunc.reduceat(values, self.starts, -1)
-        return made
+        reduced: Floats = ufunc.reduceat(values, self.edges[:-1], -1)
+        return reduced
 
     def average(self, values: Floats, test: Flags, instead: list[float]) -> list[float]:
         """See `Whole`."""
         sums = self.add(np.where(test, values, 0.0))
-        counts = np.add.reduceat(test, self.starts, dtype=np.intp).tolist()
-        return [own / n if n else other for own, n, other in zip(sums, counts, instead, strict=True)]
+        counts = np.add.reduceat(test, self.edges[:-1], dtype=np.intp).tolist()
+        triples = zip(sums, counts, instead, strict=True)
+        return [total / count if count else default for total, count, default in triples]
 
     def multiply(self, forms: Sequence[Any], basis: Floats, out: Floats | None = None) -> Floats:
         """See `Whole`."""

@@ -123,6 +123,10 @@ DOUBTED, PERIODS = 0.4, 20.0
 OVER = 0.45
 
 
+#: Height of a blister's top, m, and the total force predicted for it, N.
+Top = tuple[float, float]
+
+
 class Coasting(NamedTuple):
     """Motion that no command of this period changes: lowest and highest speeds, and heights reached, m."""
 
@@ -157,9 +161,18 @@ class HybridControl:
     @cached_property
     def _observer(self) -> FingerObserver:
         """Observer of the fingertips."""
-        gains, loss = self.parameters, self.substitute.loss
-        known = self._at, self.pulp, self.finger, self.felt, self.noise, loss, self._unknown
-        return FingerObserver(*known, gains.force_setpoint, gains.travel)
+        gains = self.parameters
+        return FingerObserver(
+            at=self._at,
+            pulp=self.pulp,
+            finger=self.finger,
+            felt=self.felt,
+            noise=self.noise,
+            loss=self.substitute.loss,
+            unknown=self._unknown,
+            asked=gains.force_setpoint,
+            travel=gains.travel,
+        )
 
     @cached_property
     def _unknown(self) -> tuple[float, ...]:
@@ -223,15 +236,17 @@ class HybridControl:
         if memories[0].master.phase is not IDLE:
             memory, disc = self._substitute(memories[0], touched)
             return [memory], [disc]
-        memories = [memory._replace(period=memory.period + 1) for memory in memories]
-        if memories[0].phase is not IDLE:
-            predict = self.finger.predict
-            memories = [memory._replace(estimate=predict(memory.estimate)) for memory in memories]
+        memories = [self._move_on(memory) for memory in memories]
         if touched.force.size:
             memories = self._observer.observe(memories, touched, sections)
         else:
             memories = list(map(self.substitute.loss.wait, memories))
         return memories, list(map(self._surface.find_disc, memories))
+
+    def _move_on(self, memory: Follower) -> Follower:
+        """Return the memory a period later, with the fingertip predicted."""
+        estimate = memory.estimate if memory.phase is IDLE else self.finger.predict(memory.estimate)
+        return memory._replace(period=memory.period + 1, estimate=estimate)
 
     def _substitute(self, memory: Follower, touched: Measurement) -> tuple[Follower, Any]:
         """Let Method I follow the fingertip; the next one is predicted again."""
@@ -252,11 +267,11 @@ class HybridControl:
             x, y, z, *_ = memory.estimate.mean.tolist()
             master = memory.master
             aims.append((x, y, z) if master.phase is IDLE else (master.x, master.y, master.height))
-        return self.finger.find_underside(aims, [own.estimate for own in memories], basis, SHARED)
+        return self.finger.find_underside(aims, [memory.estimate for memory in memories], basis, SHARED)
 
-    def predict_force(self, depth: Floats, own: Floats) -> Floats:
+    def predict_force(self, depth: Floats, rows: Floats) -> Floats:
         """Return the forces of fingertips on pins, (f, m), N, at depths (f, m), m, by rows (f, r, m)."""
-        return self.pulp.predict_force(depth, self.pulp.predict_loss(own[:, self._at.pulp]))
+        return self.pulp.predict_force(depth, self.pulp.predict_loss(rows[:, self._at.pulp]))
 
     def command_all(
         self, memories: list[Follower], seen: Measurement, sections: Whole = WHOLE
@@ -277,7 +292,7 @@ class HybridControl:
         else:
             region = self._surface.survey(memories, seen.quadratic_basis, left, sections)
             memories = self._follow_force(memories, seen, region, coasting, sections)
-            edge, top = sections.spread([(own.edge, own.top) for own in memories])
+            edge, top = sections.spread([(memory.edge, memory.top) for memory in memories])
             left = self._surface.leave((edge, top), seen, left, region.cells, mode)
             target = lead_heights(left, top, region.drop, sections.spread(region.raised))
             np.maximum(target, lowest, out=target)
@@ -301,24 +316,25 @@ class HybridControl:
         sections: Whole,
     ) -> list[Follower]:
         """Turn forces into the heights of tops; without contact go back to where it was felt."""
-        forces, found = sections.add(seen.force), list[tuple[float, float] | None]()
+        forces, tops = sections.add(seen.force), list[Top | None]()
         for memory, force, part in zip(memories, forces, sections.parts, strict=True):
-            found.append(None)
             if memory.period % EVERY and not memory.alone and self._observer.holds(memory, force):
                 top = self._move_top(memory)
                 later = seen.own[self._at.later, part]
                 later += top - memory.top
-                found[-1] = top, self.parameters.force_setpoint + memory.trim
-        if None in found:
-            self._solve_tops(memories, seen, region, coasting, sections, found)
-        counts = [own.size for own in sections.cut(seen.force)]
-        numbers = zip(memories, found, forces, counts, region.edges, region.aims, region.speeds, strict=True)
-        return [self._move_blister(*own) for own in numbers]
+                tops.append((top, self.parameters.force_setpoint + memory.trim))
+            else:
+                tops.append(None)
+        if None in tops:
+            self._solve_tops(memories, seen, region, coasting, sections, tops)
+        counts = [values.size for values in sections.cut(seen.force)]
+        fingers = zip(memories, tops, forces, counts, region.edges, region.aims, region.speeds, strict=True)
+        return [self._move_blister(*finger) for finger in fingers]
 
     def _move_blister(
         self,
         memory: Follower,
-        solved: tuple[float, float] | None,
+        solved: Top | None,
         force: float,
         cells: int,
         edge: float,
@@ -329,43 +345,42 @@ class HybridControl:
 
         `force` of so many cells, N; surface, m; lowest point of the fingertip, m, and its speed, m/s.
         """
-        asked, top, due = self.parameters.force_setpoint, memory.felt, self._unknown
+        asked, due, doubt = self.parameters.force_setpoint, self._unknown, memory.doubt
+        top, felt, trim, master = memory.felt, memory.felt, memory.trim, memory.master
         if not memory.alone:
-            top, coming = solved or (top, 0.0)
+            top, coming = solved or (felt, 0.0)
             goes, beyond = self._leaves(memory)
-            carried = memory.trim != 0.0  # one that has just landed does not leave, wherever it is estimated
+            carried = trim != 0.0  # one that has just landed does not leave, wherever it is estimated
             if carried and (goes or beyond) and top > (along := self._move_top(memory)):
                 top, coming = along, -1.0  # fewer cells carry the fingertip, and none is to rise for it
             top = min(max(top, 0.0), self.device.cell.actuator.stroke)
             # The trim belongs to a force that pins reach.
-            coming -= memory.trim * (coming == asked + memory.trim)
-            due, doubt, losses = (*memory.due[1:], coming), self._doubt(memory, force, cells), memory.losses
+            coming -= trim * (coming == asked + trim)
+            due, doubt = (*memory.due[1:], coming), self._doubt(memory, force, cells)
             if beyond and not (carried and goes) and force < LEARNED * asked:
                 phase = SHAPING if carried else SPRINGING
-                memory = memory._replace(master=Master(phase, height=math.nan, losses=losses))
+                master = Master(phase, height=math.nan, losses=memory.losses)
             elif doubt > (DOUBTED * asked) ** 2:
                 (x, y, *_), due, doubt = memory.estimate.mean.tolist(), memory.due, 0.0
-                master = Master(
-                    phase=SHAPING,
-                    x=x,
-                    y=y,
-                    height=top,
-                    reference=top,
-                    edge=edge,
-                    heading=memory.heading,
-                    felt=top,
-                    losses=losses,
-                )
-                memory = memory._replace(master=master)
+                master = Master(SHAPING, x, y, top, reference=top, edge=edge, felt=top)
+                master = master._replace(heading=memory.heading, losses=memory.losses)
             if abs(asked - force) <= LEARNED * asked:
                 learned = (asked - force) * self.device.period / self.parameters.trim_time
-                trim = memory.trim + learned * (coming >= 0.0)
-                most = LEARNED * asked
-                memory = memory._replace(felt=top, trim=min(max(trim, -most), most))
-            memory = memory._replace(doubt=doubt)
+                trim += learned * (coming >= 0.0)
+                felt, trim = top, min(max(trim, -LEARNED * asked), LEARNED * asked)
         x, y, _ = aim
-        reach = self.profile.find_reach(top - edge, speed)
-        return memory._replace(top=top, edge=edge, led_x=x, led_y=y, led_radius=reach, due=due)
+        return memory._replace(
+            top=top,
+            edge=edge,
+            trim=trim,
+            felt=felt,
+            led_x=x,
+            led_y=y,
+            led_radius=self.profile.find_reach(top - edge, speed),
+            due=due,
+            doubt=doubt,
+            master=master,
+        )
 
     def _leaves(self, memory: Follower) -> tuple[bool, bool]:
         """Tell whether the fingertip goes off the bed, and whether it is beyond, where few pins carry it."""
@@ -393,25 +408,22 @@ class HybridControl:
         region: Region,
         coasting: Coasting,
         sections: Whole,
-        found: list[tuple[float, float] | None],
+        tops: list[Top | None],
     ) -> None:
         """Find, in place, the tops at which predicted forces add up to the set point, with the sums."""
         (near,) = (region.cells.distance <= self.contact_radius + TIE).nonzero()
-        wanted = [not (one or own.alone) for one, own in zip(found, memories, strict=True)]
+        wanted = [not (top or memory.alone) for top, memory in zip(tops, memories, strict=True)]
         near, fingers, picked = sections.pick(near, wanted)
         if not fingers:
             return
-        aims, estimates, asked, guesses, edges, raised = [], [], [], [], [], []
-        for i in fingers:
-            aims.append(region.aims[i])
-            estimates.append(memories[i].estimate)
-            asked.append(self.parameters.force_setpoint + memories[i].trim)
-            guesses.append(self._move_top(memories[i]))
-            edges.append(region.edges[i])
-            raised.append(region.raised[i])
-        at, own = self._at, seen.own.take(near, 1)
+        aims, edges = [region.aims[i] for i in fingers], [region.edges[i] for i in fingers]
+        raised = [region.raised[i] for i in fingers]
+        solved = [memories[i] for i in fingers]
+        forces = [self.parameters.force_setpoint + memory.trim for memory in solved]
+        guesses, estimates = list(map(self._move_top, solved)), [memory.estimate for memory in solved]
+        at, rows = self._at, seen.own.take(near, 1)
         under = self.finger.find_underside(aims, estimates, seen.quadratic_basis.take(near, 1), picked)
-        under += own[at.residual]
+        under += rows[at.residual]
         for i in fingers:
             seen.own[at.later, sections.parts[i]] = AWAY
         seen.own[at.later, near] = under
@@ -422,13 +434,11 @@ class HybridControl:
         np.maximum(ends, lowest, out=ends)
         np.minimum(ends, highest, out=ends)
         part = self.blister.evaluate_profile(region.cells.distance.take(near))
-        lost = self.pulp.predict_loss(own[at.pulp])
-        drop = region.drop.take(near)
-        reach = Reach(picked.spread(edges), picked.spread(raised), part, drop, ends)
-        for i, top in zip(
-            fingers, find_tops(asked, guesses, reach, under, lost, self.pulp, picked), strict=True
-        ):
-            found[i] = top
+        reach = Reach(picked.spread(edges), picked.spread(raised), part, region.drop.take(near), ends)
+        lost = self.pulp.predict_loss(rows[at.pulp])
+        results = find_tops(forces, guesses, reach, under, lost, self.pulp, picked)
+        for i, top in zip(fingers, results, strict=True):
+            tops[i] = top
 
 
 #: How far beyond the fingertip's largest semi-axis cells may be touched, m.

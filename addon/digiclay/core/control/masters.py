@@ -130,8 +130,8 @@ class VirtualMasterColumns(VirtualMasterControl):
         none, idle = total < felt, numbers[PHASE] == AWAY
         with np.errstate(divide="ignore", invalid="ignore"):
             x, y = np.rint(np.array((near_x, near_y)) / near * PARTS) / PARTS
-            way = (x - numbers[FROM_X]) ** 2 + (y - numbers[FROM_Y]) ** 2
-        goes = ~none & ~idle & (near >= felt) & (way < (SHORT * gains.travel) ** 2)
+            square = (x - numbers[FROM_X]) ** 2 + (y - numbers[FROM_Y]) ** 2
+        goes = ~none & ~idle & (near >= felt) & (square < (SHORT * gains.travel) ** 2)
         others = ~goes & ~(none & idle)
         alone = [self.runs[i].follow(masters[i], *(own[i] for own in sums)) for i in others.nonzero()[0]]
         np.copyto(numbers[X], x, where=goes)

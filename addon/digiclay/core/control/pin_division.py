@@ -222,9 +222,9 @@ class PinDivision:
         """Return the blisters of all fingers."""
         rows = []
         for controller, follower in zip(self.controllers, memory.fingers, strict=True):
-            place = follower.place
-            radius = controller.blister_radius * (1.0 + RELATIVE_TOLERANCE) if place else -1.0
-            rows.append((*(place or NOWHERE), radius, follower.ground, follower.top))
+            middle = follower.place
+            radius = controller.blister_radius * (1.0 + RELATIVE_TOLERANCE) if middle else -1.0
+            rows.append((*(middle or NOWHERE), radius, follower.ground, follower.top))
         return Blisters(*np.array(rows).T)
 
     def remember(self, rows: Floats, obeyed: Cells) -> None:

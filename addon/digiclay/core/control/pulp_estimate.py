@@ -25,11 +25,11 @@ class Span(NamedTuple):
     """Change over a time, for a tension that goes linearly from T_0 to T_1.
 
     ``z_1 = decay z_0 + early T_0 + late T_1``; of T_1 the share ``Σ ĉ_i late_i`` is lost to relaxation,
-    `held` is not. `late` (k + 1, 1): what T_1 adds to filters and tension. `kept` (k + 1, k + 1), of filters
-    and tension before: the filters after without T_1's share, and the tension lost of it, over `held`.
+    `held` is not. `late` (k + 1, 1): what T_1 adds to filters and tension. `remaining` (k + 1, k + 1), of
+    filters and tension before: the filters after without T_1's share, and the tension lost of it, over `held`.
     """
 
-    kept: Floats
+    remaining: Floats
     late: Floats
     held: float
 
@@ -68,8 +68,10 @@ class PulpEstimate:
         decay = np.exp(-turns)
         late = 1.0 - (1.0 - decay) / turns
         held = 1.0 - float(pulp.shares @ late)
-        kept = np.column_stack((np.diag(decay), 1.0 - decay - late))
-        return Span(np.vstack((kept, pulp.shares @ kept / held)), np.append(late, 1.0)[:, None], held)
+        remaining = np.column_stack((np.diag(decay), 1.0 - decay - late))
+        return Span(
+            np.vstack((remaining, pulp.shares @ remaining / held)), np.append(late, 1.0)[:, None], held
+        )
 
     def age(self, pulp: Floats, periods: Floats) -> None:
         """Let the pulp over cells relax for their control periods, (m,), without contact, in place."""
@@ -88,8 +90,8 @@ class PulpEstimate:
         predicted fingertip, N.
         """
         span = self.once
-        kept, share = span.kept.dot(pulp), self.touch.contact.share * span.held
-        lost = kept[-1]
+        remaining, share = span.remaining.dot(pulp), self.touch.contact.share * span.held
+        lost = remaining[-1]
         touched: Flags = expected > lost + max(EXPECTED * self.floor, LEAST) / share
         touched |= force > self.floor
         tension = np.where(touched, np.maximum(force, 0.0), self.floor)
@@ -98,12 +100,12 @@ class PulpEstimate:
         np.minimum(tension, expected, out=tension, where=~touched)
         lost[:] = 0.0
         np.multiply(span.late, tension, out=pulp)
-        pulp += kept
+        pulp += remaining
         return touched
 
     def predict_loss(self, pulp: Floats) -> Floats:
         """Return the tension at which there would be no force at the end of the prediction, (m,), N."""
-        lost: Floats = self.later.kept[-1].dot(pulp)
+        lost: Floats = self.later.remaining[-1].dot(pulp)
         return lost
 
     def predict_force(self, depth: Floats, lost: Floats) -> Floats:
@@ -193,8 +195,8 @@ def find_tops(
     depths -= under
     forces = sections.reduce(np.add, pulp.predict_force(depths, lost))
     tried = sections.reduce(np.maximum, tops)  # those of each finger, all of whose cells have the same
-    found = []
-    for force, own, heights in zip(wanted, forces.T, tried.T, strict=True):
-        weakest, *_, strongest = own.tolist()
-        found.append((float(np.interp(force, own, heights)), min(max(force, weakest), strongest)))
-    return found
+    results = []
+    for force, sums, heights in zip(wanted, forces.T, tried.T, strict=True):
+        weakest, *_, strongest = sums.tolist()
+        results.append((float(np.interp(force, sums, heights)), min(max(force, weakest), strongest)))
+    return results

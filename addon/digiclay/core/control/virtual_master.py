@@ -250,8 +250,8 @@ class VirtualMasterControl(BatchControl):
     def find_batch_class(self, count: int) -> type[VirtualMasterControl]:
         """Return the class of the controller of a batch of so many runs."""
         name = "VirtualMasterBatch" if count < MANY else "VirtualMasterColumns"
-        found: type[VirtualMasterControl] = import_part("control.masters", name)
-        return found
+        kind: type[VirtualMasterControl] = import_part("control.masters", name)
+        return kind
 
     def begin(self) -> Master:
         """Return the memory before a session."""

@@ -211,13 +211,13 @@ class HandMovement:
             block[0, group.columns] = group.own[0]
             block[system.cell.lag_rows, group.columns] = group.own[group.lag]
         if self._double.size:
-            one = moved[0] if len(moved) == 1 else join_moved(moved)
-            block[0, self._double] = np.minimum.reduce(one.height[self._copies])
-            presses = one.presses[self._copies] & self._distinct
+            pairs = moved[0] if len(moved) == 1 else join_moved(moved)
+            block[0, self._double] = np.minimum.reduce(pairs.height[self._copies])
+            presses = pairs.presses[self._copies] & self._distinct
             if any_true(presses):
                 pressed = np.add.reduce(presses, axis=0, dtype=np.intp) > 1
                 if any_true(pressed):
-                    self._press_together(one, pressed)
+                    self._press_together(pairs, pressed)
         np.add.reduce(block[rows.pressing, :near], axis=0, out=block[rows.force, :near])
 
     def _press_together(self, moved: Moved, pressed: Flags) -> None:
