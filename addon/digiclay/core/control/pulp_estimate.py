@@ -26,7 +26,7 @@ class Span(NamedTuple):
 
     ``z_1 = decay z_0 + early T_0 + late T_1``; of T_1 the share ``Σ ĉ_i late_i`` is lost to relaxation,
     `held` is not. `late` (k + 1, 1): what T_1 adds to filters and tension. `remaining` (k + 1, k + 1), of
-    filters and tension before: the filters after without T_1's share, and the tension lost of it, over `held`.
+    filters and tension before: the filters after, but for T_1, and the tension lost of it, over `held`.
     """
 
     remaining: Floats
