@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+import pytest
 from digiclay.core.base.arrays import Floats
 from digiclay.core.base.modes import Mode
 from digiclay.core.control.blister import Blister
@@ -30,6 +31,11 @@ from digiclay.core.scene.toml_table import resolve
 from digiclay.core.session import snapshot
 from digiclay.core.session.take import Take, replay
 from numpy.typing import NDArray
+
+
+def table(columns: str, rows: Mapping[str, Any]) -> pytest.MarkDecorator:
+    """Give a test each row of a table; the sentence before a row names it."""
+    return pytest.mark.parametrize(columns, list(rows.values()), ids=list(rows))
 
 
 def path(*waypoints: tuple[float, float, float, float], interpolation: str = "smooth") -> Trajectory:

@@ -11,6 +11,8 @@ from digiclay.core.model.layout import Layout, make_grid
 from digiclay.strokes.nominal import Device, Ghost, Nominal, extend, find_ghosts, find_nominal
 from digiclay.strokes.stroke import Brush, Stroke, deepen, lay_path, lay_ring, make_images, start
 
+from tests.assemble import table
+
 BED = make_grid(Layout(60, 60, pitch=1.5e-3))
 REST = 40e-3
 FLAT = np.full(BED.count, REST)
@@ -70,7 +72,7 @@ def test_where_no_blister_is_the_fingertip_leaves_its_underside(name):
     np.testing.assert_allclose(found.height - REST, np.minimum(gap - 2e-3, 0.0), rtol=0, atol=0.15e-3)
 
 
-@pytest.mark.parametrize(("accumulate", "height"), [(False, 4e-3), (True, 8e-3)])
+@pytest.mark.parametrize("accumulate, height", [(False, 4e-3), (True, 8e-3)])
 def test_a_crossing_counts_once_or_twice_where_it_accumulates(accumulate, height):
     eight = PATHS["a figure eight"]
     found = find_nominal(stroke(eight, accumulate=accumulate), DEVICE, FLAT).height.reshape(60, 60) - REST
@@ -117,13 +119,13 @@ def test_a_surface_that_is_extended_is_that_of_the_whole_path(accumulate):
 CLIFF = FLAT + np.where(BED.x > 0.0, 5e-3, 0.0)
 
 
-@pytest.mark.parametrize(
-    ("brush", "amount", "share", "lowest", "highest"),
-    [
-        pytest.param(Brush.RAISE, 30e-3, 1.0, 40e-3, 60e-3, id="as far as the pins' stroke"),
-        pytest.param(Brush.LEVEL, 4e-3, 1.0, 40e-3, 40e-3, id="to the height below the first place"),
-        pytest.param(Brush.LEVEL, 4e-3, 0.5, 40e-3, 42.5e-3, id="half of the way"),
-    ],
+@table(
+    "brush, amount, share, lowest, highest",
+    {
+        "as far as the pins' stroke": (Brush.RAISE, 30e-3, 1.0, 40e-3, 60e-3),
+        "to the height below the first place": (Brush.LEVEL, 4e-3, 1.0, 40e-3, 40e-3),
+        "half of the way": (Brush.LEVEL, 4e-3, 0.5, 40e-3, 42.5e-3),
+    },
 )
 def test_pins_come_to_the_height_of_the_brush(brush, amount, share, lowest, highest):
     line = np.array([[-25e-3, 0.0], [25e-3, 0.0]])

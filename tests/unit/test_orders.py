@@ -19,6 +19,7 @@ from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.toml_table import resolve
 from digiclay.core.session.live_session import has_arrived, simulate_path
 
+from tests.assemble import table
 from tests.reliefs import heighten, make_orders, make_spike_and_ridge, measure_roughness, stay_away
 
 ARRANGEMENTS = ("aligned", "staggered", "hexagonal")
@@ -33,7 +34,7 @@ STROKE = make_orders(100, -9e-3, 9e-3, -3e-3, RADIUS)
 @cache
 def bed(
     arrangement: str = "aligned", method: str = "virtual_master", size: int = 13, period: float = 5e-3,
-    *, shape: bool = False,
+    *, shape: bool = False
 ) -> System:  # fmt: skip
     layout = {"rows": size, "columns": size, "arrangement": arrangement}
     control: object = "absent" if method == "absent" else {"method": method}
@@ -62,7 +63,7 @@ def test_each_stroke_makes_a_spike_and_a_ridge_less_rough_and_keeps_the_volume(a
 
 
 @pytest.mark.parametrize(
-    ("period", "swing", "verb"),
+    "period, swing, verb",
     [(5e-3, 1e-9, Verb.AVERAGE), (20e-3, BAND, Verb.AVERAGE), (5e-3, BAND, Verb.SMOOTH)],
 )
 def test_a_spike_sinks_without_swinging_no_faster_than_valves_let_it(period, swing, verb):
@@ -82,7 +83,7 @@ def test_a_spike_sinks_without_swinging_no_faster_than_valves_let_it(period, swi
     assert limit.fall * (1.0 + 1e-9) <= speed.min() < 0.45 * limit.fall
 
 
-def test_pins_are_in_the_mode_blister_until_they_arrive_and_are_driven_home_by_the_method() -> None:
+def test_pins_are_in_the_mode_blister_until_they_arrive_and_are_driven_home_by_the_method():
     system = bed(method="absent")
     rest = system.cell.actuator.rest_height
     state = heighten(system, np.where(system.grid.x < 0.0, 4e-3, 0.0))
@@ -102,7 +103,7 @@ def test_pins_are_in_the_mode_blister_until_they_arrive_and_are_driven_home_by_t
     assert np.abs(state.row(0) - target).max() < 0.2e-3
 
 
-def test_a_finger_at_work_elsewhere_stays_under_the_methods_control() -> None:
+def test_a_finger_at_work_elsewhere_stays_under_the_methods_control():
     system, ends = bed(size=21), []
     path = stay_away(80)
     path[:, 0, :3] = np.column_stack([np.full(81, -15e-3), np.zeros(81), np.linspace(42e-3, 36e-3, 81)])
@@ -120,7 +121,7 @@ def test_a_finger_at_work_elsewhere_stays_under_the_methods_control() -> None:
 
 
 @pytest.mark.parametrize("method", [*METHODS, "absent"])
-def test_every_method_lets_its_pins_be_smoothed_and_keeps_them_if_it_keeps_heights(method: str) -> None:
+def test_every_method_lets_its_pins_be_smoothed_and_keeps_them_if_it_keeps_heights(method):
     system = bed(method=method)
     state = heighten(system, make_spike_and_ridge(system.grid))
     spike = int(state.row(0).argmax())
@@ -137,12 +138,12 @@ def test_every_method_lets_its_pins_be_smoothed_and_keeps_them_if_it_keeps_heigh
         assert np.abs(state.row(0) - smoothed).max() <= 2.0 * BAND
 
 
-def test_periods_without_an_order_or_with_locks_that_are_gone_are_those_of_the_method_alone() -> None:
+def test_periods_without_an_order_or_with_locks_that_are_gone_are_those_of_the_method_alone():
     system, path, ends = bed(), stay_away(120), set()
     path[:, 0, 2] = np.linspace(46e-3, 36e-3, 121)
     nothing = Orders(np.zeros((120, 5)))
     for before, orders in (
-        ((None, None), None), ((None, None), nothing), ((lock(Verb.LOCK), lock(Verb.UNLOCK)), None),
+        ((None, None), None), ((None, None), nothing), ((lock(Verb.LOCK), lock(Verb.UNLOCK)), None)
     ):  # fmt: skip
         state = begin(system)
         for one in before:
@@ -168,7 +169,7 @@ def place_until_arrived(system: System, state: State, surface: Floats, patience:
 
 
 @pytest.mark.parametrize("method", [*METHODS, "absent"])
-def test_pins_are_placed_within_a_micrometer_and_stay_there_whatever_the_method(method: str) -> None:
+def test_pins_are_placed_within_a_micrometer_and_stay_there_whatever_the_method(method):
     system = bed(method=method)
     surface = bumpy(system)
     driven, state = ~np.isnan(surface), begin(system)
@@ -182,20 +183,20 @@ def test_pins_are_placed_within_a_micrometer_and_stay_there_whatever_the_method(
         assert set(np.unique(state.mode()[driven])) <= {Mode.REST, Mode.HOLD}
 
 
-@pytest.mark.parametrize(
-    ("table", "longest", "error", "swing"),
-    [
-        pytest.param({}, 0.4, 1e-6, 0.1e-6, id="paper"),
-        pytest.param({"preset": "fast"}, 0.25, 1e-6, 0.2e-6, id="fast"),
-        pytest.param(STIFF, 0.15, 1e-6, 0.5e-6, id="pins four times as fast"),
-        pytest.param({"simulation": {"control_period": 20e-3}}, 0.6, 1e-6, 0.5e-6, id="slow control"),
-        pytest.param({"simulation": {"control_period": 1e-3}}, 0.4, 1e-6, 0.5e-6, id="fast control"),
-        pytest.param({"delay": {"dead_time": 20e-3}}, 0.6, 1e-6, 0.5e-6, id="dead time"),
-        pytest.param({"valve_lag": {"time_constant": 50e-3}}, 1.1, 1e-6, 4e-6, id="slow valve"),
-        pytest.param({"valve_lag": "absent", "delay": "absent"}, 0.4, 1e-6, 0.5e-6, id="ideal valve"),
-        pytest.param({"sensors": {"delay": 4}}, 0.6, 1e-6, 0.5e-6, id="late readings"),
-        pytest.param({"sensors": {"height_noise": 5e-6}}, 0.4, 25e-6, 5e-6, id="noisy readings"),
-    ],
+@table(
+    "table, longest, error, swing",
+    {
+        "paper": ({}, 0.4, 1e-6, 0.1e-6),
+        "fast": ({"preset": "fast"}, 0.25, 1e-6, 0.2e-6),
+        "pins four times as fast": (STIFF, 0.15, 1e-6, 0.5e-6),
+        "slow control": ({"simulation": {"control_period": 20e-3}}, 0.6, 1e-6, 0.5e-6),
+        "fast control": ({"simulation": {"control_period": 1e-3}}, 0.4, 1e-6, 0.5e-6),
+        "dead time": ({"delay": {"dead_time": 20e-3}}, 0.6, 1e-6, 0.5e-6),
+        "slow valve": ({"valve_lag": {"time_constant": 50e-3}}, 1.1, 1e-6, 4e-6),
+        "ideal valve": ({"valve_lag": "absent", "delay": "absent"}, 0.4, 1e-6, 0.5e-6),
+        "late readings": ({"sensors": {"delay": 4}}, 0.6, 1e-6, 0.5e-6),
+        "noisy readings": ({"sensors": {"height_noise": 5e-6}}, 0.4, 25e-6, 5e-6),
+    },
 )
 def test_placed_pins_come_fast_and_do_not_swing_behind_any_valve(table, longest, error, swing):
     system = assemble(resolve({"layout": {"rows": 13, "columns": 13}, **table}))
@@ -210,7 +211,7 @@ def test_placed_pins_come_fast_and_do_not_swing_behind_any_valve(table, longest,
     assert beyond < swing
 
 
-def test_a_pin_under_a_finger_that_is_too_strong_is_waited_for_and_holds_up_no_other() -> None:
+def test_a_pin_under_a_finger_that_is_too_strong_is_waited_for_and_holds_up_no_other():
     system = bed()
     surface, path = bumpy(system, 4e-3, 8e-3), stay_away(200)
     path[:, 0, 2] = 36e-3
@@ -228,7 +229,7 @@ def lock(verb: Verb, x: float = 0.0, radius: float = 7e-3) -> Orders:
 
 @pytest.mark.parametrize("shape", [False, True])
 @pytest.mark.parametrize("method", [*METHODS, "absent"])
-def test_a_locked_pin_stays_whatever_the_method_and_orders_command(method: str, shape: bool) -> None:
+def test_a_locked_pin_stays_whatever_the_method_and_orders_command(method, shape):
     if shape:
         pytest.importorskip("PIL.Image", reason="the shape is a picture")
     system = bed(method=method, shape=shape)
@@ -257,7 +258,7 @@ def test_a_locked_pin_stays_whatever_the_method_and_orders_command(method: str, 
     assert np.abs(place_until_arrived(system, state, everywhere).row(0) - 45e-3).max() < 1e-6
 
 
-def test_a_pin_locked_on_its_way_stops_there_and_stays_there_when_it_is_unlocked() -> None:
+def test_a_pin_locked_on_its_way_stops_there_and_stays_there_when_it_is_unlocked():
     system = bed()
     surface = np.full(system.grid.count, 48e-3)
     *_, state = simulate_path(system, begin(system), stay_away(12), place(12, surface))
@@ -277,7 +278,7 @@ FLAT = np.full(PINS, 40e-3)
 
 
 @pytest.mark.parametrize(
-    ("order", "sound"),
+    "order, sound",
     [((np.nan, 0.0, 1e-2, 1.0, 0.0), False), ((0.0, np.inf, 1e-2, 1.0, 0.0), False),
      ((0.0, 0.0, -1e-2, 1.0, 0.0), False), ((0.0, 0.0, 1e-9, 1.0, 0.0), False),
      ((0.0, 0.0, 1e9, 1.0, 0.0), False), ((0.0, 0.0, 1e-2, 101.0, 0.0), False),
@@ -299,19 +300,19 @@ def test_an_order_out_of_its_range_and_orders_of_another_shape_are_found(order, 
 
 
 @pytest.mark.parametrize("ridge", [0.0, 6e-3])
-@pytest.mark.parametrize(
-    ("pitch", "radius", "wave"),
-    [
-        pytest.param(3e-3, 8e-3, 0.0, id="paper, random"),
-        pytest.param(3e-3, 8e-3, 6e-3, id="paper, 6 mm"),
-        pytest.param(1.5e-3, 4e-3, 0.0, id="design, random"),
-        pytest.param(1.5e-3, 4e-3, 3e-3, id="design, 3 mm"),
-        pytest.param(1e-3, 8e-3 / 3.0, 0.0, id="fine, random"),
-    ],
+@table(
+    "pitch, radius, wave",
+    {
+        "paper, random": (3e-3, 8e-3, 0.0),
+        "paper, 6 mm": (3e-3, 8e-3, 6e-3),
+        "design, random": (1.5e-3, 4e-3, 0.0),
+        "design, 3 mm": (1.5e-3, 4e-3, 3e-3),
+        "fine, random": (1e-3, 8e-3 / 3.0, 0.0),
+    },
 )
 def test_one_quick_pass_of_smooth_halves_what_varies_on_flat_ground_and_on_a_ridge(
-    pitch: float, radius: float, wave: float, ridge: float
-) -> None:
+    pitch, radius, wave, ridge
+):
     layout = {"rows": 17, "columns": 41, "pitch": pitch}
     bore = {"bore": min(2e-3, pitch)}
     system = assemble(resolve({"layout": layout, "control": "absent", "actuator": bore}))
@@ -336,8 +337,7 @@ def order(system: System, x: float, y: float, radius: float) -> Controller:
 
 
 @pytest.mark.parametrize(
-    ("place", "radius", "held"),
-    [((12e-3, -9e-3), 5e-3, None), ((1e-3, 2e-3), 5e-3, 0), ((-3e-3, 1e-3), 60e-3, 1)],
+    "place, radius, held", [((12e-3, -9e-3), 5e-3, None), ((1e-3, 2e-3), 5e-3, 0), ((-3e-3, 1e-3), 60e-3, 1)]
 )
 def test_the_disc_of_a_period_holds_the_methods_and_the_smoothed_one_and_no_more(place, radius, held):
     system, memory = bed(), Master(Phase.SHAPING, 2e-3, -1e-3, 40e-3)

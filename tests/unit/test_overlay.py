@@ -10,7 +10,6 @@ from digiclay.overlay.picture import (
     LETTERS,
     LINES,
     Box,
-    Color,
     Picture,
     choose_colors,
     contrast,
@@ -18,7 +17,7 @@ from digiclay.overlay.picture import (
     round_axis,
     scale_curve,
 )  # fmt: skip
-from digiclay.overlay.sections import COMPACT, FULL, TAKEN, Content, Readings, find_room, lay_out, place_label
+from digiclay.overlay.sections import COMPACT, FULL, TAKEN, Readings, find_room, lay_out, place_label
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -45,7 +44,7 @@ def said(picture: Picture) -> str:
 
 
 @given(COLOR, st.one_of(st.none(), COLOR))
-def test_letters_and_curves_stand_out_from_any_theme(back: Color, ink: Color | None) -> None:
+def test_letters_and_curves_stand_out_from_any_theme(back, ink):
     chosen = choose_colors(back, ink or back)  # letters of the color of the ground: the worst there is
     # The guidelines' contrasts, as near as steps of a fortieth of the way to black or white come.
     assert min(contrast(ink, back) for ink in (chosen.ink, chosen.faint)) >= LETTERS - 0.01
@@ -94,7 +93,7 @@ WORDS: dict[str, tuple[dict[str, object], tuple[str, ...], tuple[str, ...]]] = {
 
 
 @pytest.mark.parametrize("case", WORDS)
-def test_it_tells(case: str) -> None:
+def test_it_tells(case):
     changes, present, absent = WORDS[case]
     picture = draw(session(**changes))
     words = f" | {said(picture)} | "
@@ -104,7 +103,7 @@ def test_it_tells(case: str) -> None:
 
 
 @pytest.mark.parametrize("scale", [0.5, 1.0, 2.0])
-def test_every_mark_lies_on_the_box_behind_it_at_every_ui_scale(scale: float) -> None:
+def test_every_mark_lies_on_the_box_behind_it_at_every_ui_scale(scale):
     picture = lay_out(session(), choose_colors(DARK, LIGHT), (0.0, 0.0, 2000.0, 2000.0), scale)
     (box,) = picture.boxes
     assert box.width == 290.0 * scale
@@ -129,21 +128,21 @@ LABELS = {
 
 @pytest.mark.parametrize("case", LABELS)
 @pytest.mark.parametrize("scale", [1.0, 1.5])
-def test_a_label_stands(case: str, scale: float) -> None:
+def test_a_label_stands(case, scale):
     (x, y), wanted = LABELS[case]
     room = (50.0 * scale, 10.0 * scale, 250.0 * scale, 200.0 * scale)
     found = place_label((x * scale, y * scale), (60.0 * scale, 12.0 * scale), room, scale)
     assert np.divide(found, scale).tolist() == list(wanted)
 
 
-def test_a_row_too_long_for_its_box_has_smaller_letters() -> None:
+def test_a_row_too_long_for_its_box_has_smaller_letters():
     names = ("Bed", "Bed of the third experiment, last of six")
     short, long = (draw(session(name=name)).words[0] for name in names)
     assert short.size == 12.0
     assert 7.0 < long.size < 10.0
 
 
-def test_a_low_view_leaves_sections_away_and_a_narrow_one_all() -> None:
+def test_a_low_view_leaves_sections_away_and_a_narrow_one_all():
     def fit(width: float, height: float) -> Picture:
         return lay_out(session(), choose_colors(DARK, LIGHT), (0.0, 0.0, width, height), 1.0)
 
@@ -157,7 +156,7 @@ def test_a_low_view_leaves_sections_away_and_a_narrow_one_all() -> None:
 
 @pytest.mark.parametrize("corner", ["bottom_left", "bottom_right", *TAKEN])
 @pytest.mark.parametrize("content", [COMPACT, FULL])
-def test_it_stands_in_the_chosen_corner_of_the_room_that_panels_leave(corner: str, content: Content) -> None:
+def test_it_stands_in_the_chosen_corner_of_the_room_that_panels_leave(corner, content):
     room = find_room(900.0, 700.0, [("LEFT", 50.0), ("RIGHT", 200.0), ("TOP", 26.0), ("TOP", 26.0)])
     assert room == (50.0, 0.0, 700.0, 648.0)
     picture = lay_out(session(), choose_colors(DARK, LIGHT), room, 1.0, content, corner)
@@ -169,7 +168,7 @@ def test_it_stands_in_the_chosen_corner_of_the_room_that_panels_leave(corner: st
 
 
 @pytest.mark.parametrize(
-    ("changes", "rows"),
+    "changes, rows",
     [
         ({}, "0.35 N | of 0.40 N | 10.0 s | 0.97 x real time"),
         ({"paused": True}, "0.35 N | of 0.40 N | 10.0 s | paused"),
@@ -177,13 +176,13 @@ def test_it_stands_in_the_chosen_corner_of_the_room_that_panels_leave(corner: st
         ({"time": np.empty(0), "force": np.empty(0)}, "no force yet | of 0.40 N | 0.0 s | 0.97 x real time"),
     ],
 )
-def test_in_short_it_has_two_rows(changes: dict[str, object], rows: str) -> None:
+def test_in_short_it_has_two_rows(changes, rows):
     picture = lay_out(session(**changes), choose_colors(DARK, LIGHT), ROOM, 1.0, COMPACT, "top_left")
     assert said(picture) == rows
     assert picture.boxes[0].height < 60.0
 
 
-def test_in_short_several_fingertips_stand_two_in_a_row_below_and_none_over_another() -> None:
+def test_in_short_several_fingertips_stand_two_in_a_row_below_and_none_over_another():
     told = session(
         fingers=tuple((number, LIGHT) for number in (1, 2, 31)), finger_force=np.full((1001, 3), 0.4)
     )
@@ -194,7 +193,7 @@ def test_in_short_several_fingertips_stand_two_in_a_row_below_and_none_over_anot
     assert (one[1] == two[1] > three[1], two[0] - one[0] > 70.0, one[0] == three[0]) == (True, True, True)
 
 
-def test_a_curve_shows_its_window_alone_and_the_set_point_is_the_dashed_line_at_its_height() -> None:
+def test_a_curve_shows_its_window_alone_and_the_set_point_is_the_dashed_line_at_its_height():
     time, box = np.arange(11.0), Box(100.0, 50.0, 200.0, 40.0, DARK)
     value = np.where(time == 7.0, np.nan, time)
     points = scale_curve(time, value, (5.0, 10.0), (0.0, 10.0), box)
@@ -210,7 +209,7 @@ def test_a_curve_shows_its_window_alone_and_the_set_point_is_the_dashed_line_at_
 
 
 @given(st.floats(-1e3, 1e3), st.floats(1e-3, 1e3))
-def test_an_axis_holds_its_values_and_wastes_little(low: float, span: float) -> None:
+def test_an_axis_holds_its_values_and_wastes_little(low, span):
     ends = round_axis(low, low + span)
     slack = 1e-9 * (abs(low) + span)
     assert ends[0] <= low + slack
@@ -232,7 +231,7 @@ CROWDS = {
 
 
 @pytest.mark.parametrize("crowd", CROWDS)
-def test_numbers_of_fingertips_cover_neither_each_other_nor_a_fingertip(crowd: str) -> None:
+def test_numbers_of_fingertips_cover_neither_each_other_nor_a_fingertip(crowd):
     balls = np.array(CROWDS[crowd], float).reshape(-1, 2)
     above = balls + np.array([0.0, 19.5])
     found = move_apart(above, 9.5, balls, np.full(len(balls), 10.0))

@@ -34,7 +34,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
         yield tmp_path
 
 
-def test_a_method_runs_by_its_file_and_its_parameters_are_in_the_scene_file() -> None:
+def test_a_method_runs_by_its_file_and_its_parameters_are_in_the_scene_file():
     write_method(Path())
     name = load_method("pad.py:SoftPad")
     assert (name, name in METHODS, name in list_added()) == ("soft_pad", False, True)
@@ -46,7 +46,7 @@ def test_a_method_runs_by_its_file_and_its_parameters_are_in_the_scene_file() ->
     assert run(scene).history["height"].min() < softer < 0.04
 
 
-def test_the_code_is_shipped_to_processes_that_have_no_file(here: Path) -> None:
+def test_the_code_is_shipped_to_processes_that_have_no_file(here):
     path = write_method(here)
     scene = small(load_method("pad.py:SoftPad"), "control.step=70 um")
     packed = pickle.dumps(scene)
@@ -91,7 +91,7 @@ def test_an_installed_package_offers_a_method_by_its_name(here, monkeypatch):
         load_method("pad")
 
 
-def test_a_copy_of_method_one_gives_its_run_bit_for_bit(here: Path) -> None:
+def test_a_copy_of_method_one_gives_its_run_bit_for_bit(here):
     write_method(here, COPY, "one.py")
     name = load_method("one.py:MethodOne")
     own, built_in = run(small(name)), run(small("virtual_master"))
@@ -113,7 +113,7 @@ CHEAT = f"""{OPEN.replace("SoftPad", "Cheat")}
 """
 
 
-def test_nothing_shown_leads_to_the_bed_and_openings_are_limited_to_those_of_a_valve(here: Path) -> None:
+def test_nothing_shown_leads_to_the_bed_and_openings_are_limited_to_those_of_a_valve(here):
     write_method(here, f"{OPEN}        return memory, orders\n")
     write_method(here, CHEAT, "cheat.py")
     honest, cheat = (run(small(load_method(word))) for word in ("pad.py:SoftPad", "cheat.py:Cheat"))
@@ -128,7 +128,7 @@ def test_nothing_shown_leads_to_the_bed_and_openings_are_limited_to_those_of_a_v
     assert heights[0] == heights[1] < heights[2] < heights[3] == heights[4]
 
 
-def test_a_batch_gives_what_the_runs_give_alone_and_a_shape_is_displayed_before(here: Path) -> None:
+def test_a_batch_gives_what_the_runs_give_alone_and_a_shape_is_displayed_before(here):
     write_method(here)
     name = load_method("pad.py:SoftPad")
     scenes = [small(name, f"control.step={step} um", "sensors.force_noise=1 mN") for step in (20, 40, 80)]
@@ -218,7 +218,7 @@ def test_the_template_runs_as_it_is_and_its_run_needs_no_code_any_more(here, cap
 
 
 @pytest.mark.parametrize(
-    ("arguments", "said"),
+    "arguments, said",
     [
         (["mine"], "mine.py is there already"),
         (["Mine"], "must be small letters and digits"),
@@ -247,7 +247,7 @@ def test_a_sweep_varies_methods_and_goes_on_with_the_same_code_only(here, capsys
 
 
 @pytest.mark.parametrize("code", CODE)
-def test_the_code_of_the_page_runs(here: Path, code: str) -> None:
+def test_the_code_of_the_page_runs(here, code):
     (here / "page.py").write_text(code, encoding="utf-8")
     name = re.findall(r"class (\w+)", code)[-1]
     assert load_method(f"page.py:{name}") in list_added()
@@ -294,7 +294,7 @@ def keeping(first: str, later: str) -> str:
 NONE = "command = lambda *_: None\n"
 
 
-def test_a_scene_never_loads_code_by_itself(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_scene_never_loads_code_by_itself(here, capsys):
     write_method(here)
     for word in ("soft_pad", "pad.py:SoftPad"):
         (here / "my.toml").write_text(f'[control]\nmethod = "{word}"\n', encoding="utf-8")
@@ -306,7 +306,7 @@ def test_a_scene_never_loads_code_by_itself(here: Path, capsys: pytest.CaptureFi
 
 
 @pytest.mark.parametrize(
-    ("text", "rule"),
+    "text, rule",
     [
         ("import nothing_of_this_name", "the code must not raise (got ModuleNotFoundError in line 1: No"),
         ("x = (", "pad.py: the code must not raise (got SyntaxError in line 1"),
@@ -336,7 +336,7 @@ def test_a_class_that_is_no_method_is_refused_in_a_line(here, text, rule, capsys
 
 
 @pytest.mark.parametrize(
-    ("word", "rule"),
+    "word, rule",
     [
         ("absent.py:Mine", "absent.py cannot be read as a control method: No such file or directory."),
         ("absent.py", "absent.py must be a file and a class in it, such as absent.py:Mine."),
@@ -355,7 +355,7 @@ def test_a_word_that_names_no_code_is_refused_in_a_line(here, word, rule, capsys
 
 
 @pytest.mark.parametrize(
-    ("text", "rule"),
+    "text, rule",
     [
         (ordering("Orders(height=cells.height[:-1])"), "command must return height of the shape ("),
         (ordering("Orders(opening=cells.height * np.nan)"), "return opening as finite numbers (got nan)"),
@@ -394,7 +394,7 @@ def test_a_word_that_names_no_code_is_refused_in_a_line(here, word, rule, capsys
         ),
     ],
 )  # fmt: skip
-def test_a_mistake_while_it_runs_is_a_line_with_file_and_rule(text: str, rule: str) -> None:
+def test_a_mistake_while_it_runs_is_a_line_with_file_and_rule(text, rule):
     said = refusal(text)
     assert said.startswith("bad.py:Bad: ")
     assert rule in said
@@ -415,7 +415,7 @@ def run_quickly(*more: str) -> int:
     return main(["run", "tap", "--method", "bad.py:Bad", *period, "--quiet", *more])
 
 
-def test_a_method_that_is_too_slow_is_refused(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_method_that_is_too_slow_is_refused(here, capsys):
     write_method(here, SLOW, "bad.py")
     assert run_quickly() == 2
     said = capsys.readouterr().err
@@ -423,7 +423,7 @@ def test_a_method_that_is_too_slow_is_refused(here: Path, capsys: pytest.Capture
     assert [path.name for path in here.iterdir()] == ["bad.py"]
 
 
-def test_one_slow_call_is_no_slow_method(here: Path) -> None:
+def test_one_slow_call_is_no_slow_method(here):
     once = SLOW.replace("while", "while memory == 0 and").replace("return memory", "return 1")
     write_method(
         here, once.replace("def command", "begin = lambda self, device: 0\n    def command"), "bad.py"
@@ -432,7 +432,7 @@ def test_one_slow_call_is_no_slow_method(here: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("commands", "rule"),
+    "commands, rule",
     [
         ("seen.target, seen.mode, seen.height * 0 + 1.5", "must return commands from -1 to 1 (got 1.5)."),
         ("seen.target, seen.mode + 9, seen.height * 0", "must return mode as codes of Mode, from 0 to 7"),
@@ -446,7 +446,7 @@ def test_one_slow_call_is_no_slow_method(here: Path) -> None:
         ),
     ],
 )
-def test_a_controller_of_ones_own_is_checked_as_well(commands: str, rule: str) -> None:
+def test_a_controller_of_ones_own_is_checked_as_well(commands, rule):
     text = bad("def build(self, device):\n    return Raw()")
     controller = f"""
 class Raw:
@@ -460,7 +460,7 @@ class Raw:
     assert rule in said
 
 
-def test_two_methods_of_one_name_are_refused(here: Path) -> None:
+def test_two_methods_of_one_name_are_refused(here):
     write_method(here)
     write_method(here, PAD.replace("50e-6", "60e-6"), "other.py")
     assert load_method("pad.py:SoftPad") == load_method(str(here / "pad.py:SoftPad")) == "soft_pad"

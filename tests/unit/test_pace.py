@@ -115,14 +115,14 @@ DESIGN = make_device("hybrid", "design", "design")
 
 
 @pytest.mark.parametrize(
-    ("method", "bed", "preset"),
+    "method, bed, preset",
     [
         ("hybrid", "design", "design"), ("hybrid", "fine", "design"), ("hybrid", "paper", "paper"),
         ("virtual_master", "design", "design"), ("virtual_master", "paper", "paper"),
         ("cell_states", "design", "design"),
     ],
 )  # fmt: skip
-def test_pins_follow_at_the_stated_pace(method: str, bed: str, preset: str) -> None:
+def test_pins_follow_at_the_stated_pace(method, bed, preset):
     scene = make_device(method, bed, preset)
     system = assemble(scene)
     for height in (RIDGE, VALLEY):
@@ -131,21 +131,21 @@ def test_pins_follow_at_the_stated_pace(method: str, bed: str, preset: str) -> N
 
 
 @pytest.mark.parametrize(
-    ("raised", "height"),
+    "raised, height",
     [
         ({"push": 0.4}, VALLEY),  # m/s: the pins ahead are not out of the way in time
         ({"drag": 0.5}, RIDGE),
         ({"gain": 8.0}, RIDGE),
     ],
 )
-def test_a_pace_that_is_too_fast_is_seen_to_fail(raised: dict[str, float], height: float) -> None:
+def test_a_pace_that_is_too_fast_is_seen_to_fail(raised, height):
     system = assemble(DESIGN)
     assert not lead(DESIGN, system, replace(find_stated(DESIGN, system), **raised), height).is_followed(
         "hybrid"
     )
 
 
-def test_what_is_made_for_hands_is_led_at_100_mm_a_second_and_a_method_of_one_s_own_carefully() -> None:
+def test_what_is_made_for_hands_is_led_at_100_mm_a_second_and_a_method_of_one_s_own_carefully():
     tracking = find_tracking(DESIGN, assemble(DESIGN))
     assert tracking is not None
     assert min(tracking.drag, tracking.push) >= 0.1
@@ -154,7 +154,7 @@ def test_what_is_made_for_hands_is_led_at_100_mm_a_second_and_a_method_of_one_s_
     assert Pace().press == 20e-3
 
 
-def test_pins_stay_where_a_stroke_of_method_iii_has_left_them() -> None:
+def test_pins_stay_where_a_stroke_of_method_iii_has_left_them():
     bed = BEDS["design"]
     scene = make_scene(bed.preset, Layout(rows=30, columns=50, pitch=bed.pitch), bed.method, bed.share)
     session, _ = begin_session(1, "", scene, np.array([0.0, 0.0, 0.05, *LEVEL]))
@@ -170,7 +170,7 @@ def test_pins_stay_where_a_stroke_of_method_iii_has_left_them() -> None:
 
 # More than twice the stated speed through a valley 12 mm deep: without yielding 351 kN. How deep it gets
 # before is chance, so one speed has more than its neighbors.
-@pytest.mark.parametrize(("push", "most"), [(0.22, 50.0), (0.24, 50.0), (0.25, 500.0)])
+@pytest.mark.parametrize("push, most", [(0.22, 50.0), (0.24, 50.0), (0.25, 500.0)])
 def test_pins_give_way_under_a_fingertip_that_is_not_where_it_is_taken_to_be(push, most):
     system = assemble(DESIGN)
     fast = replace(find_stated(DESIGN, system), push=push)

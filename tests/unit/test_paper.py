@@ -1,7 +1,6 @@
 """The paper's claims on results made by hand; the page and its data; sections through known surfaces."""
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -54,7 +53,7 @@ def swing(gain: float, amplitude: float, settling: float | None, position_gain: 
 CALM_THEN_WILD = (swing(2.0, 0.001, 1.0), swing(5.0, 0.001, 0.2), swing(50.0, 0.2, None))
 
 
-def test_a_fingertip_that_a_method_loses_is_named_with_the_method() -> None:
+def test_a_fingertip_that_a_method_loses_is_named_with_the_method():
     assert tracking(results()).verdict == "holds"
     claim = tracking(results(cell_states=replace(GOOD, losses=1, loss_share=0.4)))
     assert claim.verdict == "holds in part"
@@ -67,7 +66,7 @@ def test_a_fingertip_that_a_method_loses_is_named_with_the_method() -> None:
     assert (evidence.verdict, "Method III" in evidence.measured) == ("holds", False)
 
 
-def test_the_oscillation_is_all_of_the_papers_only_at_the_gain_of_its_session() -> None:
+def test_the_oscillation_is_all_of_the_papers_only_at_the_gain_of_its_session():
     swings = results(*CALM_THEN_WILD)
     assert swings.onset(500.0) == (5.0, 50.0)  # between the last calm gain and the first that swings
     assert results(*CALM_THEN_WILD[:2]).onset(500.0) == (5.0, None)
@@ -83,10 +82,8 @@ def test_the_oscillation_is_all_of_the_papers_only_at_the_gain_of_its_session() 
     assert onset(swings).verdict == "holds"
 
 
-@pytest.mark.parametrize(
-    ("height", "said"), [(1.6, "holds"), (1.4, "holds in part"), (None, "holds in part")]
-)
-def test_deviations_count_in_each_of_the_papers_windows(height: float | None, said: str) -> None:
+@pytest.mark.parametrize("height, said", [(1.6, "holds"), (1.4, "holds in part"), (None, "holds in part")])
+def test_deviations_count_in_each_of_the_papers_windows(height, said):
     once, twice = (dict.fromkeys((*DEVIATIONS, *WINDOWED, "set_point"), value) for value in (1.0, 2.0))
     known = results().printed[scenes.METHODS[0]]
     one, two = (known._replace(metrics=each, windows=dict.fromkeys(WINDOWS, each)) for each in (once, twice))
@@ -95,8 +92,8 @@ def test_deviations_count_in_each_of_the_papers_windows(height: float | None, sa
     assert deviations(replace(results(), printed=found, session=found)).verdict == said
 
 
-@pytest.mark.parametrize(("speed", "times"), [(0.2, []), (5e-3, [0.5, 0.8])])
-def test_only_a_finger_a_pin_could_follow_is_lost_without_intention(speed: float, times: list[float]) -> None:
+@pytest.mark.parametrize("speed, times", [(0.2, []), (5e-3, [0.5, 0.8])])
+def test_only_a_finger_a_pin_could_follow_is_lost_without_intention(speed, times):
     time = np.linspace(0.0, 1.0, 201)
     tip = np.zeros((201, 7))
     tip[:, 2] = speed * time
@@ -132,7 +129,7 @@ def lost(tmp_path_factory: pytest.TempPathFactory) -> Results:
     return found
 
 
-def test_a_session_a_method_loses_the_finger_in_is_run_again_slowly_enough(lost: Results) -> None:
+def test_a_session_a_method_loses_the_finger_in_is_run_again_slowly_enough(lost):
     assert [bool(lost.printed[method].lost) for method in scenes.METHODS] == [False, True]
     # 10 mm/s over four fifths of 6 mm/s is 2.08; in steps of a tenth.
     assert lost.slow == pytest.approx(2.1)
@@ -177,7 +174,7 @@ SLOWER = (swing(2.0, 0.001, 0.2), swing(5.0, 0.001, 0.3), swing(50.0, 0.2, None)
 
 
 @pytest.mark.parametrize(
-    ("claim", "found", "verdict", "words"),
+    "claim, found, verdict, words",
     [
         # A rise that raises force and RFD causes them.
         (rise, lambda: Results(dragged=dragged(it_II=HARD, rise_II=EASY)), "holds", "0.80 N with the rise a"),
@@ -201,7 +198,7 @@ SLOWER = (swing(2.0, 0.001, 0.2), swing(5.0, 0.001, 0.3), swing(50.0, 0.2, None)
         (largest_speed, lambda: limits(20e-3, None), "holds in part", ""),
     ],
 )  # fmt: skip
-def test_a_claim_has_the_verdict_of_its_evidence(claim: Any, found: Any, verdict: str, words: str) -> None:
+def test_a_claim_has_the_verdict_of_its_evidence(claim, found, verdict, words):
     evidence = claim(found())
     assert evidence.verdict == verdict
     assert words in evidence.measured + evidence.why
@@ -214,7 +211,7 @@ def escaped(point: Swing) -> Results:
 
 
 @pytest.mark.parametrize(
-    ("near", "known", "verdict"),
+    "near, known, verdict",
     [(0.1, 0.1, "holds"), (0.1, 0.2, "holds in part"), (0.2, 0.3, "differs"), (None, 0.2, "differs")],
 )
 def test_a_search_radius_has_to_halve_the_scatter_with_and_without_thresholds(near, known, verdict):
@@ -227,7 +224,7 @@ def test_a_search_radius_has_to_halve_the_scatter_with_and_without_thresholds(ne
     assert claim.why.endswith("lost with and without the radius: 1 mN, no such thresholds: 7 and 0 times.")
 
 
-def test_a_search_radius_lowers_the_scatter_of_noisy_sensors_and_thresholds_do_as_well() -> None:
+def test_a_search_radius_lowers_the_scatter_of_noisy_sensors_and_thresholds_do_as_well():
     quiet = located(0.0, None, thresholds=True)
     assert (quiet.radius, quiet.losses) == (8e-3, 0)
     assert quiet.scatter == pytest.approx(0.0, abs=1e-9)  # rounding in places of millimeters
@@ -239,7 +236,7 @@ def test_a_search_radius_lowers_the_scatter_of_noisy_sensors_and_thresholds_do_a
 
 
 @pytest.mark.parametrize("variant", [STAGGERED, GAUSSIAN])
-def test_a_variant_holds_where_it_is_followed_as_the_scene_is(variant: str) -> None:
+def test_a_variant_holds_where_it_is_followed_as_the_scene_is(variant):
     def judge(**drags: Dragged) -> Evidence:
         return varied(variant, Results(dragged=dragged(**drags)))
 
@@ -251,7 +248,7 @@ def test_a_variant_holds_where_it_is_followed_as_the_scene_is(variant: str) -> N
     assert judge(**{"it_I": BAD, f"{variant}_I": BAD}).verdict == "differs"
 
 
-def test_panels_are_lettered_and_their_named_curves_are_the_data() -> None:
+def test_panels_are_lettered_and_their_named_curves_are_the_data():
     with canvas(6.0, 3.0) as (figure, place):
         one, two = place("one", 0.5, 0.5, 2.0, 2.0), place("two", 3.5, 0.5, 2.0, 2.0)
         one.plot([1.0, 2.0], [3.0, np.nan], label="$K_f$ low")
@@ -305,7 +302,7 @@ def at(bare: Session, x: float, y: float) -> NDArray[np.bool_]:
     return place
 
 
-def test_the_flank_asked_for_is_that_of_the_profile_and_the_claim_names_the_sections_missed() -> None:
+def test_the_flank_asked_for_is_that_of_the_profile_and_the_claim_names_the_sections_missed():
     # 12 mm beside the ridge. Method I: flat to 6, down at 15 mm. Method II: flat to 3, down at 12 mm
     # from the outermost cell under the finger; a disc of 16 cells reaches 3 (sqrt(16/pi) - 0.5) mm.
     reach = 3.0 * (np.sqrt(16.0 / np.pi) - 0.5)
@@ -326,7 +323,7 @@ def missed(bare: Session, over: Floats) -> list[str]:
     return [one.name for one in sections(formed(bare, over)) if not one.meets(LIMITS)]
 
 
-def test_the_relief_asked_for_meets_the_limits_in_every_section_and_less_of_it_in_none(bare: Session) -> None:
+def test_the_relief_asked_for_meets_the_limits_in_every_section_and_less_of_it_in_none(bare):
     found = list(sections(formed(bare, asked_for(bare))))
     assert len(found) == 6
     assert missed(bare, asked_for(bare)) == []
@@ -339,7 +336,7 @@ def test_the_relief_asked_for_meets_the_limits_in_every_section_and_less_of_it_i
     assert levels == pytest.approx({"ridge": 1.35e-3, "mound": 2.3e-3, "valley": 1e-3}, rel=1e-9)
 
 
-def test_a_raised_rim_is_no_mound_and_a_crease_with_a_hump_no_valley(bare: Session) -> None:
+def test_a_raised_rim_is_no_mound_and_a_crease_with_a_hump_no_valley(bare):
     mound = ["along ridge and mound", "across the mound", "slantwise across the mound"]
     # What Method II leaves: arms along the bed's sides, their ends higher than the middle.
     over, place = asked_for(bare), bare.history["position"] - (21e-3, -21e-3)

@@ -129,7 +129,7 @@ def test_the_surface_is_to_scale_and_shows_the_final_heights_and_the_path(surfac
     np.testing.assert_array_equal(~np.isnan(pressed.get_xdata()), case["total_force"] > 0.0)
 
 
-@pytest.mark.parametrize(("rows", "columns", "share"), [(3, 25, 1.0), (12, 14, -1.5), (25, 3, 1.0)])
+@pytest.mark.parametrize("rows, columns, share", [(3, 25, 1.0), (12, 14, -1.5), (25, 3, 1.0)])
 def test_the_relief_is_in_the_middle_of_its_room_and_as_large(rows, columns, share):
     case = drag(rows, columns)
     case["height"] = 0.04 + (case["height"] - 0.04) * share
@@ -182,7 +182,7 @@ TWO = Column("layout.pitch", "m", (2.5e-3, 3e-3), False)
 WORDS = Column("blister.profile", "", ("cone", "gaussian", "flat"), False)
 
 
-def test_numbers_of_one_axis_are_a_line_from_left_to_right_with_units_and_words_make_none() -> None:
+def test_numbers_of_one_axis_are_a_line_from_left_to_right_with_units_and_words_make_none():
     picture = sweep_figure([ONE], "lag_mean", np.array([1e-3, 2e-3, 3e-3]))
     (axes,) = picture.axes
     (line,) = axes.get_lines()
@@ -198,7 +198,7 @@ def test_numbers_of_one_axis_are_a_line_from_left_to_right_with_units_and_words_
     assert lines[1].get_linestyle() == "None"
 
 
-def test_two_axes_are_a_heat_map_labeled_with_units() -> None:
+def test_two_axes_are_a_heat_map_labeled_with_units():
     values = np.array([[0.1, 0.2], [0.3, 0.4], [0.5, np.nan]])
     axes, scale = sweep_figure([ONE, TWO], "rfd", values).axes
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("control.force_gain (1/N)", "layout.pitch (mm)")
@@ -209,7 +209,7 @@ def test_two_axes_are_a_heat_map_labeled_with_units() -> None:
 
 
 @pytest.mark.parametrize("columns", [[ONE], [ONE, TWO]])
-def test_a_metric_nobody_has_is_drawn_as_missing_at_every_point(columns: list[Column]) -> None:
+def test_a_metric_nobody_has_is_drawn_as_missing_at_every_point(columns):
     nothing = np.full([len(one.values) for one in columns], np.nan)
     picture = sweep_figure(columns, "rfd", nothing)
     picture.canvas.draw()

@@ -53,7 +53,7 @@ def test_a_ray_goes_through_no_more_than_the_corner_of_a_pin_before_it_meets_one
 
 
 @pytest.mark.parametrize(
-    ("origin", "way"),
+    "origin, way",
     [
         ([1.0, 0.0, 1.0], DOWN),  # they pass by
         ([0.0, 0.0, 1.0], -DOWN),
@@ -65,11 +65,11 @@ def test_a_ray_goes_through_no_more_than_the_corner_of_a_pin_before_it_meets_one
         ([0.0, np.inf, 1.0], DOWN),
     ],
 )
-def test_a_ray_that_passes_by_or_is_none_meets_nothing(origin: list[float], way: list[float]) -> None:
+def test_a_ray_that_passes_by_or_is_none_meets_nothing(origin, way):
     assert intersect_surface(*bed(), np.array(origin), np.array(way)) is None
 
 
-def test_a_ray_along_the_bed_meets_the_side_of_the_first_pin_that_stands_out() -> None:
+def test_a_ray_along_the_bed_meets_the_side_of_the_first_pin_that_stands_out():
     cells, _ = bed()
     height, cell = np.full(cells.count, 0.04), 5 * 15 + 7
     height[cell] = 0.06
@@ -85,7 +85,7 @@ LENSES = {
 
 
 @pytest.mark.parametrize("lens", LENSES)
-def test_every_place_lies_on_the_ray_through_where_it_is_seen(lens: str) -> None:
+def test_every_place_lies_on_the_ray_through_where_it_is_seen(lens):
     projection = np.array(LENSES[lens])
     seen = np.eye(4)
     seen[:3, :3] = 3.0 * make_matrices(np.array([[0.8, 0.4, -0.3, 0.33]]))[0]
@@ -99,7 +99,7 @@ def test_every_place_lies_on_the_ray_through_where_it_is_seen(lens: str) -> None
         np.testing.assert_allclose(origin + along * way, place, rtol=0, atol=1e-12 * along + 1e-12)
 
 
-def test_the_ground_is_the_mean_of_pins_in_reach_and_a_high_pin_raises_a_line_by_a_sixth() -> None:
+def test_the_ground_is_the_mean_of_pins_in_reach_and_a_high_pin_raises_a_line_by_a_sixth():
     cells, height = bed()
     near = np.hypot(cells.x - 1e-3, cells.y) <= 5e-3
     assert find_ground_height(cells, height, 1e-3, 0.0, 5e-3) == pytest.approx(height[near].mean(), rel=1e-12)
@@ -126,7 +126,7 @@ def test_the_patch_is_where_the_underside_of_the_finger_is_as_high_as_the_plane(
 
 
 @pytest.mark.parametrize("depth", [-1.0, 0.0, 0.05, np.inf])
-def test_the_patch_never_leaves_the_finger(depth: float) -> None:
+def test_the_patch_never_leaves_the_finger(depth):
     rim = find_contact_outline(Fingertip(), np.array(LEVEL), depth)
     radius = np.hypot(rim[:, 0] / 10e-3, rim[:, 1] / 8e-3)
     # The root of a rounding error of 1e-16 is 1e-8.

@@ -35,8 +35,8 @@ def told(bar: Line) -> None:
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_terminal_gets_the_share_done_and_the_time_left_in_a_line_that_goes_and_a_file_gets_nothing(
-    kind: str, clock: list[float]
-) -> None:
+    kind, clock
+):
     for stream in (Terminal(), io.StringIO()):
         with KINDS[kind](stream) as bar:
             clock[0] += 10.0
@@ -55,8 +55,8 @@ def test_a_terminal_gets_the_share_done_and_the_time_left_in_a_line_that_goes_an
 
 
 def test_a_line_is_cut_to_the_terminal_and_things_done_beforehand_do_not_count_for_the_time_left(
-    clock: list[float], monkeypatch: pytest.MonkeyPatch
-) -> None:
+    clock, monkeypatch
+):
     stream = Terminal()
     with Counted(stream, "first", "jobs", before=8) as bar:
         clock[0] += 10.0
@@ -74,7 +74,7 @@ def test_a_line_is_cut_to_the_terminal_and_things_done_beforehand_do_not_count_f
 
 
 @pytest.mark.parametrize(
-    ("seconds", "said"), [(0.4, "0 s"), (59.4, "59 s"), (200.0, "3 min 20 s"), (7500.0, "2 h 5 min")]
+    "seconds, said", [(0.4, "0 s"), (59.4, "59 s"), (200.0, "3 min 20 s"), (7500.0, "2 h 5 min")]
 )
-def test_times_are_written_as_people_say_them(seconds: float, said: str) -> None:
+def test_times_are_written_as_people_say_them(seconds, said):
     assert format_duration(seconds) == said

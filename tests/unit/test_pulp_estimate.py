@@ -14,6 +14,8 @@ from digiclay.core.model.touch import Touch
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
+from tests.assemble import table
+
 Floats = NDArray[np.float64]
 
 PERIOD = 5e-3
@@ -40,7 +42,7 @@ def observe(forces: Floats, expected: Floats) -> Floats:
     return np.array(found)
 
 
-def test_the_tension_of_a_press_is_found_and_its_underside_as_uncertain_as_the_force() -> None:
+def test_the_tension_of_a_press_is_found_and_its_underside_as_uncertain_as_the_force():
     forces, own = history(lambda t: 1.5e-3 * np.minimum(t / 0.2, 1.0), 100)
     # The tension is taken as linear within 5 ms, while it grows exponentially; a filter takes 4 ms.
     assert observe(forces, own) == pytest.approx(own[1:], rel=0.01, abs=2e-3)
@@ -50,7 +52,7 @@ def test_the_tension_of_a_press_is_found_and_its_underside_as_uncertain_as_the_f
     assert deviation == pytest.approx(1e-3 / slope, rel=1e-6)
 
 
-def test_a_predicted_force_comes_and_relieved_pulp_keeps_the_expected_tension() -> None:
+def test_a_predicted_force_comes_and_relieved_pulp_keeps_the_expected_tension():
     depth = lambda t: 1.0e-3 + 3e-3 * (t - 0.2)  # noqa: E731
     forces, own = history(lambda t: np.maximum(depth(t), 0.0), 42)
     pulp = np.zeros((4, 1))
@@ -76,7 +78,7 @@ UNDER = 40e-3 + DISTANCE**2 / 16e-3
 
 
 @pytest.mark.parametrize(
-    ("wanted", "guess", "low", "high", "force", "top"),
+    "wanted, guess, low, high, force, top",
     [
         # Linear between nine heights, 0.16 mm apart near the guess, and up to 2.4 mm far from it.
         (0.4, 41.13e-3, 39e-3, 43e-3, pytest.approx(0.4, abs=10e-3), None),
@@ -118,7 +120,7 @@ def test_several_fingertips_have_the_tops_that_each_has_alone():
 
 
 @pytest.mark.parametrize(
-    ("raised", "top", "expected"), [(True, 55e-3, [55e-3, 53e-3]), (False, 30e-3, [30e-3, 32e-3])]
+    "raised, top, expected", [(True, 55e-3, [55e-3, 53e-3]), (False, 30e-3, [30e-3, 32e-3])]
 )
 def test_led_cells_stand_no_farther_from_the_top_than_they_may(raised, top, expected):
     cells = Reach(40e-3, raised, np.array([1.0, 0.5, 0.0]), np.array([0.0, 2e-3, 20e-3]), np.empty((2, 3)))
@@ -129,17 +131,17 @@ LEAD = LeadProfile(level=7.5e-3, rise=20e-3, fall=20e-3, skirt=0.0)
 SKIRT = LeadProfile(level=7.5e-3, rise=20e-3, fall=20e-3, skirt=40e-3)
 
 
-@pytest.mark.parametrize(
-    ("profile", "distance", "ahead", "speed", "drop"),
-    [
+@table(
+    "profile, distance, ahead, speed, drop",
+    {
         # 10 mm ahead at 40 mm/s is a quarter of a second, in which a pin rises 5 mm.
-        pytest.param(LEAD, 17.5e-3, 17.5e-3, 40e-3, 5e-3, id="ahead, where it can still arrive"),
-        pytest.param(LEAD, 17.5e-3, -17.5e-3, 40e-3, 1e7, id="behind, without a skirt: not led"),
-        pytest.param(LEAD, 17.5e-3, 17.5e-3, 0.5e-3, 1e7, id="too slow to have a direction"),
-        pytest.param(LEAD, 5e-3, 0.0, 40e-3, 0.0, id="on the level ring"),
-        pytest.param(SKIRT, 17.5e-3, -1.0, 0.0, 5e-3, id="a skirt behind, for its speed"),
-        pytest.param(SKIRT, 17.5e-3, 1.0, 0.0, 5e-3, id="a skirt ahead, for its speed"),
-    ],
+        "ahead, where it can still arrive": (LEAD, 17.5e-3, 17.5e-3, 40e-3, 5e-3),
+        "behind, without a skirt: not led": (LEAD, 17.5e-3, -17.5e-3, 40e-3, 1e7),
+        "too slow to have a direction": (LEAD, 17.5e-3, 17.5e-3, 0.5e-3, 1e7),
+        "on the level ring": (LEAD, 5e-3, 0.0, 40e-3, 0.0),
+        "a skirt behind, for its speed": (SKIRT, 17.5e-3, -1.0, 0.0, 5e-3),
+        "a skirt ahead, for its speed": (SKIRT, 17.5e-3, 1.0, 0.0, 5e-3),
+    },
 )
 def test_a_pin_stands_as_far_from_the_top_as_it_can_still_rise(profile, distance, ahead, speed, drop):
     slopes = profile.find_slopes(speed, raised=True)
@@ -147,7 +149,7 @@ def test_a_pin_stands_as_far_from_the_top_as_it_can_still_rise(profile, distance
     assert found == pytest.approx([drop])
 
 
-def test_the_disc_reaches_farther_than_pins_are_led_and_holds_those_led_before() -> None:
+def test_the_disc_reaches_farther_than_pins_are_led_and_holds_those_led_before():
     assert LEAD.find_reach(15e-3, 40e-3) == pytest.approx(7.5e-3 + 30e-3)
     assert LEAD.find_reach(-10e-3, 40e-3) == pytest.approx(7.5e-3 + 20e-3)
     blister = LedBlister(BlisterRule(Blister(), -0.05, 0.02, 1e-3), SKIRT, 10e-3)

@@ -24,7 +24,7 @@ class Lever(Parameters):
 
 
 @pytest.mark.parametrize(
-    ("given", "field", "kind", "value"),
+    "given, field, kind, value",
     [
         ({}, "notches", tuple, (0.1, 0.2)),
         ({"length": 1}, "length", float, 1.0),
@@ -49,7 +49,7 @@ def test_a_valid_value_has_the_type_of_its_default(given, field, kind, value):
 
 
 @pytest.mark.parametrize(
-    ("given", "line"),
+    "given, line",
     [
         ({"length": 0}, "Lever.length must be above 0 m (got 0 m)."),
         ({"length": 10.0}, "Lever.length must be below 10 m (got 10 m)."),
@@ -82,7 +82,7 @@ def test_a_broken_rule_is_one_line_with_owner_field_rule_and_value(given, line):
 
 
 @pytest.mark.parametrize(
-    ("text", "unit", "value"),
+    "text, unit, value",
     [
         ("3 mm", "m", 3e-3),
         ("0.5 bar", "Pa", 5e4),
@@ -96,12 +96,12 @@ def test_a_broken_rule_is_one_line_with_owner_field_rule_and_value(given, line):
         ("9.81 m/s\N{SUPERSCRIPT TWO}", "m/s2", 9.81),
     ],
 )
-def test_a_quantity_with_a_unit_is_read_into_si(text: str, unit: str, value: float) -> None:
+def test_a_quantity_with_a_unit_is_read_into_si(text, unit, value):
     assert parse(text, unit) == pytest.approx(value, rel=1e-15)
 
 
 @pytest.mark.parametrize(
-    ("text", "rule"),
+    "text, rule",
     [
         ("three mm", "must be a number, or a text such as '3 m'"),
         ("3 parsec", "must have a unit known here"),
@@ -109,12 +109,12 @@ def test_a_quantity_with_a_unit_is_read_into_si(text: str, unit: str, value: flo
         ("3 bar", "must be in m or a multiple of it"),
     ],
 )
-def test_a_quantity_that_cannot_be_read_names_the_rule(text: str, rule: str) -> None:
+def test_a_quantity_that_cannot_be_read_names_the_rule(text, rule):
     with pytest.raises(ValueError, match=rule):
         parse(text, "m")
 
 
-def test_the_nearest_name_is_suggested_unless_all_are_unlike() -> None:
+def test_the_nearest_name_is_suggested_unless_all_are_unlike():
     names = ["density", "viscosity"]
     assert [find_nearest_name(name, names) for name in ("viscosty", "qqq")] == ["viscosity", ""]
 
@@ -127,7 +127,7 @@ def path(times: Any, positions: Any = None) -> Trajectory:
 
 
 @pytest.mark.parametrize(
-    ("part", "given", "said"),
+    "part, given, said",
     [
         (Layout, {"rows": 10_000, "columns": 10_000}, "rows * columns must have at most 20 million"),
         (Relaxation, {"weights": (0.0,) * 4}, "weights must not all be 0"),
@@ -145,7 +145,7 @@ def path(times: Any, positions: Any = None) -> Trajectory:
         ),
     ],
 )  # fmt: skip
-def test_what_no_part_can_have_is_refused_with_the_rule(part: Any, given: dict[str, Any], said: str) -> None:
+def test_what_no_part_can_have_is_refused_with_the_rule(part, given, said):
     name = "Trajectory" if part is path else part.__name__
     with pytest.raises(ParameterError, match="^" + re.escape(f"{name}.{said}")):
         part(**given)

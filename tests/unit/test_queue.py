@@ -68,7 +68,7 @@ def draw(name: str) -> Running:
 
 
 @pytest.mark.parametrize("name", DRAWN)
-def test_strokes_leave_the_same_bits_however_many_periods_are_simulated_at_a_time(name: str) -> None:
+def test_strokes_leave_the_same_bits_however_many_periods_are_simulated_at_a_time(name):
     few, many = (finish(draw(name), periods) for periods in (7, 64))
     assert few.state.period == many.state.period
     np.testing.assert_array_equal(heights(few), heights(many))
@@ -134,8 +134,8 @@ def form(part: str, queue: str) -> Formed:
     return Formed(before, ghost, heights(done), expected, taken, sculpting.estimate_time(done))
 
 
-@pytest.mark.parametrize(("part", "queue"), CASES)
-def test_the_ghost_agrees_with_the_result_to_a_millimeter_over_most_pins(part: str, queue: str) -> None:
+@pytest.mark.parametrize("part, queue", CASES)
+def test_the_ghost_agrees_with_the_result_to_a_millimeter_over_most_pins(part, queue):
     before, ghost, formed, *_ = form(part, queue)
     # Of the pins that move, not of all: those far from a stroke agree anyway.
     moved = np.maximum(np.abs(ghost - before), np.abs(formed - before)) > 0.1e-3
@@ -146,7 +146,7 @@ def test_the_ghost_agrees_with_the_result_to_a_millimeter_over_most_pins(part: s
 
 
 @pytest.mark.parametrize("queue", QUEUES)
-def test_the_time_that_a_queue_still_takes_is_known_roughly(queue: str) -> None:
+def test_the_time_that_a_queue_still_takes_is_known_roughly(queue):
     formed = form("Method III", queue)
     assert 0.6 * formed.taken < formed.expected < 1.6 * formed.taken
     assert formed.left == 0.0

@@ -1,7 +1,6 @@
 """Recorded strokes of the Press tool: their file, and that a replay forms what a hand's strokes form."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -29,7 +28,7 @@ def play(*strokes: PointerStroke) -> Running:
     return session
 
 
-def test_a_replay_presses_along_the_whole_stroke_the_same_each_time() -> None:
+def test_a_replay_presses_along_the_whole_stroke_the_same_each_time():
     session = play(PointerStroke(moves=ALONG))
     risen = 1e3 * (heights(session) - 40e-3).reshape(11, 15)
     assert (risen[5, 4:11] < -2.0).all()
@@ -39,7 +38,7 @@ def test_a_replay_presses_along_the_whole_stroke_the_same_each_time() -> None:
     np.testing.assert_array_equal(heights(play(PointerStroke(moves=ALONG))), heights(session))
 
 
-def test_ctrl_symmetry_strength_and_line_are_those_of_the_tool() -> None:
+def test_ctrl_symmetry_strength_and_line_are_those_of_the_tool():
     line = PointerStroke(moves=((0.0, 9e-3, -6e-3), (0.3, 9e-3, 6e-3)), path="line", symmetry="x")
     deep = 1e3 * (40e-3 - heights(play(line)).reshape(11, 15))
     half = 1e3 * (40e-3 - heights(play(replace(line, strength=0.5))).reshape(11, 15))
@@ -52,7 +51,7 @@ def test_ctrl_symmetry_strength_and_line_are_those_of_the_tool() -> None:
     assert PointerStroke(ctrl=True).amount == 15e-3
 
 
-def test_a_stroke_has_its_own_fingertip_and_a_brush_without_its_blister_is_refused() -> None:
+def test_a_stroke_has_its_own_fingertip_and_a_brush_without_its_blister_is_refused():
     begun = begin()
     first, *_, last = play_strokes(begun, (PointerStroke(width=6e-3, moves=ALONG),))
     sessions = [first, last]
@@ -65,7 +64,7 @@ def test_a_stroke_has_its_own_fingertip_and_a_brush_without_its_blister_is_refus
         list(play_strokes(begin(method="elastic"), (PointerStroke(brush="raise"),)))
 
 
-def test_a_file_gives_its_strokes(tmp_path: Path) -> None:
+def test_a_file_gives_its_strokes(tmp_path):
     path = tmp_path / "two.toml"
     path.write_text(f'bed = "paper"\n{STROKE}depth = "2 mm"\n{STROKE}brush = "level"\n', encoding="utf-8")
     recorded = read_strokes(path)
@@ -74,7 +73,7 @@ def test_a_file_gives_its_strokes(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    "text, said",
     [
         ("", r"stroke must be a list of tables, \[\[stroke\]\]"),
         ("stroke = 3", r"stroke must be a list of tables"),
@@ -92,7 +91,7 @@ def test_a_file_gives_its_strokes(tmp_path: Path) -> None:
         (None, "cannot be read"),
     ],
 )
-def test_a_file_that_is_wrong_is_refused_in_one_line(tmp_path: Path, text: str | None, said: str) -> None:
+def test_a_file_that_is_wrong_is_refused_in_one_line(tmp_path, text, said):
     path = tmp_path / "wrong.toml"
     if text is not None:
         path.write_text(text, encoding="utf-8")

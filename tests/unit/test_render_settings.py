@@ -8,7 +8,7 @@ from digiclay.core.session.render_settings import Film, Turntable
 TIME = np.arange(201) * 5e-3
 
 
-def test_a_film_lasts_as_long_as_its_session_or_a_part_of_it_and_shows_the_nearest_row() -> None:
+def test_a_film_lasts_as_long_as_its_session_or_a_part_of_it_and_shows_the_nearest_row():
     moments = Film(rate=25).moments(TIME)
     assert len(moments) == 26
     np.testing.assert_allclose(moments, np.arange(26) / 25, rtol=0, atol=1e-12)
@@ -23,17 +23,17 @@ def test_a_film_lasts_as_long_as_its_session_or_a_part_of_it_and_shows_the_neare
 
 
 @pytest.mark.parametrize(
-    ("film", "told"),
+    "film, told",
     [
         (Film(start=2.0), "start must be between 0 s and 1 s"),
         (Film(start=0.5, stop=0.4), r"between 0 s and 0\.4 s"),
         (Film(speed=1e-3, rate=240), "speed must be so high that there are at most 100000 frames"),
     ],
 )
-def test_a_part_that_is_not_there_is_refused(film: Film, told: str) -> None:
+def test_a_part_that_is_not_there_is_refused(film, told):
     with pytest.raises(ParameterError, match=told):
         film.moments(TIME)
 
 
-def test_a_turntable_goes_round_once_without_showing_the_first_frame_twice() -> None:
+def test_a_turntable_goes_round_once_without_showing_the_first_frame_twice():
     np.testing.assert_allclose(np.degrees(Turntable(frames=4).angles()), [0, 90, 180, 270], atol=1e-12)

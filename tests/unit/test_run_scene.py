@@ -26,6 +26,8 @@ from digiclay.core.session.memory_limit import (
 )
 from digiclay.core.session.run_scene import Result, run
 
+from tests.assemble import table
+
 WAY = [{"time": t, "position": [0, 0, z]} for t, z in ((0, 0.041), (0.1, 0.038), (0.2, 0.041))]
 SMALL = {"radius": 6e-3, "edge_radius": 9e-3, "flat_radius": 3e-3}
 TABLE: dict[str, Any] = {
@@ -42,7 +44,7 @@ def result() -> Result:
     return run(scene())
 
 
-def test_a_history_has_the_arrays_and_shapes_it_is_known_by(result: Result) -> None:
+def test_a_history_has_the_arrays_and_shapes_it_is_known_by(result):
     cells = dict.fromkeys(("height", "force", "command", "mode"), (41, 12))
     assert {name: array.shape for name, array in result.history.items()} == {
         "time": (41,), **cells, "fingertip": (41, 7), "total_force": (41,), "position": (12, 2),
@@ -55,7 +57,7 @@ def test_a_history_has_the_arrays_and_shapes_it_is_known_by(result: Result) -> N
     assert [name for name in result.metrics["units"] if name not in result.metrics] == []
 
 
-def test_the_same_scene_gives_the_same_history_bit_for_bit_or_less_of_it(result: Result) -> None:
+def test_the_same_scene_gives_the_same_history_bit_for_bit_or_less_of_it(result):
     told: list[tuple[int, int]] = []
     again = run(scene(), progress=lambda done, total: told.append((done, total))).history
     assert [name for name in again if not np.array_equal(again[name], result.history[name])] == []
@@ -70,7 +72,7 @@ def test_the_same_scene_gives_the_same_history_bit_for_bit_or_less_of_it(result:
     )
 
 
-def test_without_control_no_force_is_deviated_from_and_what_fits_into_no_memory_is_refused() -> None:
+def test_without_control_no_force_is_deviated_from_and_what_fits_into_no_memory_is_refused():
     done = run(scene(control="absent"))
     assert (done.metrics["rfd"], done.metrics["set_point"]) == (None, None)
     assert np.ptp(done.history["height"]) == 0.0
@@ -80,7 +82,7 @@ def test_without_control_no_force_is_deviated_from_and_what_fits_into_no_memory_
         run(endless)
 
 
-def test_the_summary_is_one_line_with_times_and_rfd(result: Result) -> None:
+def test_the_summary_is_one_line_with_times_and_rfd(result):
     made = Result(
         result.scene, result.history, 40, 0.05, {**result.metrics, "rfd": 0.0612, "beyond_a_finger": ""}
     )
@@ -93,7 +95,7 @@ def test_the_summary_is_one_line_with_times_and_rfd(result: Result) -> None:
 
 
 @pytest.mark.parametrize(
-    ("changed", "why"),
+    "changed, why",
     [
         ({"recorder": {"every": 2}}, "recorder.every = 2 leaves out commands"),
         ({"recorder": "absent"}, "recorder = 'absent' keeps no command"),
@@ -103,7 +105,7 @@ def test_the_summary_is_one_line_with_times_and_rfd(result: Result) -> None:
         ),
     ],
 )
-def test_a_run_whose_errors_cannot_be_estimated_says_why(changed: dict[str, Any], why: str) -> None:
+def test_a_run_whose_errors_cannot_be_estimated_says_why(changed, why):
     known = run(scene(**changed)).estimate_errors()
     assert known is not None
     assert "height_error" not in known.metrics
@@ -111,10 +113,8 @@ def test_a_run_whose_errors_cannot_be_estimated_says_why(changed: dict[str, Any]
     assert f"errors not estimated ({known.metrics['errors_absent']})" in known.summary()
 
 
-@pytest.mark.parametrize(("speed", "said"), [(24e-3, ", lost once, 0.99 s"), (26e-3, ""), (5e-3, "")])
-def test_the_summary_tells_that_a_lift_lost_the_finger_unless_no_pin_rises_so_fast(
-    speed: float, said: str
-) -> None:
+@pytest.mark.parametrize("speed, said", [(24e-3, ", lost once, 0.99 s"), (26e-3, ""), (5e-3, "")])
+def test_the_summary_tells_that_a_lift_lost_the_finger_unless_no_pin_rises_so_fast(speed, said):
     points = [(0.0, 0.041), (0.2, 0.037), (0.5, 0.037), (1.5, 0.037 + speed)]
     way = [{"time": time, "position": [0, 0, z]} for time, z in points]
     path = {"waypoints": way, "interpolation": "linear"}
@@ -124,11 +124,9 @@ def test_the_summary_tells_that_a_lift_lost_the_finger_unless_no_pin_rises_so_fa
 
 
 @pytest.mark.parametrize(
-    ("order", "parts"), [(1, 4), (2, 2)], ids=["across a kink, in quarters", "smooth, in halves"]
+    "order, parts", [(1, 4), (2, 2)], ids=["across a kink, in quarters", "smooth, in halves"]
 )
-def test_an_estimate_is_the_error_itself_where_the_reference_converges_with_an_order(
-    order: int, parts: int
-) -> None:
+def test_an_estimate_is_the_error_itself_where_the_reference_converges_with_an_order(order, parts):
     error = np.array([5e-6, 1e-3, 4e-3])
     assert Errors.estimate(error - error / parts**order) == pytest.approx(tuple(error), rel=1e-12)
 
@@ -138,7 +136,7 @@ def stopped_after(count: int) -> Result:
     return run(scene(), stopped=lambda: next(asked) == count)
 
 
-def test_a_stopped_session_keeps_what_was_computed_and_is_marked_incomplete(result: Result) -> None:
+def test_a_stopped_session_keeps_what_was_computed_and_is_marked_incomplete(result):
     cut = stopped_after(10)
     assert np.array_equal(cut.history["height"], result.history["height"][:11])
     assert (cut.incomplete, cut.metrics["incomplete"]) == (True, True)
@@ -164,7 +162,7 @@ def test_a_folder_appears_with_all_that_was_written_and_not_before_nor_after_a_f
     assert [path.name for path in (tmp_path / "empty").iterdir()] == ["x"]
 
 
-def test_an_older_run_is_replaced_when_asked_and_stays_when_the_new_one_fails(tmp_path: Path) -> None:
+def test_an_older_run_is_replaced_when_asked_and_stays_when_the_new_one_fails(tmp_path):
     def words() -> list[tuple[str, str]]:
         return [(path.name, path.read_text(encoding="utf-8")) for path in tmp_path.glob("*/*")]
 
@@ -178,7 +176,7 @@ def test_an_older_run_is_replaced_when_asked_and_stays_when_the_new_one_fails(tm
 
 
 @pytest.mark.parametrize(
-    ("there", "out", "overwrite", "message"),
+    "there, out, overwrite, message",
     [
         (f"run/{MARK}", "run", False, r"is not empty: .* --overwrite"),
         ("thesis.doc", ".", True, "holds other things than a run"),
@@ -209,7 +207,7 @@ def locked() -> Iterator[Path]:
             folder.chmod(0o700)
 
 
-def test_a_folder_without_leave_to_write_is_told_before_any_work(locked: Path) -> None:
+def test_a_folder_without_leave_to_write_is_told_before_any_work(locked):
     with pytest.raises(OutputError, match="cannot be written to"):
         check_folder(locked / "run", overwrite=False)
 
@@ -239,7 +237,7 @@ def recorded(every: int, periods: int, stop: int | None = None) -> dict[str, lis
 
 
 @pytest.mark.parametrize(
-    ("session", "name", "wanted"),
+    "session, name, wanted",
     [
         # The first row is the state before the session, any other one that at its time.
         ((1, 3), "height", [0.04, 101.0, 102.0, 103.0]),
@@ -260,11 +258,11 @@ def test_a_row_is_the_state_at_its_time_and_what_was_commanded_from_then_on(sess
 
 
 @pytest.mark.parametrize("every", [1, 2, 3, 4, 5, 6])
-def test_there_are_as_many_rows_as_were_announced(every: int) -> None:
+def test_there_are_as_many_rows_as_were_announced(every):
     assert len(recorded(every, 5)["period"]) == Recorder(every).rows(5)
 
 
-def test_a_written_history_is_read_back_bit_for_bit_and_smaller_than_its_arrays(tmp_path: Path) -> None:
+def test_a_written_history_is_read_back_bit_for_bit_and_smaller_than_its_arrays(tmp_path):
     rng, path = np.random.default_rng(1), tmp_path / "history.npz"
     history = {"height": rng.normal(size=(5, 7)), "mode": rng.integers(0, 8, (5, 7)).astype(np.int8)}
     write(history, path)
@@ -284,7 +282,7 @@ def fits(recorder: Recorder, cells: int, periods: int, free: int) -> bool:
     return True
 
 
-def test_a_history_fits_to_the_byte_or_is_refused_with_the_least_thinning_that_fits() -> None:
+def test_a_history_fits_to_the_byte_or_is_refused_with_the_least_thinning_that_fits():
     needed = count_bytes_needed(Recorder(1), ROWS, 1000, 100)
     assert [fits(Recorder(1), 1000, 100, free) for free in (needed - 1, needed)] == [False, True]
     with pytest.raises(ParameterError) as caught:
@@ -326,25 +324,23 @@ def measured_and_estimated(**changes: Any) -> tuple[float, float]:
     return (taken[1] - taken[0]) / MORE, (told[1] - told[0]) / MORE
 
 
-@pytest.mark.parametrize(
-    ("changes", "least", "most"),
-    [
+@table(
+    "changes, least, most",
+    {
         # All of it is arrays whose lengths are known; of what is taken once a little depends on the finger.
-        pytest.param({"recorder": "absent"}, 0.95, 1.05, id="I"),
-        pytest.param({"recorder": "absent", "control": {"method": "cell_states"}}, 0.95, 1.05, id="Method I"),
+        "I": ({"recorder": "absent"}, 0.95, 1.05),
+        "Method I": ({"recorder": "absent", "control": {"method": "cell_states"}}, 0.95, 1.05),
         # Temporary arrays are as many as numpy happens to need.
-        pytest.param({"recorder": "absent", "shape": {"file": "dome"}}, 0.95, 1.05, id="cells that all take"),
-        pytest.param(
-            {"shape": {"file": "dome"}, "simulation": {"duration": 0.5}}, 0.5, 1.0, id="rows that wait"
-        ),
-    ],
+        "cells that all take": ({"recorder": "absent", "shape": {"file": "dome"}}, 0.95, 1.05),
+        "rows that wait": ({"shape": {"file": "dome"}, "simulation": {"duration": 0.5}}, 0.5, 1.0),
+    },
 )  # fmt: skip
-def test_a_cell_takes_as_many_bytes_as_is_said(changes: dict[str, Any], least: float, most: float) -> None:
+def test_a_cell_takes_as_many_bytes_as_is_said(changes, least, most):
     taken, told = measured_and_estimated(**changes)
     assert least * told <= taken <= most * told
 
 
-def test_a_row_of_a_cell_takes_as_many_bytes_as_is_said() -> None:
+def test_a_row_of_a_cell_takes_as_many_bytes_as_is_said():
     history = run(resolve({"simulation": {"duration": 0.05}})).history
     assert history is not None
     rows, cells = history["height"].shape

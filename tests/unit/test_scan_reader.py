@@ -52,7 +52,7 @@ OFF_FACES = "4 0 1 2 3\n3 3 2 4\n"
 
 
 @pytest.mark.parametrize(
-    ("name", "content"),
+    "name, content",
     [
         ("text.stl", text_stl(CUT)),
         ("upper.stl", text_stl(CUT).upper()),
@@ -91,7 +91,7 @@ def test_whatever_way_a_scan_is_written_it_is_the_same_three_triangles(tmp_path,
 
 
 @pytest.mark.parametrize(
-    ("name", "content", "said"),
+    "name, content, said",
     [
         ("comma.stl", text_stl(CUT).replace(".", ","), "could not convert string to float: b'1,5'"),
         ("comma.ply", (ASCII + FACES + TEXT + OFF_FACES).replace(".5", ",5"), "to float: b'1,5'"),

@@ -19,8 +19,10 @@ from digiclay.core.scene.schema import (
 )  # fmt: skip
 from digiclay.core.scene.toml_table import PRESETS, format_scene, resolve
 
+from tests.assemble import table
 
-def test_an_empty_file_is_a_whole_scene_that_presses_once_and_a_written_one_names_everything() -> None:
+
+def test_an_empty_file_is_a_whole_scene_that_presses_once_and_a_written_one_names_everything():
     scene = resolve({})
     assert (scene.layout.rows, scene.layout.pitch, scene.valve.orifice_diameter) == (25, 3e-3, 0.5e-3)
     assert tuple(name for name in SECTIONS if scene.section(name) is None) == UNASKED
@@ -34,7 +36,7 @@ def test_an_empty_file_is_a_whole_scene_that_presses_once_and_a_written_one_name
     assert missing == []
 
 
-def test_quantities_may_have_a_unit_and_a_hexagonal_bed_shares_the_force_among_more_cells() -> None:
+def test_quantities_may_have_a_unit_and_a_hexagonal_bed_shares_the_force_among_more_cells():
     scene = resolve({"relaxation": {"times": ["4 ms", 0.07, "1.4 s"]}, "fluid": {"density": 900}})
     # The product of number and unit is rounded once.
     assert scene.section("relaxation").times == pytest.approx((4e-3, 0.07, 1.4), rel=1e-15)
@@ -45,7 +47,7 @@ def test_quantities_may_have_a_unit_and_a_hexagonal_bed_shares_the_force_among_m
 
 
 @pytest.mark.parametrize("preset", ["fast", "viscous"])
-def test_a_preset_changes_what_it_says_unless_the_file_does_and_nothing_else(preset: str) -> None:
+def test_a_preset_changes_what_it_says_unless_the_file_does_and_nothing_else(preset):
     asked: dict[str, Any] = {name: {} for name in UNASKED}
     changed, plain = resolve({"preset": preset, **asked}), resolve(asked)
     for name in PARTS:
@@ -56,13 +58,13 @@ def test_a_preset_changes_what_it_says_unless_the_file_does_and_nothing_else(pre
 
 
 @pytest.mark.parametrize(
-    ("name", "other"), [*zip(OPTIONAL, OPTIONAL, strict=True), *NEEDS.items()], ids=lambda name: name
+    "name, other", [*zip(OPTIONAL, OPTIONAL, strict=True), *NEEDS.items()], ids=lambda name: name
 )
-def test_an_optional_part_can_be_left_out_and_what_needs_it_leaves_with_it(name: str, other: str) -> None:
+def test_an_optional_part_can_be_left_out_and_what_needs_it_leaves_with_it(name, other):
     assert resolve({other: "absent"}).section(name) is None
 
 
-def test_periods_cover_the_duration_and_steps_the_period_without_one_more_by_rounding() -> None:
+def test_periods_cover_the_duration_and_steps_the_period_without_one_more_by_rounding():
     # 0.3 / 0.1 is a little more than 3 in binary: that is no fourth period.
     sizes = {"control_period": 0.1, "physics_step": 0.1}
     lasting = [resolve({"simulation": {"duration": d, **sizes}}) for d in (0.3, 0.31, 1e-3)]
@@ -125,8 +127,8 @@ WRONG: list[tuple[dict[str, Any], str]] = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize(("table", "said"), WRONG)
-def test_what_is_wrong_is_said_in_one_line_of_a_sane_length(table: dict[str, Any], said: str) -> None:
+@pytest.mark.parametrize("table, said", WRONG)
+def test_what_is_wrong_is_said_in_one_line_of_a_sane_length(table, said):
     line = refused(table)
     assert (line[: len(said)], "\n" in line, len(line) < 400) == (said, False, True)
 
@@ -151,8 +153,8 @@ SCENES: dict[str, dict[str, Any]] = {
 }
 
 
-@pytest.mark.parametrize("table", SCENES.values(), ids=SCENES.keys())
-def test_a_scene_written_as_a_file_reads_back_as_an_equal_one(table: dict[str, Any]) -> None:
+@table("table", SCENES)
+def test_a_scene_written_as_a_file_reads_back_as_an_equal_one(table):
     scene = resolve(table, "some name")
     assert resolve(tomllib.loads(format_scene(scene))) == scene
 
@@ -171,7 +173,7 @@ def refused_file(folder: Path, text: str, **settings: str) -> str:
 
 
 @pytest.mark.parametrize(
-    ("text", "setting", "said"),
+    "text, setting, said",
     [
         ("", {"valve__stroke": "0"}, "--set: valve.stroke must be above 0 m (got 0 m)."),
         # A mistake in the file is not blamed on a setting; what both break together is.
@@ -187,7 +189,7 @@ def test_a_mistake_is_told_with_the_file_or_the_option(tmp_path, text, setting, 
 
 
 @pytest.mark.parametrize(
-    ("text", "settings", "part", "key", "value"),
+    "text, settings, part, key, value",
     [
         ("[valve]\nstroke = 0.0", {"valve__stroke": "3e-5"}, "valve", "stroke", 3e-5),  # it mends
         ("", {"layout__pitch": "4 mm"}, "layout", "pitch", 4e-3),  # without quotes
@@ -202,7 +204,7 @@ def test_a_setting_is_a_value_of_the_scene(tmp_path, text, settings, part, key, 
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    "text, said",
     [
         ("[valve\nstroke = 1", "my.toml, line 1: Expected ']' at the end of a table declaration."),
         ("a = 1\nb 2\n", "my.toml, line 2: Expected '=' after a key in a key/value pair."),
@@ -211,18 +213,18 @@ def test_a_setting_is_a_value_of_the_scene(tmp_path, text, settings, part, key, 
         ("a = " + "[" * 100_000, "my.toml: lists or tables are nested too deeply."),
     ],
 )
-def test_text_that_is_no_toml_is_told_with_its_line(tmp_path: Path, text: str, said: str) -> None:
+def test_text_that_is_no_toml_is_told_with_its_line(tmp_path, text, said):
     assert refused_file(tmp_path, text) == said
 
 
-def test_a_file_that_is_no_text_is_refused(tmp_path: Path) -> None:
+def test_a_file_that_is_no_text_is_refused(tmp_path):
     path = tmp_path / "my.toml"
     path.write_bytes(b"name = '\xff'")
     with pytest.raises(SceneError, match=r"my\.toml must be UTF-8 text \(byte 8 is not\)\."):
         load(path)
 
 
-def test_a_sample_is_found_although_a_run_of_it_lies_here_which_stands_for_its_scene(here: Path) -> None:
+def test_a_sample_is_found_although_a_run_of_it_lies_here_which_stands_for_its_scene(here):
     (here / "tap").mkdir()
     (here / "tap" / "scene.toml").touch()
     assert find("tap") == SAMPLES / "tap.toml"
@@ -230,12 +232,12 @@ def test_a_sample_is_found_although_a_run_of_it_lies_here_which_stands_for_its_s
 
 
 @pytest.mark.parametrize("word", ["nowhere.toml", "a\0b", 300 * "a", "", 300 * "a" + "/b"])
-def test_a_word_no_file_can_be_called_is_told_as_any_other(word: str) -> None:
+def test_a_word_no_file_can_be_called_is_told_as_any_other(word):
     with pytest.raises(SceneError, match=r"neither a file nor a sample|there is no such file"):
         find(word)
 
 
-def test_every_sample_is_a_scene_called_like_its_file_and_a_misspelt_one_is_told_with_all_names() -> None:
+def test_every_sample_is_a_scene_called_like_its_file_and_a_misspelt_one_is_told_with_all_names():
     assert [name for name in list_samples() if load(find(name)).name != name] == []
     names = ", ".join(list_samples())
     with pytest.raises(SceneError) as caught:

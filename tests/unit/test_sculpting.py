@@ -17,7 +17,7 @@ from tests.hand import SCENE, SIZES, Hand, heights, pose, started
 pytestmark = pytest.mark.usefixtures("quick_machine")
 
 
-def test_a_paused_session_goes_on_without_catching_up_and_gestures_kept_do_not_grow() -> None:
+def test_a_paused_session_goes_on_without_catching_up_and_gestures_kept_do_not_grow():
     hand = Hand()
     session = replace(hand.move(started(), [(0.0, 39.0)] * 5), paused=True)
     before = session.state.period
@@ -33,7 +33,7 @@ def test_a_paused_session_goes_on_without_catching_up_and_gestures_kept_do_not_g
 
 
 @pytest.mark.parametrize("off", [0.0, 1e-6])
-def test_what_was_taken_back_within_a_press_counts_again_when_the_finger_moves(off: float) -> None:
+def test_what_was_taken_back_within_a_press_counts_again_when_the_finger_moves(off):
     hand = Hand()
     session = hand.move(started(), [(0.0, z) for z in np.linspace(46, 38, 20)] + [(0.0, 38.0)] * 30)
     first = heights(session)
@@ -51,7 +51,7 @@ def test_what_was_taken_back_within_a_press_counts_again_when_the_finger_moves(o
     assert (heights(back) == 40e-3).all()
 
 
-def test_undo_brings_back_the_state_it_finds_bit_for_bit() -> None:
+def test_undo_brings_back_the_state_it_finds_bit_for_bit():
     hand = Hand()
     session = hand.press(started())
     kept = session.snapshot
@@ -64,7 +64,7 @@ def test_undo_brings_back_the_state_it_finds_bit_for_bit() -> None:
     assert (heights(sculpting.restore(session, None, pose())) == 40e-3).all()
 
 
-def test_changed_parts_keep_the_heights_and_say_so_and_a_changed_gain_takes_effect() -> None:
+def test_changed_parts_keep_the_heights_and_say_so_and_a_changed_gain_takes_effect():
     session = Hand().press(started())
     other = resolve({"layout": SIZES, "control": {"method": "plastic"}})
     later, said = sculpting.begin_session(8, "Copy", other, pose(), session.snapshot)
@@ -79,7 +79,7 @@ def test_changed_parts_keep_the_heights_and_say_so_and_a_changed_gain_takes_effe
     assert hand.move(later, [(0.0, 38.0)] * 30).trace.set_point[-1] == 0.8
 
 
-def test_a_session_takes_no_more_memory_the_longer_it_lasts() -> None:
+def test_a_session_takes_no_more_memory_the_longer_it_lasts():
     hand, session = Hand(), started()
     circle = [(5.0 * np.cos(turn), 38.0) for turn in np.linspace(0.0, 6.0, 30)]
     session = hand.move(session, [*circle * 11])  # longer than the trace's ten seconds, so that it is full
@@ -100,7 +100,7 @@ def test_a_session_takes_no_more_memory_the_longer_it_lasts() -> None:
     assert floors[-1] - floors[0] < 100_000
 
 
-def test_a_step_too_long_to_halve_has_no_estimate_and_parts_that_do_not_go_together_are_refused() -> None:
+def test_a_step_too_long_to_halve_has_no_estimate_and_parts_that_do_not_go_together_are_refused():
     table = {"simulation": {"control_period": "1 s"}, "layout": SIZES, "control": "absent"}
     session, _ = sculpting.begin_session(7, "Bed", resolve(table), pose())
     session = sculpting.advance(session, pose(), 0.0, 9)
@@ -125,7 +125,7 @@ def plays(session: Running) -> bool:
     return snapshot.dump(session.system, again) == session.snapshot
 
 
-def test_a_recording_gives_the_session_again_bit_for_bit_and_undo_shortens_it() -> None:
+def test_a_recording_gives_the_session_again_bit_for_bit_and_undo_shortens_it():
     hand = Hand()
     session = sculpting.set_recording(hand.press(started(), -6.0), True)
     session = hand.press(session)
@@ -140,7 +140,7 @@ def test_a_recording_gives_the_session_again_bit_for_bit_and_undo_shortens_it() 
     assert plays(session)
 
 
-def test_redo_to_what_a_recording_did_not_lead_to_ends_it() -> None:
+def test_redo_to_what_a_recording_did_not_lead_to_ends_it():
     hand = Hand()
     session = sculpting.set_recording(started(), True)
     early = hand.press(session)
@@ -151,7 +151,7 @@ def test_redo_to_what_a_recording_did_not_lead_to_ends_it() -> None:
     assert sculpting.restore(session, *there).recording is None
 
 
-def test_a_long_recording_copies_itself_seldom() -> None:
+def test_a_long_recording_copies_itself_seldom():
     session = sculpting.set_recording(started(), True)
     keep, arrays = session.recording, set()
     assert keep is not None
@@ -162,7 +162,7 @@ def test_a_long_recording_copies_itself_seldom() -> None:
     assert len(arrays) < 12
 
 
-def test_a_recording_ends_with_what_began_before_it_a_gesture_or_a_reset_that_is_rewound() -> None:
+def test_a_recording_ends_with_what_began_before_it_a_gesture_or_a_reset_that_is_rewound():
     hand = Hand()
     begun = hand.press(started())
     session = hand.press(sculpting.set_recording(begun, True), 6.0)
@@ -176,7 +176,7 @@ def test_a_recording_ends_with_what_began_before_it_a_gesture_or_a_reset_that_is
     assert session.recording is None
 
 
-def test_fingertips_keep_their_poses_by_number_and_far_below_the_floor_do_no_harm() -> None:
+def test_fingertips_keep_their_poses_by_number_and_far_below_the_floor_do_no_harm():
     had, others = np.arange(14.0).reshape(2, 7), -np.ones((3, 7))
     matched = sculpting.match_poses(had, (2, 5), others, (1, 5, 2))
     np.testing.assert_array_equal(matched, [others[0], had[1], had[0]])

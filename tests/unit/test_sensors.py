@@ -62,13 +62,13 @@ def field(seed: int = 3) -> tuple[Floats, Floats]:
 
 
 # Variance of the mean of n powers of a normal number: 1, 2, 15 and 105 - 9, over n.
-@pytest.mark.parametrize(("moment", "normal", "variance"), [(1, 0, 1), (2, 1, 2), (3, 0, 15), (4, 3, 96)])
-def test_noise_has_the_moments_of_a_normal_distribution(moment: int, normal: float, variance: float) -> None:
+@pytest.mark.parametrize("moment, normal, variance", [(1, 0, 1), (2, 1, 2), (3, 0, 15), (4, 3, 96)])
+def test_noise_has_the_moments_of_a_normal_distribution(moment, normal, variance):
     off = [abs((one**moment).mean() - normal) for one in field()]
     assert max(off) < SURE * np.sqrt(variance / COUNT)
 
 
-def test_noise_of_other_cells_periods_quantities_and_seeds_is_independent() -> None:
+def test_noise_of_other_cells_periods_quantities_and_seeds_is_independent():
     force, height = field()
     some, (every, _) = np.array([7, 400, 3]), field()
     np.testing.assert_array_equal(draw_normals(3, 9, some)[0], every[9, some])
@@ -81,7 +81,7 @@ def test_noise_of_other_cells_periods_quantities_and_seeds_is_independent() -> N
 
 
 @pytest.mark.parametrize("seed", [8, np.array([8, 3])])
-def test_noise_drawn_ahead_is_that_of_its_period_and_cells_in_any_order(seed: Any) -> None:
+def test_noise_drawn_ahead_is_that_of_its_period_and_cells_in_any_order(seed):
     shape = np.shape(seed)
     drawn = NoiseAhead(seed, 1.0, 1.0)
     some = [2, 7]
@@ -92,7 +92,7 @@ def test_noise_drawn_ahead_is_that_of_its_period_and_cells_in_any_order(seed: An
         np.testing.assert_array_equal(drawn.draw(period, numbers), draw_normals(seed, period, numbers))
 
 
-def test_noise_is_added_in_proportion_to_its_standard_deviation() -> None:
+def test_noise_is_added_in_proportion_to_its_standard_deviation():
     sensors, seen = Noisy(PerfectSensors(), 2e-3, 5e-6, 8), show([0.1, 0.2], [0.04, 0.05])
     first, second = draw_normals(8, 4, seen.cells)
     force, height = sensors.measure(seen, 4)
@@ -101,7 +101,7 @@ def test_noise_is_added_in_proportion_to_its_standard_deviation() -> None:
     assert Noisy(PerfectSensors(), 2e-3, 0.0, 8).measure(seen, 4)[1] is seen.height
 
 
-def test_readings_noise_and_all_are_the_nearest_whole_steps_and_a_step_of_zero_rounds_nothing() -> None:
+def test_readings_noise_and_all_are_the_nearest_whole_steps_and_a_step_of_zero_rounds_nothing():
     seen = show([0.3, 0.4, 0.12], [0.3, 0.0, 1.0])
     force, height = Quantized(PerfectSensors(), 0.25, 0.125).measure(seen, 0)
     # Steps that are powers of two: not even a rounding error is allowed.
@@ -115,7 +115,7 @@ def test_readings_noise_and_all_are_the_nearest_whole_steps_and_a_step_of_zero_r
 
 
 @pytest.mark.parametrize("step", [0.0, 1.0, 4.0, 7.5])
-def test_no_force_reads_above_the_floor_of_five_standard_deviations_and_half_a_step(step: float) -> None:
+def test_no_force_reads_above_the_floor_of_five_standard_deviations_and_half_a_step(step):
     floor = Sensing(force_noise=1.0, force_step=step).force_floor
     assert (floor, Sensing(force_step=step).force_floor) == (pytest.approx(5.0 + step / 2, abs=1e-12), 0.0)
     sensors = Quantized(Noisy(PerfectSensors(), 1.0, 0.0, 5), step, 0.0)
@@ -142,7 +142,7 @@ RAMP = [(0.1 * i, 40e-3 + 1e-3 * i) for i in range(9)]
 
 
 @pytest.mark.parametrize("late", [1, 2, 4, 5])
-def test_readings_are_late_by_whole_periods_and_begin_with_that_of_the_start(late: int) -> None:
+def test_readings_are_late_by_whole_periods_and_begin_with_that_of_the_start(late):
     read = readings(Delayed(PerfectSensors(), late, 40e-3), RAMP)
     assert read.tolist() == [[0.0, 40e-3]] * late + [list(true) for true in RAMP[:-late]]
 
@@ -161,7 +161,7 @@ def test_a_cell_that_took_no_part_while_nothing_changed_is_read_as_if_it_had(lat
 ALL = ("sensors.force_noise=0.5 mN", "sensors.height_noise=5 um", "sensors.delay=1")
 
 
-def test_seed_and_coarse_sensors_make_the_session_also_one_taken_up_again_in_the_middle() -> None:
+def test_seed_and_coarse_sensors_make_the_session_also_one_taken_up_again_in_the_middle():
     noisy, other = (sample("slow_press", *ALL, f"sensors.seed={seed}") for seed in (0, 1))
     path = noisy.section("trajectory").trajectory()
     first, second = (record(assemble(one), path, 200) for one in (noisy, other))
@@ -244,7 +244,7 @@ PRESSED = slice(30, 68)  # the finger has caught up with the pin, which falls fr
 
 
 @pytest.mark.parametrize("sections", LINES)
-def test_the_force_on_a_pressed_moving_pin_is_found_to_three_millinewtons(sections: dict[str, Any]) -> None:
+def test_the_force_on_a_pressed_moving_pin_is_found_to_three_millinewtons(sections):
     true, read = watched(scene(**sections), down_and_up)
     # At the default step too: the mean of a period is read whatever it is cut into.
     _, coarse = watched(scene(**sections, simulation={}), down_and_up)
@@ -255,7 +255,7 @@ def test_the_force_on_a_pressed_moving_pin_is_found_to_three_millinewtons(sectio
     assert np.abs(np.array([read, coarse]) - half_way(true))[:, known].max() < 3e-3
 
 
-def test_the_force_is_found_where_the_flow_is_turbulent() -> None:
+def test_the_force_is_found_where_the_flow_is_turbulent():
     known = scene(FALL, **NARROW)
     true, read = watched(known, pulled_down, 75)
     assert assemble(known).cell.flow.knee / 0.8**2 < 0.5e5, "the flow is laminar"
@@ -269,7 +269,7 @@ def test_the_force_is_found_where_the_flow_is_turbulent() -> None:
 
 
 @pytest.mark.parametrize(
-    ("inexact", "most"),
+    "inexact, most",
     # The simulation averages the flow over 1 ms steps, the observer over the period: 18 µN between them.
     [({}, 5e-5), ({"height_noise": 1e-6}, 0.0), ({"height_step": 5e-6}, 0.0)],
 )
@@ -280,7 +280,7 @@ def test_an_unloaded_pin_reads_no_force_and_no_reading_is_below_zero(inexact, mo
     assert read.min() == 0.0 < read.max()
 
 
-def test_the_last_estimate_is_held_while_the_valve_is_shut_at_a_stop_or_of_a_bed_at_rest() -> None:
+def test_the_last_estimate_is_held_while_the_valve_is_shut_at_a_stop_or_of_a_bed_at_rest():
     true, read = watched(scene(), lambda period: 0.5 if period < 60 else 0.0)
     # Five time constants of the valve, and the dead time, after period 60 it is shut.
     assert true[-1] - true[64] > 0.05, "the force does not change"
@@ -303,7 +303,7 @@ def loading(flow: float, opening: float) -> float:
     return cell.actuator.area**2 * flow / (PERIOD * conductance)
 
 
-def test_coarse_late_or_noisy_heights_cost_the_observer_what_the_flow_says() -> None:
+def test_coarse_late_or_noisy_heights_cost_the_observer_what_the_flow_says():
     def read(**inexact: float) -> Floats:
         return watched(scene(sensors={"observer": "valve", **inexact}), down_and_up)[1]
 

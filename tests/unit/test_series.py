@@ -7,7 +7,6 @@ import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
 import pytest
 from digiclay.cli import main
@@ -64,7 +63,7 @@ def test_scenes_with_any_signs_in_their_names_are_jobs_with_safe_names_of_their_
 @example("LPT²")
 @example("ü" * 200)
 @example("\ud800")
-def test_any_text_makes_a_name_that_every_file_system_takes(text: str) -> None:
+def test_any_text_makes_a_name_that_every_file_system_takes(text):
     name = run_folder.make_safe_name(text)
     assert 0 < len(name.encode()) <= run_folder.LONGEST + 1  # a device's name gets one letter more
     assert not set(name) & set('/\\:*?"<>|\0 ')
@@ -78,7 +77,7 @@ def test_any_text_makes_a_name_that_every_file_system_takes(text: str) -> None:
     st.lists(st.sampled_from(["a", "A", "a-2", "a-2-2", "ä", "a\u0308", "a b", "a_b", ".", "a.", "x" * 300]))
 )
 @example(["x" * 300 + end for end in ("a", "b", "b")])
-def test_no_two_names_are_alike_and_a_name_of_its_own_is_kept(texts: list[str]) -> None:
+def test_no_two_names_are_alike_and_a_name_of_its_own_is_kept(texts):
     names = run_folder.make_unique_names(texts)
     assert len({run_folder.fold_name(name) for name in names}) == len(texts)
     assert max([0, *map(len, names)]) <= run_folder.LONGEST
@@ -114,7 +113,7 @@ def jobs_file(said: str) -> Path:
 
 
 @pytest.mark.parametrize("folder", ["jobs", "runs", "logs", "runs/my"])
-def test_a_link_that_leads_out_of_the_batchs_folder_is_refused(folder: str, here: Path, refused: Any) -> None:
+def test_a_link_that_leads_out_of_the_batchs_folder_is_refused(folder, here, refused):
     (here / "away").mkdir()
     assert main(["batch", str(jobs_file('scenes = ["my.toml"]')), "--out", "o", "--prepare", "--quiet"]) == 0
     link = here / "o" / folder
@@ -137,7 +136,7 @@ def test_a_link_in_a_sweeps_folder_is_refused_and_a_link_to_the_folder_is_not(he
     assert list((here / "else").iterdir()) == []
 
 
-def test_a_run_of_which_something_is_missing_or_cut_off_is_not_done() -> None:
+def test_a_run_of_which_something_is_missing_or_cut_off_is_not_done():
     made = read_jobs(jobs_file(f'scenes = ["my.toml"]\n{QUICK}'))
     (job,) = made.jobs
     assert main(["batch", "jobs.toml", "--out", "o", "--prepare", "--quiet"]) == 0
@@ -160,7 +159,7 @@ def test_a_run_of_which_something_is_missing_or_cut_off_is_not_done() -> None:
 
 
 @pytest.mark.parametrize("word", [".", "../work", "scene.toml"])
-def test_a_run_of_a_folder_by_an_odd_path_has_the_folders_name(word: str) -> None:
+def test_a_run_of_a_folder_by_an_odd_path_has_the_folders_name(word):
     shutil.copy("my.toml", "scene.toml")
     assert main(["run", word, "--quiet", "--no-errors"]) == 0
     assert Path("work/metrics.json").is_file()
@@ -220,7 +219,7 @@ def test_a_description_that_cannot_be_read_counts_as_none_where_nothing_is_done(
     assert [path.name for path in (here / "o").iterdir() if path.name.startswith(".")] == []
 
 
-def test_a_sweep_of_which_points_are_done_is_not_begun_anew(here: Path, refused: Any) -> None:
+def test_a_sweep_of_which_points_are_done_is_not_begun_anew(here, refused):
     assert main(SWEEP) == 0
     (here / "o" / "sweep.json").write_text("", encoding="utf-8")
     refused(SWEEP, "its sweep.json cannot be read")
@@ -229,7 +228,7 @@ def test_a_sweep_of_which_points_are_done_is_not_begun_anew(here: Path, refused:
 
 
 @pytest.mark.parametrize("stranger", ["letter.txt", "points/letter.txt", "sub/", ".git/"])
-def test_a_folder_with_other_things_is_left_alone(stranger: str, here: Path, refused: Any) -> None:
+def test_a_folder_with_other_things_is_left_alone(stranger, here, refused):
     path = here / "o" / stranger
     (path if stranger.endswith("/") else path.parent).mkdir(parents=True)
     if not stranger.endswith("/"):
@@ -239,7 +238,7 @@ def test_a_folder_with_other_things_is_left_alone(stranger: str, here: Path, ref
     assert sorted((here / "o").rglob("*")) == before
 
 
-def test_what_a_killed_process_left_in_a_series_is_taken_away(here: Path) -> None:
+def test_what_a_killed_process_left_in_a_series_is_taken_away(here):
     folder = here / "o"
     with open_series(folder, KIND, {"a": 1}):
         pass
@@ -258,7 +257,7 @@ def test_what_a_killed_process_left_in_a_series_is_taken_away(here: Path) -> Non
     assert not (folder / ".lock").exists()
 
 
-def test_another_series_and_what_is_no_folder_are_refused(here: Path) -> None:
+def test_another_series_and_what_is_no_folder_are_refused(here):
     def refuse(there: object) -> None:
         raise OutputError(f"found {there}")
 

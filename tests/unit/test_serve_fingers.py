@@ -33,7 +33,7 @@ def osc(address: str, *values: Any) -> bytes:
     return bytes(builder.build().dgram)
 
 
-def test_poses_are_the_same_in_all_formats() -> None:
+def test_poses_are_the_same_in_all_formats():
     wanted = Poses(((7, (*PLACE, *LEVEL)), (3, (0.0, 0.0, 0.04, 0.0, 0.0, 0.0, 1.0))), (7, 3), 9)
     fingers = [
         {"id": 7, "position": list(PLACE)},
@@ -60,8 +60,8 @@ BAD: list[tuple[str, list[tuple[Any, list[Any]]], str]] = [
 ]
 
 
-@pytest.mark.parametrize(("wrong", "message"), [row[1:] for row in BAD], ids=[row[0] for row in BAD])
-def test_a_wrong_finger_is_told_and_the_others_go_on(wrong: list[Any], message: str) -> None:
+@pytest.mark.parametrize("wrong, message", [row[1:] for row in BAD], ids=[row[0] for row in BAD])
+def test_a_wrong_finger_is_told_and_the_others_go_on(wrong, message):
     read = check_fingers([(1, [*PLACE]), *wrong, (3, [*PLACE])], None, 5)
     assert [identity for identity, _ in read.fingers] == [1, 3]
     assert message in read.fault
@@ -70,7 +70,7 @@ def test_a_wrong_finger_is_told_and_the_others_go_on(wrong: list[Any], message: 
 
 
 @pytest.mark.parametrize(
-    ("said", "message"),
+    "said, message",
     [
         ({}, "fingers must be a list"),
         ({"fingers": 3}, "fingers must be a list"),
@@ -81,7 +81,7 @@ def test_a_wrong_finger_is_told_and_the_others_go_on(wrong: list[Any], message: 
         ({"fingers": [], "position": [0, 0, 0]}, "no other keys"),
     ],
 )
-def test_a_message_that_is_none_is_refused_in_one_line(said: dict[str, Any], message: str) -> None:
+def test_a_message_that_is_none_is_refused_in_one_line(said, message):
     with pytest.raises(ParameterError, match=message) as caught:
         read_json(json.dumps({"type": "poses", **said}))
     assert "\n" not in str(caught.value)
@@ -93,7 +93,7 @@ def poses(*identities: int, alive: tuple[int, ...] = (), **given: Any) -> Poses:
     return Poses(fingers, alive or identities, **given)
 
 
-def test_the_first_that_appear_have_the_fingertips_and_33_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_first_that_appear_have_the_fingertips_and_33_are_told(monkeypatch):
     import asyncio
 
     for fingers, identities, held in ((2, (5, 4, 3), [5, 4]), (32, tuple(range(33)), list(range(32)))):
@@ -111,7 +111,7 @@ def test_the_first_that_appear_have_the_fingertips_and_33_are_told(monkeypatch: 
         assert [identity for identity, _ in seen.fingers] == held
 
 
-def test_an_order_keeps_what_is_alive_and_its_bytes_are_read_as_they_were_written() -> None:
+def test_an_order_keeps_what_is_alive_and_its_bytes_are_read_as_they_were_written():
     order, _ = Order().name(poses(1, 2), 2)
     order, more = order.name(poses(3, alive=(2, 3), number=2**32 - 1), 2)
     assert ([one for one, _ in order.fingers], more, order.named) == ([2, 3], 0, 2)
@@ -141,7 +141,7 @@ def tips(*packets: bytes) -> np.ndarray:
     return np.array(list(hands.fingers(1.0).values()))
 
 
-def test_fingertips_of_a_quest_are_in_axes_of_the_bed_whatever_the_place_in_the_room() -> None:
+def test_fingertips_of_a_quest_are_in_axes_of_the_bed_whatever_the_place_in_the_room():
     found = tips(lines())
     np.testing.assert_allclose(found[:, :2].mean(0), 0.0, atol=1e-12)
     assert found[:, 2].min() == pytest.approx(0.06)
@@ -157,14 +157,14 @@ def test_fingertips_of_a_quest_are_in_axes_of_the_bed_whatever_the_place_in_the_
     assert list(Hands(0.04).take(lines(meta=" | f = 12 | t = 123456"), 1.0).fingers(1.0)) == [5, 6, 7, 8, 9]
 
 
-def test_the_left_hand_is_the_mirrored_right_one() -> None:
+def test_the_left_hand_is_the_mirrored_right_one():
     x, y, z, a, b, c, w = (float(word) for word in WRIST.split(","))
     mirrored = lines("Left", ", ".join(map(str, (-x, y, z, a, -b, -c, w))), JOINTS * [-1.0, 1.0, 1.0])
     np.testing.assert_allclose(tips(mirrored), tips(lines()) * [-1.0, 1.0, 1.0], atol=1e-12)
     assert list(Hands(0.04).take(mirrored, 1.0).take(lines(), 1.0).fingers(1.0)) == list(range(10))
 
 
-def test_a_hand_is_gone_after_50_ms_and_after_a_second_begins_over_the_middle_again() -> None:
+def test_a_hand_is_gone_after_50_ms_and_after_a_second_begins_over_the_middle_again():
     hands = Hands(0.04).take(lines(), 1.0)
     assert len(hands.fingers(1.04)) == 5
     assert hands.fingers(1.06) == {}
@@ -177,7 +177,7 @@ def test_a_hand_is_gone_after_50_ms_and_after_a_second_begins_over_the_middle_ag
     assert np.mean([tip[0] for tip in late.values()]) == pytest.approx(0.0, abs=1e-12)
 
 
-@pytest.mark.parametrize(("pause", "seen"), [(0.0, 5), (0.9, 5), (1.1, 0), (60.0, 0), (1e5, 0)])
+@pytest.mark.parametrize("pause, seen", [(0.0, 5), (0.9, 5), (1.1, 0), (60.0, 0), (1e5, 0)])
 def test_joints_are_put_on_a_wrist_of_a_second_ago_but_of_none_from_before_a_pause(pause, seen):
     hands = Hands(0.04).take(lines(), 1.0).take(lines().split(b"\n")[1], 1.0 + pause)
     assert len(hands.fingers(1.0 + pause)) == seen
@@ -188,7 +188,7 @@ def test_joints_are_put_on_a_wrist_of_a_second_ago_but_of_none_from_before_a_pau
 
 
 @pytest.mark.parametrize(
-    ("packet", "message"),
+    "packet, message",
     [
         (b"Right wrist:, 0,2502, 1,0635, 0,2540, 0,194, -0,116, 0,094, -0,970", "decimal points"),
         (b"Right wrist:, nan, 1, 1, 0, 0, 0, 1", "must be 7 numbers"),
@@ -199,13 +199,13 @@ def test_joints_are_put_on_a_wrist_of_a_second_ago_but_of_none_from_before_a_pau
         (b"Left landmarks:, 1, 2, 3", "must be 63 numbers"),
     ],
 )
-def test_a_hostile_line_is_refused_in_one_line(packet: bytes, message: str) -> None:
+def test_a_hostile_line_is_refused_in_one_line(packet, message):
     with pytest.raises(ParameterError, match=message) as caught:
         Hands(0.04).take(packet, 1.0)
     assert "\n" not in str(caught.value)
 
 
-def test_other_lines_are_passed_over_and_a_hand_that_is_not_turned_at_all_does_no_harm() -> None:
+def test_other_lines_are_passed_over_and_a_hand_that_is_not_turned_at_all_does_no_harm():
     others = [
         b"",
         b"\xff\xfe",
@@ -255,7 +255,7 @@ def point(*fingers: tuple[int, float, float, float]) -> bytes:
 PAD = Pad(0.04, 0.08, 0.01)
 
 
-def test_a_pads_corners_are_the_beds_and_pressure_is_depth() -> None:
+def test_a_pads_corners_are_the_beds_and_pressure_is_depth():
     old = PAD.take(touch((4, 0.0, 0.0), (5, 1.0, 0.25)), 1.0).fingers(1.0)
     assert {one: tip.tolist() for one, tip in old.items()} == {
         4: pytest.approx([-0.04, 0.04, 0.035]),
@@ -275,7 +275,7 @@ def test_a_pads_corners_are_the_beds_and_pressure_is_depth() -> None:
     assert beyond[2**32 - 1].tolist() == [0.04, 0.04, 0.035]  # it stays on the bed
 
 
-def test_a_contact_that_rests_stays_and_ends_with_the_list_of_those_alive() -> None:
+def test_a_contact_that_rests_stays_and_ends_with_the_list_of_those_alive():
     pad = PAD.take(touch((4, 0.5, 0.5), (5, 0.6, 0.5)), 1.0)
     pad = pad.take(bundle(osc("/tuio/2Dcur", "alive", 5)), 1.5)
     assert list(pad.fingers(1.6)) == [5]
@@ -292,13 +292,13 @@ def test_a_contact_that_rests_stays_and_ends_with_the_list_of_those_alive() -> N
         bundle(*[osc("/tuio/2Dcur", "set", one, 0.5, 0.5) for one in range(300)]),
     ],
 )  # fmt: skip
-def test_a_datagram_that_is_none_is_refused_and_changes_nothing(data: bytes) -> None:
+def test_a_datagram_that_is_none_is_refused_and_changes_nothing(data):
     with pytest.raises(ParameterError, match=r"must be TUIO"):
         PAD.take(data, 1.0)
 
 
 @pytest.mark.parametrize(
-    ("words", "message"),
+    "words, message",
     [
         ("--token short", "--token must have 8 to 128"),
         ("", "needs the token of the server"),
@@ -326,7 +326,7 @@ GOES_BACK = "line 3: a time must be finite and not before that of the line above
 
 
 @pytest.mark.parametrize(
-    ("times", "said"),
+    "times, said",
     [
         (["1", "2", "3"], ""),
         (["1", "1", "1"], ""),

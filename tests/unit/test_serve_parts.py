@@ -2,9 +2,8 @@
 
 import socket
 from dataclasses import replace
-from pathlib import Path
 from time import thread_time
-from typing import Any, cast
+from typing import cast
 
 import numpy as np
 import pytest
@@ -54,7 +53,7 @@ STILL = resolve({**SMALL, "trajectory": WAIT})
 DOWN = np.array([[0.0, 0.0, 0.038, 1.0, 0.0, 0.0, 0.0]])
 
 
-def test_a_period_is_due_from_its_beginning_once_and_the_oldest_late_ones_are_left_out() -> None:
+def test_a_period_is_due_from_its_beginning_once_and_the_oldest_late_ones_are_left_out():
     schedule, counts = Schedule(10.0, PERIOD, 5), []
     for now in (9.9995, 10.0, 10.0004, 10.001, 10.0035):
         counts.append(schedule.take_due(now)[0])
@@ -118,7 +117,7 @@ LONG = 0.1
 
 
 @pytest.mark.parametrize("restless", [True, False])
-def test_a_new_pose_begins_its_period_early_by_one(restless: bool, clock: Clock) -> None:
+def test_a_new_pose_begins_its_period_early_by_one(restless, clock):
     session = begin_session(resolve({**SMALL, "trajectory": WAIT, "simulation": {"control_period": LONG}}))
     doors = Asked(clock, restless=restless)
     _, figures = run_session(session, cast(Doors, doors), None, 1.0, doors.stopped, print)
@@ -132,9 +131,7 @@ def test_a_new_pose_begins_its_period_early_by_one(restless: bool, clock: Clock)
     assert figures["elapsed"]["p50"] > 0.0
 
 
-def test_each_take_has_its_simulated_time_and_errors_or_why_there_are_none(
-    clock: Clock, tmp_path: Path
-) -> None:
+def test_each_take_has_its_simulated_time_and_errors_or_why_there_are_none(clock, tmp_path):
     doors, session = Asked(clock, restless=False), begin_session(STILL)
     with PartWriter(tmp_path / "out") as writer:
         run_session(session, cast(Doors, doors), writer, 1.0, doors.stopped, print)
@@ -143,7 +140,7 @@ def test_each_take_has_its_simulated_time_and_errors_or_why_there_are_none(
     assert writer.efforts == {1: {"simulated": simulated, "errors_absent": "not yet"}}
 
 
-def test_frames_and_report_have_the_errors_since_the_last_reset() -> None:
+def test_frames_and_report_have_the_errors_since_the_last_reset():
     session = begin_session(resolve({**SMALL, "trajectory": WAIT}))
     told = [make_frame(session).errors]
     for number in range(1, 120):
@@ -158,7 +155,7 @@ def test_frames_and_report_have_the_errors_since_the_last_reset() -> None:
     assert (make_frame(fresh).errors, fresh.monitor is None) == (None, False)
 
 
-def test_shares_of_times_are_those_of_the_sorted_times() -> None:
+def test_shares_of_times_are_those_of_the_sorted_times():
     times = np.random.default_rng(3).exponential(3e-4, 5000)
     counts = TimeCounts(1e-5)
     assert counts.find_share(0.5) == 0.0
@@ -183,9 +180,9 @@ def pressed(session: Session, count: int = 20) -> Session:
 
 
 @pytest.mark.parametrize(
-    ("most", "height", "flags"), [(2.0, 0.039, 4), (2.0, 0.03, 7), (500.0, 0.03, 7), (0.1, 0.039, 6)]
+    "most, height, flags", [(2.0, 0.039, 4), (2.0, 0.03, 7), (500.0, 0.03, 7), (0.1, 0.039, 6)]
 )
-def test_no_frame_has_more_force_than_the_ceiling(most: float, height: float, flags: int) -> None:
+def test_no_frame_has_more_force_than_the_ceiling(most, height, flags):
     session, seen = begin_session(STILL, replace(LIMITS, force=most)), 0
     for _ in range(30):
         session = follow(session, np.array([[0.0, 0.0, height, 1.0, 0.0, 0.0, 0.0]]), 3, 1)
@@ -198,8 +195,8 @@ def test_no_frame_has_more_force_than_the_ceiling(most: float, height: float, fl
 
 
 #: Time since a pose, s, and whether its fingertip lifts.
-@pytest.mark.parametrize(("silence", "lifts"), [(0.0, False), (0.29, False), (0.31, True), (1e6, True)])
-def test_the_fingertip_of_a_client_that_is_silent_lifts(silence: float, lifts: bool) -> None:
+@pytest.mark.parametrize("silence, lifts", [(0.0, False), (0.29, False), (0.31, True), (1e6, True)])
+def test_the_fingertip_of_a_client_that_is_silent_lifts(silence, lifts):
     session, order = begin_session(STILL, replace(LIMITS, silence=0.3)), Order(pose=tuple(DOWN[0]))
     assert lacks_pose(session, Order(), 0.0)  # none has come
     assert lacks_pose(session, order, silence) == lifts
@@ -212,7 +209,7 @@ def test_the_fingertip_of_a_client_that_is_silent_lifts(silence: float, lifts: b
     assert (session.state.finger_forces().sum() == 0.0) == lifts
 
 
-def test_the_ceiling_is_each_fingers() -> None:
+def test_the_ceiling_is_each_fingers():
     bed = resolve({**SMALL, "layout": {"rows": 7, "columns": 15}, "trajectory": WAIT})
     session = begin_session(replace(bed, fingers=3 * bed.fingers), replace(LIMITS, force=0.2))
     assert session.poses[:, 2].tolist() == [0.05, PARKED, PARKED]
@@ -231,14 +228,14 @@ def test_the_ceiling_is_each_fingers() -> None:
 
 
 @pytest.mark.parametrize(
-    ("place", "turn", "way", "count"),
+    "place, turn, way, count",
     [
         ([0.0, 0.0, 0.062], [1.0, 0.0, 0.0, 0.0], 0.012, 1),
         ([0.003, 0.004, 0.05], [1.0, 0.0, 0.0, 0.0], 0.005, 1),
         ([0.0, 0.0, 0.05], [0.0, 0.0, 0.0, 1.0], 0.02 * np.pi, 3),  # by 180°, of points 20 mm apart
     ],
 )
-def test_the_fingertip_has_a_largest_speed(place: Any, turn: Any, way: float, count: int) -> None:
+def test_the_fingertip_has_a_largest_speed(place, turn, way, count):
     session, turns, each = begin_session(STILL, Limits(speed=0.1)), 0, 0.1 * 5e-3 * count
     while turns == 0 or session.behind:
         before = session.poses[0, :3]
@@ -247,7 +244,7 @@ def test_the_fingertip_has_a_largest_speed(place: Any, turn: Any, way: float, co
     assert (session.poses[0].tolist(), turns) == (place + turn, np.ceil(way / each - 1e-9))
 
 
-def test_a_session_that_diverges_goes_back_and_does_not_go_there_again() -> None:
+def test_a_session_that_diverges_goes_back_and_does_not_go_there_again():
     words = {"simulation.stepper": "euler", "simulation.control_period": "0.05", "layout.rows": "11"}
     words |= {"simulation.physics_step": "0.05", "layout.columns": "11"}
     scene = load(find("slow_press"), [Setting(key, word) for key, word in words.items()])
@@ -275,7 +272,7 @@ def taken(session: Session) -> Take:
     return take
 
 
-def test_parts_of_a_take_are_joined_to_what_is_replayed_bit_for_bit(tmp_path: Path) -> None:
+def test_parts_of_a_take_are_joined_to_what_is_replayed_bit_for_bit(tmp_path):
     session = record(begin_session(STILL), 10)
     with PartWriter(tmp_path / "out") as writer:
         for _ in range(3):
@@ -297,7 +294,7 @@ def test_parts_of_a_take_are_joined_to_what_is_replayed_bit_for_bit(tmp_path: Pa
         join_parts([part, part])
 
 
-def test_a_disk_that_fails_ends_the_take_and_keeps_what_it_has(tmp_path: Path) -> None:
+def test_a_disk_that_fails_ends_the_take_and_keeps_what_it_has(tmp_path):
     take, blocked = taken(pressed(record(begin_session(STILL), 10), 3)), tmp_path / "take_001_part_00002.npz"
     with PartWriter(tmp_path) as writer:
         writer.put(take)
@@ -312,7 +309,7 @@ def test_a_disk_that_fails_ends_the_take_and_keeps_what_it_has(tmp_path: Path) -
     assert from_bytes(path.read_bytes()).periods == 3
 
 
-def test_the_first_part_replaces_the_takes_in_a_folder_and_nothing_else(tmp_path: Path) -> None:
+def test_the_first_part_replaces_the_takes_in_a_folder_and_nothing_else(tmp_path):
     held = ["mine.npz", "take_001_part_00007.npz", "take_004.npz"]
     for name in held:
         (tmp_path / name).write_text("old", encoding="utf-8")
@@ -327,7 +324,7 @@ def test_the_first_part_replaces_the_takes_in_a_folder_and_nothing_else(tmp_path
     assert sorted(path.name for path in tmp_path.iterdir()) == ["mine.npz", "take_001.npz"]
 
 
-def test_a_slot_gives_the_newest_value_once_and_none_that_is_being_written() -> None:
+def test_a_slot_gives_the_newest_value_once_and_none_that_is_being_written():
     slot, path = make_slot(16)
     other = open_slot(path)
     assert other.read() is None
@@ -349,7 +346,7 @@ def test_a_slot_gives_the_newest_value_once_and_none_that_is_being_written() -> 
         assert unpack_order(pack_order(order)) == order
 
 
-def test_a_token_comes_from_the_option_the_environment_or_chance(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_token_comes_from_the_option_the_environment_or_chance(monkeypatch):
     monkeypatch.delenv(VARIABLE, raising=False)
     first, made = choose_token(None)
     assert made
@@ -359,7 +356,7 @@ def test_a_token_comes_from_the_option_the_environment_or_chance(monkeypatch: py
     assert choose_token("from-the-option") == ("from-the-option", False)
 
 
-def test_only_the_same_token_is_the_right_one_and_one_that_is_none_is_refused_and_not_shown() -> None:
+def test_only_the_same_token_is_the_right_one_and_one_that_is_none_is_refused_and_not_shown():
     wrong = ("", "a-token-of-test", "a-token-of-testss", None, 7, b"a-token-of-tests", "\ud800")
     assert [is_token(one, "a-token-of-tests") for one in ("a-token-of-tests", *wrong)] == [True] + [False] * 7
     for token in ("", "short", "with a space", "x" * 129, "umlaut-ä-ä-ä"):
@@ -372,7 +369,7 @@ FEW_PINS = ["--set", "layout.rows=3", "--set", "layout.columns=3", "--set", "con
 
 
 @pytest.mark.parametrize(
-    ("words", "message"),
+    "words, message",
     [
         ("--rate 0", "must be from 1 to 1000 Hz"),
         ("--rate nan", "must be from 1 to 1000 Hz"),
@@ -397,12 +394,12 @@ FEW_PINS = ["--set", "layout.rows=3", "--set", "layout.columns=3", "--set", "con
         ("missing.toml", "missing.toml"),
     ],
 )
-def test_a_wrong_option_is_refused_in_one_line(words: str, message: str, here: Path, refused: Any) -> None:
+def test_a_wrong_option_is_refused_in_one_line(words, message, here, refused):
     refused(["serve", "--seconds", "0", *words.split()], message)
     assert left(here) == []
 
 
-def test_what_cannot_be_opened_is_told_in_a_line(here: Path, refused: Any) -> None:
+def test_what_cannot_be_opened_is_told_in_a_line(here, refused):
     with socket.create_server(("127.0.0.1", 0)) as other:
         port = str(other.getsockname()[1])
         command = ["serve", *FEW_PINS, "--osc-port", "0", "--port", port, "--out", "take"]
@@ -410,8 +407,8 @@ def test_what_cannot_be_opened_is_told_in_a_line(here: Path, refused: Any) -> No
     assert left(here) == []
 
 
-@pytest.mark.parametrize(("late", "share"), [(0, "0 %"), (1, "0.5 %"), (200, "100 %"), (199, "99.5 %")])
-def test_the_summary_gives_the_share_of_late_periods_in_plain_digits(late: int, share: str) -> None:
+@pytest.mark.parametrize("late, share", [(0, "0 %"), (1, "0.5 %"), (200, "100 %"), (199, "99.5 %")])
+def test_the_summary_gives_the_share_of_late_periods_in_plain_digits(late, share):
     shares = {"p50": 0.0, "p99": 0.0, "p99.9": 0.0, "longest": 0.0}
     figures = {"elapsed": shares, "period": 1e-3, "periods": 200, "missed": late, "left_out": 0}
     first = next(serve_command._summary({**figures, "counts": {}, "flagged": {}}))

@@ -37,7 +37,7 @@ def read_back(cells: Grid, formed: Formed, model: Model, path: Path, format: str
 
 @pytest.mark.parametrize("format", FORMATS)
 @pytest.mark.parametrize("arrangement", ARRANGEMENTS)
-def test_a_formed_bed_comes_back_cell_by_cell(tmp_path: Path, arrangement: str, format: str) -> None:
+def test_a_formed_bed_comes_back_cell_by_cell(tmp_path, arrangement, format):
     path = tmp_path / f"formed{find_suffix(format)}"
     for pitch, kind in zip(PITCHES, ("solid", "surface", "pins"), strict=True):
         cells, formed = bed(pitch, arrangement)
@@ -47,7 +47,7 @@ def test_a_formed_bed_comes_back_cell_by_cell(tmp_path: Path, arrangement: str, 
 
 
 @pytest.mark.parametrize("skin", ["smooth", "membrane"])
-def test_a_curved_skin_comes_back_at_its_pins(tmp_path: Path, skin: str) -> None:
+def test_a_curved_skin_comes_back_at_its_pins(tmp_path, skin):
     cells, formed = bed(2.3, "hexagonal")
     back = read_back(cells, formed, Model(kind="solid", skin=skin), tmp_path / "x.stl", "stl")
     assert back.covered == cells.count
@@ -55,7 +55,7 @@ def test_a_curved_skin_comes_back_at_its_pins(tmp_path: Path, skin: str) -> None
 
 
 @pytest.mark.parametrize(
-    ("up", "forward", "header"),
+    "up, forward, header",
     [
         ("y", "", None),
         ("z", "", None),
@@ -66,7 +66,7 @@ def test_a_curved_skin_comes_back_at_its_pins(tmp_path: Path, skin: str) -> None
         ("y", "", "# Blender 4.5"),  # whoever says nothing has Blender's axes
     ],
 )
-def test_an_obj_comes_back_from_any_axes(tmp_path: Path, up: str, forward: str, header: str | None) -> None:
+def test_an_obj_comes_back_from_any_axes(tmp_path, up, forward, header):
     cells, formed = bed(2.3, "staggered")
     path = write(make_bodies(formed, Model()), tmp_path / "x.obj", up=up, forward=forward)
     if header:
@@ -75,15 +75,15 @@ def test_an_obj_comes_back_from_any_axes(tmp_path: Path, up: str, forward: str, 
     assert np.abs(fit_relief(shape, read(shape), cells, Actuator()).heights - formed.height).max() < EXACT
 
 
-@pytest.mark.parametrize(("up", "forward"), [("z", "-z"), ("w", ""), ("y", "up")])
-def test_axes_that_make_no_sense_are_refused(tmp_path: Path, up: str, forward: str) -> None:
+@pytest.mark.parametrize("up, forward", [("z", "-z"), ("w", ""), ("y", "up")])
+def test_axes_that_make_no_sense_are_refused(tmp_path, up, forward):
     with pytest.raises(ParameterError, match=r"^Export\.(up|forward) must be "):
         write(make_bodies(bed(3.0, "aligned")[1], Model()), tmp_path / "x.obj", up=up, forward=forward)
     assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize("arrangement", ARRANGEMENTS)
-def test_a_rim_of_six_digits_still_covers_the_outer_pins(arrangement: str) -> None:
+def test_a_rim_of_six_digits_still_covers_the_outer_pins(arrangement):
     cells, formed = bed(2.3, arrangement)
     (body,) = make_bodies(formed, Model(kind="surface"))
     rounded = np.array([[float(f"{value * 1e3:.6g}") for value in row] for row in body.vertices])
@@ -100,7 +100,7 @@ NEEDLE = np.array([[-6.0, -3e-4, 1.0], [-6.0, 3e-4, 1.0], [-0.75, 0.0, 1.0]])
 
 
 @pytest.mark.parametrize(
-    ("corners", "faces", "covered"),
+    "corners, faces, covered",
     [(PLATE, [[0, 1, 2], [0, 2, 3]], INNER), (NEEDLE, [[0, 2, 1]], [10, 11])],
     ids=["not a hundredth of a pitch beside it", "not ahead of a needle's tip"],
 )

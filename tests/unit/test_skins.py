@@ -60,7 +60,7 @@ BROKEN = np.where(np.arange(18).reshape(9, 2) == 9, np.nan, pins(3, 3))
 
 
 @pytest.mark.parametrize(
-    ("place", "height", "shape", "said"),
+    "place, height, shape, said",
     [
         (BROKEN, np.full(9, 0.04), (3, 3), r"^Surface\.position must be finite \(got nan at cell 4\)\.$"),
         (pins(3, 3), np.full(8, 0.04), (3, 3), r"each of the 3 x 3 pins \(got 8 values at 9 positions\)\.$"),
@@ -265,7 +265,7 @@ def rough(instant: Instant) -> np.ndarray:
 @pytest.mark.parametrize("arrangement", ARRANGEMENTS)
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("parts", [2, 4])
-def test_the_skin_goes_through_the_top_of_every_pin(arrangement: str, kind: str, parts: int) -> None:
+def test_the_skin_goes_through_the_top_of_every_pin(arrangement, kind, parts):
     instant = at_rest(6, 7, arrangement)
     height = rough(instant)
     lattice = make_lattice(instant, parts)
@@ -278,7 +278,7 @@ def test_the_skin_goes_through_the_top_of_every_pin(arrangement: str, kind: str,
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_inside_the_bed_it_is_the_skin_of_the_exports(kind: str) -> None:
+def test_inside_the_bed_it_is_the_skin_of_the_exports(kind):
     instant, parts, margin = at_rest(9, 8), 4, 2
     height = rough(instant)
     shape = 8 * parts + 1 + 2 * margin, 7 * parts + 1 + 2 * margin
@@ -292,15 +292,15 @@ def test_inside_the_bed_it_is_the_skin_of_the_exports(kind: str) -> None:
     np.testing.assert_allclose(inside[cut, cut], known, rtol=0, atol=1e-12)
 
 
-@pytest.mark.parametrize(("rows", "columns"), [(1, 1), (1, 5), (5, 1), (2, 2)])
-def test_the_smallest_beds_have_a_skin_too(rows: int, columns: int) -> None:
+@pytest.mark.parametrize("rows, columns", [(1, 1), (1, 5), (5, 1), (2, 2)])
+def test_the_smallest_beds_have_a_skin_too(rows, columns):
     lattice = make_lattice(at_rest(rows, columns), 4)
     skin = interpolate(lattice, np.full(rows * columns, 0.04), "smooth")
     np.testing.assert_allclose(skin, np.where(lattice.sunk, 0.0, 0.04), rtol=0, atol=ROUNDING)
 
 
 @pytest.mark.parametrize("arrangement", ARRANGEMENTS)
-def test_the_faces_of_the_top_cover_the_bed_once_and_face_upwards(arrangement: str) -> None:
+def test_the_faces_of_the_top_cover_the_bed_once_and_face_upwards(arrangement):
     lattice = make_lattice(at_rest(4, 5, arrangement), 2)
     top = lattice.place[lattice.faces[~lattice.sunk[lattice.faces].any(axis=1)]]
     after = np.roll(top, -1, axis=1)
@@ -310,7 +310,7 @@ def test_the_faces_of_the_top_cover_the_bed_once_and_face_upwards(arrangement: s
 
 
 @pytest.mark.parametrize("count", [625, 10_000, 100_000])
-def test_a_skin_has_no_more_points_than_a_tick_has_time_for(count: int) -> None:
+def test_a_skin_has_no_more_points_than_a_tick_has_time_for(count):
     parts = choose_parts(count)
     assert parts**2 * count <= MOST_POINTS or parts == 1
     assert parts == 4 or (2 * parts) ** 2 * count > MOST_POINTS

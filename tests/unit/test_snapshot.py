@@ -52,11 +52,11 @@ SENSORS = {"sensors": {"delay": 3, "observer": "valve", "height_noise": "1 um"}}
 
 
 @pytest.mark.parametrize(
-    ("method", "tables"),
+    "method, tables",
     [*((method, {}) for method in METHODS), ("virtual_master", SENSORS), ("viscous", RISING)],
     ids=str,
 )
-def test_a_session_goes_on_from_a_kept_state_bit_for_bit(method: str, tables: dict[str, Any]) -> None:
+def test_a_session_goes_on_from_a_kept_state_bit_for_bit(method, tables):
     system = system_of(method, **tables)
     half = run(system, begin(system), 70)
     data = snapshot.dump(system, half)
@@ -76,7 +76,7 @@ def kept() -> tuple[System, bytes]:
 
 
 @pytest.mark.parametrize(
-    ("tables", "said"),
+    "tables, said",
     [
         ({"layout": {"rows": 9, "columns": 12}}, "number of cells"),
         ({"relaxation": "absent"}, "rows of a cell"),
@@ -85,7 +85,7 @@ def kept() -> tuple[System, bytes]:
         ({"control": {"method": "viscous"}}, "memory of the controller"),
     ],
 )
-def test_a_state_of_another_bed_is_refused(tables: dict[str, Any], said: str) -> None:
+def test_a_state_of_another_bed_is_refused(tables, said):
     _, data = kept()
     with pytest.raises(StateError, match=said):
         snapshot.load(assemble(resolve({"layout": SIZES, **tables})), data)
@@ -104,7 +104,7 @@ LONG = b"0" * 400
 
 
 @pytest.mark.parametrize(
-    ("old", "new"),
+    "old, new",
     [
         *((b'"cells": 99', b'"cells": ' + wrong) for wrong in (b"-99", b"1e99", b"99999999999999")),
         (b'"near": ', b'"near": 1'), (b'"peak": ', b'"peak": NaN, "p": '), (b'"memory"', b'"m"'),
@@ -119,7 +119,7 @@ LONG = b"0" * 400
         )),
     ],
 )  # fmt: skip
-def test_a_damaged_header_is_refused(old: bytes, new: bytes) -> None:
+def test_a_damaged_header_is_refused(old, new):
     system, data = kept()
     with pytest.raises(StateError):
         snapshot.load(system, header_replaced(data, old, new))
@@ -135,7 +135,7 @@ def kept_of_twelve() -> tuple[System, State, bytes]:
     return system, state, snapshot.dump(system, state)
 
 
-def test_fingertips_that_touch_nothing_take_next_to_no_room_and_nothing_is_lost() -> None:
+def test_fingertips_that_touch_nothing_take_next_to_no_room_and_nothing_is_lost():
     system, state, data = kept_of_twelve()
     assert len(data) < 0.25 * 2 * 99 * 8 * system.rows.count  # of what all their zeros would take
     taken_up = snapshot.load(system, data)
@@ -147,7 +147,7 @@ def test_fingertips_that_touch_nothing_take_next_to_no_room_and_nothing_is_lost(
 @pytest.mark.parametrize(
     "wrong", [b'"thin": [1', b'"thin": [-', b'"thin": 5, "t": [', b'"rows": [9999999999']
 )
-def test_another_number_of_what_is_not_zero_is_refused(wrong: bytes) -> None:
+def test_another_number_of_what_is_not_zero_is_refused(wrong):
     system, _, data = kept_of_twelve()
     with pytest.raises(StateError):
         snapshot.load(system, header_replaced(data, wrong[:8] + b"[", wrong))
@@ -163,8 +163,8 @@ IMPOSSIBLE += [
 ]
 
 
-@pytest.mark.parametrize(("name", "index", "value"), IMPOSSIBLE)
-def test_numbers_no_state_or_device_can_have_are_refused(name: str, index: Any, value: float) -> None:
+@pytest.mark.parametrize("name, index, value", IMPOSSIBLE)
+def test_numbers_no_state_or_device_can_have_are_refused(name, index, value):
     system, data = kept()
     state = snapshot.load(system, data)
     if isinstance(index, tuple) and index[1] == 1:
@@ -176,7 +176,7 @@ def test_numbers_no_state_or_device_can_have_are_refused(name: str, index: Any, 
         snapshot.load(system, snapshot.dump(system, state))
 
 
-def test_pins_at_their_ends_are_taken_up_and_a_memory_of_no_number_of_the_world_is_refused() -> None:
+def test_pins_at_their_ends_are_taken_up_and_a_memory_of_no_number_of_the_world_is_refused():
     system, data = kept()
     state = snapshot.load(system, data)
     state.rows[0, :2] = 0.0, system.cell.actuator.stroke
@@ -191,12 +191,12 @@ def test_pins_at_their_ends_are_taken_up_and_a_memory_of_no_number_of_the_world_
         snapshot.load(system, snapshot.dump(system, state))
 
 
-def test_heights_are_carried_over_to_other_parts_within_the_stroke() -> None:
+def test_heights_are_carried_over_to_other_parts_within_the_stroke():
     system, data = kept()
     before = snapshot.load(system, data).row(0)
     for tables in (
         {"control": {"method": "plastic"}}, {"relaxation": "absent"},
-        {"simulation": {"control_period": "10 ms"}},
+        {"simulation": {"control_period": "10 ms"}}
     ):  # fmt: skip
         other = assemble(resolve({"layout": SIZES, **tables}))
         state = snapshot.transfer_heights(other, data)
@@ -227,7 +227,7 @@ class Outer(NamedTuple):
     count: int = 0
 
 
-def test_a_memory_comes_back_in_its_types_with_its_arrays() -> None:
+def test_a_memory_comes_back_in_its_types_with_its_arrays():
     memory = Outer(Color.BLUE, Inner(-math.inf, np.bool_(True)), np.array([[0.1, 2.0]]), np.int64(7))
     arrays: list[NDArray[Any]] = []
     text = flatten(memory, arrays)
@@ -245,13 +245,13 @@ def test_a_memory_comes_back_in_its_types_with_its_arrays() -> None:
      ["Inner", math.nan, False], ["Inner", math.inf, False], ["Inner", -1e76, False],
      ["Inner", 10**400, False], {"array": 0}, ["Outer", 0.0, False]],
 )  # fmt: skip
-def test_a_memory_of_another_structure_is_refused(kept_memory: Any) -> None:
+def test_a_memory_of_another_structure_is_refused(kept_memory):
     with pytest.raises(StateError, match="memory of the controller must be a Inner"):
         rebuild(Inner(), kept_memory, [])
 
 
 @pytest.mark.parametrize("count", [-1, 2**53 + 1, 1e30, -math.inf, 10**400])
-def test_a_memory_with_a_count_that_is_none_is_refused(count: Any) -> None:
+def test_a_memory_with_a_count_that_is_none_is_refused(count):
     arrays = [np.zeros((0, 2))]
     template = Outer(Color.RED, Inner(), arrays[0])
     assert rebuild(template, ["Outer", 1, ["Inner", 0.0, False], {"array": 0}, 3], arrays).count == 3

@@ -24,14 +24,14 @@ def heights(file: Path | str, **known: object) -> np.ndarray:
     return fit_shape(Shape(file=str(file), **known), BED, Actuator()).heights
 
 
-def test_every_sample_shape_has_a_note_of_its_origin() -> None:
+def test_every_sample_shape_has_a_note_of_its_origin():
     notes = (SAMPLES / "README.md").read_text(encoding="utf-8")
     assert len(list_shapes()) >= 12
     assert [name for name in list_shapes() if f"| `{find_shape(name).name}` |" not in notes] == []
 
 
 @pytest.mark.parametrize("name", list_shapes())
-def test_every_sample_shape_fits_a_bed_without_clipping_and_every_mesh_is_closed(name: str) -> None:
+def test_every_sample_shape_fits_a_bed_without_clipping_and_every_mesh_is_closed(name):
     laid = fit_shape(Shape(file=name), make_grid(Layout()), Actuator())
     assert np.ptp(laid.heights) == pytest.approx(15e-3, abs=1e-12)
     assert laid.too_low + laid.too_high == 0
@@ -45,7 +45,7 @@ def test_every_sample_shape_fits_a_bed_without_clipping_and_every_mesh_is_closed
 
 
 @pytest.mark.parametrize("kind", ["stl", "obj", "ply", "glb", "off", "3mf"])
-def test_a_mesh_is_the_same_shape_in_every_format(tmp_path: Path, kind: str) -> None:
+def test_a_mesh_is_the_same_shape_in_every_format(tmp_path, kind):
     solid = trimesh.creation.icosphere(subdivisions=3, radius=10.0)
     path = tmp_path / f"Ein Körper mit Blank.{kind}"
     unit = 1e-3 if kind == "glb" else 1.0  # a GLB is in meters, y up; an OBJ that says nothing is y up
@@ -68,7 +68,7 @@ np.save(OBJECTS, np.array([{}, {}], dtype=object), allow_pickle=True)
 
 
 @pytest.mark.parametrize(
-    ("name", "content", "said"),
+    "name, content, said",
     [
         ("empty.stl", b"", "must "),
         ("rubbish.stl", b"rubbish" * 30, "must "),
@@ -96,17 +96,17 @@ def test_a_file_that_holds_no_shape_is_refused_by_name(tmp_path, name, content, 
 
 
 @pytest.mark.parametrize(
-    ("word", "said"),
+    "word, said",
     [("craters", "Did you mean crater?"), ("no/where.stl", "no/where.stl: there is no such file."),
      (".", ". is a folder, not a file."), ("a\0b", "neither a file nor a sample shape"),
      (300 * "a", "neither a file nor a sample shape")],
 )  # fmt: skip
-def test_a_shape_that_is_not_there_is_told(word: str, said: str) -> None:
+def test_a_shape_that_is_not_there_is_told(word, said):
     with pytest.raises(DigiclayError, match=re.escape(said)):
         find_shape(word)
 
 
-def test_a_scene_finds_its_shape_beside_itself_whose_first_row_is_at_the_lowest_y(tmp_path: Path) -> None:
+def test_a_scene_finds_its_shape_beside_itself_whose_first_row_is_at_the_lowest_y(tmp_path):
     (tmp_path / "Formen").mkdir()
     np.save(tmp_path / "Formen" / "größe 1.npy", np.repeat(np.arange(13.0), 13).reshape(13, 13))
     (tmp_path / "my.toml").write_text('[shape]\nfile = "Formen/größe 1.npy"\n', encoding="utf-8")

@@ -26,7 +26,7 @@ def device(method: str = "virtual_master", **layout: object) -> Scene:
 
 
 @pytest.mark.parametrize(
-    ("limit", "low", "resolution", "least", "most", "calls"),
+    "limit, low, resolution, least, most, calls",
     [
         (17.3, 2.0, 0.1, 17.2, 17.3, 11),  # to its resolution
         (11.0, 0.0, 1.25, 9.75, 11.0, 7),  # both ends, then log2(32) halvings
@@ -48,15 +48,15 @@ GOOD = Follows(speed=0.015, losses=0, loss_share=0.0, lag=1e-3, rfd=0.1)
 @pytest.mark.parametrize(
     "bad", [{"losses": 1}, {"loss_share": 0.01}, {"lag": 3.1e-3}, {"rfd": 0.21}, {"lag": float("inf")}]
 )
-def test_each_part_of_the_criterion_can_fail_a_finger(bad: dict[str, float]) -> None:
+def test_each_part_of_the_criterion_can_fail_a_finger(bad):
     assert GOOD.meets(Criterion())
     assert not replace(GOOD, **bad).meets(Criterion())
 
 
 @pytest.mark.parametrize(
-    ("drag", "height"), [(Drag(), None), (Drag(press=4e-3, height=-4e-3), 36e-3)], ids=["ridge", "as deep"]
+    "drag, height", [(Drag(), None), (Drag(press=4e-3, height=-4e-3), 36e-3)], ids=["ridge", "as deep"]
 )
-def test_a_drag_goes_straight_and_level_at_its_speed(drag: Drag, height: float | None) -> None:
+def test_a_drag_goes_straight_and_level_at_its_speed(drag, height):
     path, start, end = drag.path(12e-3, 40e-3)
     times = np.linspace(start, end, 11)
     x, y, z = path.trajectory().poses(times)[:, :3].T
@@ -65,7 +65,7 @@ def test_a_drag_goes_straight_and_level_at_its_speed(drag: Drag, height: float |
     np.testing.assert_allclose(z, height or z[0], rtol=1e-12)
 
 
-def test_a_lift_is_as_fast_as_it_says_at_its_fastest_and_a_bed_narrower_than_the_drag_is_refused() -> None:
+def test_a_lift_is_as_fast_as_it_says_at_its_fastest_and_a_bed_narrower_than_the_drag_is_refused():
     path, start, end = Lift().path(8e-3, 40e-3)
     moments = np.linspace(start, end, 2001)
     speed = np.gradient(path.trajectory().poses(moments)[:, 2], moments)
@@ -74,7 +74,7 @@ def test_a_lift_is_as_fast_as_it_says_at_its_fastest_and_a_bed_narrower_than_the
         track(device(columns=9), Drag(), 10e-3)
 
 
-def test_a_drag_has_a_limit_and_a_finger_that_is_lost_is_counted_with_its_time() -> None:
+def test_a_drag_has_a_limit_and_a_finger_that_is_lost_is_counted_with_its_time():
     drag = Drag(height=6e-3, length=30e-3)
     found = find_largest_speed(device(), drag, Criterion(), low=15e-3, high=70e-3, resolution=60e-3)
     assert found == 15e-3
@@ -90,7 +90,7 @@ def press() -> Result:
     return run(device(rows=11, columns=11))
 
 
-def test_a_run_gives_every_figure_and_its_rows_between_two_times(press: Result) -> None:
+def test_a_run_gives_every_figure_and_its_rows_between_two_times(press):
     assert list(press.figures) == list(RUN_METRICS)
     assert press.figures["duration"] == press.metrics["duration"] > 0.0
     part = select_rows(press.history, 0.5, 1.0)
@@ -98,7 +98,7 @@ def test_a_run_gives_every_figure_and_its_rows_between_two_times(press: Result) 
 
 
 @pytest.mark.parametrize(
-    ("without", "losses"),
+    "without, losses",
     [
         ((), 0),
         (((0.0, 0.3),), 0),  # touched before the phase
@@ -121,13 +121,13 @@ def test_losses_of_a_phase_are_counted_from_the_record_for_every_method(press, w
 
 
 @pytest.mark.parametrize(
-    ("changed", "losses"),
+    "changed, losses",
     [
         ({"control": "absent", "layout": {"rows": 5, "columns": 5}}, None),
         ({"shape": {"file": "crater"}, "control": {"method": "elastic"}}, None),
         ({"shape": {"file": "crater"}}, 0),  # what the method counts after the shape
     ],
 )
-def test_only_a_method_that_counts_losses_has_some(changed: dict[str, object], losses: int | None) -> None:
+def test_only_a_method_that_counts_losses_has_some(changed, losses):
     bed = {"layout": {"rows": 11, "columns": 11}, "simulation": {"duration": 0.02}}
     assert run(resolve({**bed, **changed})).metrics["losses"] == losses

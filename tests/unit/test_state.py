@@ -12,7 +12,7 @@ from digiclay.core.model.layout import Layout
 from tests.assemble import make_system, one_cell, path, record
 
 
-def test_a_copy_a_row_and_the_modes_share_no_array_with_a_state_that_has_active_cells() -> None:
+def test_a_copy_a_row_and_the_modes_share_no_array_with_a_state_that_has_active_cells():
     system = make_system(Layout(9, 9), control=VirtualMaster())
     pressed = record(system, path((0, 0, 0, 41), (0.2, 0, 0, 37)), 40).last
     copy = pressed.copy()
@@ -28,10 +28,9 @@ def test_a_copy_a_row_and_the_modes_share_no_array_with_a_state_that_has_active_
 
 
 @pytest.mark.parametrize(
-    ("absent", "rows"),
-    [(("",), 5), (("valve_lag",), 4), (("relaxation",), 2), (("valve_lag", "relaxation"), 1)],
+    "absent, rows", [(("",), 5), (("valve_lag",), 4), (("relaxation",), 2), (("valve_lag", "relaxation"), 1)]
 )
-def test_a_part_that_is_left_out_owns_no_row(absent: tuple[str, ...], rows: int) -> None:
+def test_a_part_that_is_left_out_owns_no_row(absent, rows):
     system = one_cell(dead_time=0.0, **dict.fromkeys(filter(None, absent)))
     start = begin(system)
     assert start.rows.shape[0] == rows + 3  # command, target, force
@@ -42,7 +41,7 @@ def test_a_part_that_is_left_out_owns_no_row(absent: tuple[str, ...], rows: int)
 
 
 @pytest.mark.parametrize(
-    ("disc", "serves"),
+    "disc, serves",
     [((3, -6, 5), True), ((5, -6, 5), True), ((3, -8, 5), True), ((3, -6, 7), True), ((3, -6, 9), False),
      ((6.1, -6, 5), False), ((3, -2.9, 5), False), ((-6, 3, 5), False)],
 )  # fmt: skip
@@ -54,7 +53,7 @@ def test_an_active_set_serves_while_the_controlled_disc_is_within_a_pitch_around
     assert select.serves(first, 0, None, tuple(1e-3 * one for one in disc)) == serves
 
 
-def test_stored_codes_never_change_and_every_mode_has_a_meaning_and_a_color_unlike_all_others() -> None:
+def test_stored_codes_never_change_and_every_mode_has_a_meaning_and_a_color_unlike_all_others():
     # Histories on disk hold them.
     assert {mode.name: int(mode) for mode in Mode} == {
         "REST": 0, "HOLD": 1, "EDGE": 2, "BLISTER": 3,

@@ -47,7 +47,7 @@ def solved(e: float, bow: float, slip: float, decay: float, pulp: float) -> tupl
 
 
 @pytest.mark.parametrize(
-    ("e", "slip", "decay", "pulp"),
+    "e, slip, decay, pulp",
     [(-1.0, 2.0, 1.5, 1.0), (-0.5, 2.0, 0.8, 1.4), (0.8, -2.0, 1.5, 1.0), (1.2, -2.5, 0.7, 1.3)],
 )
 def test_a_cell_that_meets_or_leaves_on_a_straight_way_is_solved_exactly(e, slip, decay, pulp):
@@ -56,7 +56,7 @@ def test_a_cell_that_meets_or_leaves_on_a_straight_way_is_solved_exactly(e, slip
 
 
 @pytest.mark.parametrize("share", [0.3, 0.5, 0.7])
-def test_a_bend_raises_the_way_by_its_mean_over_the_loaded_part(share: float) -> None:
+def test_a_bend_raises_the_way_by_its_mean_over_the_loaded_part(share):
     # Met after 1 - share of a straight way: the parabola's mean over the rest is bow share (3 - 2 share).
     slip, decay, bow = 0.5, 0.2, 0.005
     e = -(1.0 - share) * slip
@@ -70,7 +70,7 @@ def test_a_bend_raises_the_way_by_its_mean_over_the_loaded_part(share: float) ->
 @pytest.mark.parametrize("slip", [-8000.0, 0.0, 8000.0])
 @pytest.mark.parametrize("decay", [closed_form.TINY, 1e-3, 1e6])
 @pytest.mark.parametrize("pulp", [1.0, 1e125])
-def test_no_size_overflows_and_no_load_pulls(exponent: float, slip: float, decay: float, pulp: float) -> None:
+def test_no_size_overflows_and_no_load_pulls(exponent, slip, decay, pulp):
     numbers = tuple(np.array([value]) for value in (slip, decay, pulp))
     with np.errstate(all="raise", under="ignore"):
         growth = closed_form.replace_zeros(numbers[0] + numbers[1] * numbers[2])
@@ -87,9 +87,9 @@ def test_no_size_overflows_and_no_load_pulls(exponent: float, slip: float, decay
 
 
 @pytest.mark.parametrize("exponent", [-5.0, 5.0, 250.0])
-@pytest.mark.parametrize(("slip", "decay"), [(-8e3, 1.0), (-100.0, 1e9), (310.0, 1e6), (8e3, 1e9)])
+@pytest.mark.parametrize("slip, decay", [(-8e3, 1.0), (-100.0, 1e9), (310.0, 1e6), (8e3, 1e9)])
 @pytest.mark.parametrize("pulp", [1.0, 50.0])
-def test_a_vast_growth_keeps_its_digits(exponent: float, slip: float, decay: float, pulp: float) -> None:
+def test_a_vast_growth_keeps_its_digits(exponent, slip, decay, pulp):
     e, way, rate, unit = map(Decimal, (exponent, slip, decay, pulp))
     with localcontext() as digits:
         digits.prec, digits.Emax, digits.Emin = 60, MAX_EMAX, MIN_EMIN
@@ -130,7 +130,7 @@ def put(
     return driven[0], force
 
 
-def test_a_cell_thrown_off_is_given_up_and_a_finger_pushes_a_pin_no_deeper_than_it_comes() -> None:
+def test_a_cell_thrown_off_is_given_up_and_a_finger_pushes_a_pin_no_deeper_than_it_comes():
     alone = {"step": 1e-3, "fingertip": None, "contact": None}
     height, _ = put(Setter(None, (10.0, 1e-3)), [], [0.04, 0.04], **alone)
     np.testing.assert_allclose(height, [np.inf, 0.045], rtol=1e-12)
@@ -151,7 +151,7 @@ def test_a_cell_thrown_off_is_given_up_and_a_finger_pushes_a_pin_no_deeper_than_
 
 
 @pytest.mark.parametrize(
-    ("height", "under", "start", "left"),
+    "height, under, start, left",
     [
         (15e-3, 15e-3, 40e-3, 15e-3),  # pushed as far as the finger comes
         # A hundredth of the stroke is allowed; an open valve lowers it by less than a millimeter in 5 ms.
@@ -170,7 +170,7 @@ STROKE, WAY = CELL.actuator.stroke, find_speeds(CELL).rise * 5e-3
 
 
 @pytest.mark.parametrize(
-    ("coarse", "fine", "period", "under", "height"),
+    "coarse, fine, period, under, height",
     [
         # In a period of 10 s a valve lets a pin go anywhere.
         (0.010, 0.013, 10.0, 1.0, 0.014),  # a third of what the halves changed is added

@@ -17,7 +17,6 @@ from digiclay.strokes.pose import lean_finger, turn_image, turn_toward
 from digiclay.strokes.stroke import (
     DEEPEST,
     Image,
-    Place,
     Stroke,
     deepen,
     draw,
@@ -30,6 +29,7 @@ from digiclay.strokes.stroke import (
 )
 from numpy.typing import NDArray
 
+from tests.assemble import table
 from tests.hand import TICK, finish, let_go, risen, started
 
 pytestmark = pytest.mark.usefixtures("quick_machine")
@@ -63,7 +63,7 @@ def path(
 
 def lead(
     stroke: Stroke, at: NDArray[np.float64], chunk: int = 4000, bed: NDArray[np.float64] = HEIGHT,
-    creep: float = 0.0,
+    creep: float = 0.0
 ) -> tuple[Stroke, NDArray[np.float64]]:  # fmt: skip
     """Let fingers at poses (m, 7) go on along a stroke that has begun; return their poses (t, m, 7)."""
     poses, part, forces = [at], at[None], np.zeros(len(at))
@@ -89,7 +89,7 @@ def pressed(poses: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 @pytest.mark.parametrize("moves", [1, 20, 1000])
-def test_the_finger_goes_along_the_whole_path_however_quick_the_hand(moves: int) -> None:
+def test_the_finger_goes_along_the_whole_path_however_quick_the_hand(moves):
     stroke, poses = path(release(line(moves=moves)))
     assert stroke.done
     assert poses[np.argmax(poses[:, 2] <= 0.036 + 1e-9), 0] == 0.0  # first to its depth
@@ -124,18 +124,18 @@ def test_the_way_follows_from_the_path_alone_and_is_never_ahead_of_the_hand(away
     )
 
 
-@pytest.mark.parametrize(
-    ("drawn", "images", "pressing", "longer", "nearest"),
-    [
-        pytest.param([(20, 4), (26, 4)], make_images("XY"), 2, 120, 9.9, id="two wait for two that are near"),
-        pytest.param([(20, 5.1), (26, 5.1)], make_images("XY"), 4, 1, 10.2, id="side by side all press"),
-        pytest.param([(9, 28), (2, -28)], make_images("X"), 2, 1, 4, id="they come nearer to each other"),
-        pytest.param([(0, -20), (0, 20)], make_images("X"), 1, 1, 99, id="on the axis one presses"),
-        pytest.param([(0.7, -20), (0.7, 20)], make_images("X"), 1, 1, 99, id="or within half a pitch"),
-        pytest.param([(0, 0), (0, 0)], make_images("RADIAL", 24), 1, 1, 99, id="a click in the middle"),
-        pytest.param([(4, -28), (4, 28)], make_images("X"), 2, 120, 9.9, id="beside the axis one is behind"),
-        pytest.param([(28, -20), (-28, 28)], make_images("X"), 2, 1, 0, id="across the axis they meet"),
-    ],
+@table(
+    "drawn, images, pressing, longer, nearest",
+    {
+        "two wait for two that are near": ([(20, 4), (26, 4)], make_images("XY"), 2, 120, 9.9),
+        "side by side all press": ([(20, 5.1), (26, 5.1)], make_images("XY"), 4, 1, 10.2),
+        "they come nearer to each other": ([(9, 28), (2, -28)], make_images("X"), 2, 1, 4),
+        "on the axis one presses": ([(0, -20), (0, 20)], make_images("X"), 1, 1, 99),
+        "or within half a pitch": ([(0.7, -20), (0.7, 20)], make_images("X"), 1, 1, 99),
+        "a click in the middle": ([(0, 0), (0, 0)], make_images("RADIAL", 24), 1, 1, 99),
+        "beside the axis one is behind": ([(4, -28), (4, 28)], make_images("X"), 2, 120, 9.9),
+        "across the axis they meet": ([(28, -20), (-28, 28)], make_images("X"), 2, 1, 0),
+    },
 )
 def test_of_images_that_are_near_one_gives_way(drawn, images, pressing, longer, nearest):
     places = 1e-3 * np.linspace(*np.array(drawn, float), 57)
@@ -157,14 +157,14 @@ def test_of_images_that_are_near_one_gives_way(drawn, images, pressing, longer, 
             assert np.linalg.norm(pressed_at - image.place(*place), axis=1).min() < 1.5e-3
 
 
-def test_one_that_waits_comes_down_although_pins_creep_up() -> None:
+def test_one_that_waits_comes_down_although_pins_creep_up():
     places = 1e-3 * np.linspace([4.0, -28.0], [4.0, 28.0], 57)
     stroke = lay_path(start(1, 0.0, 0.0, 4e-3, make_images("X")), places)
     stroke = motion.begin(stroke, HEIGHT, AT[3:], None)
     assert lead(stroke, np.repeat(AT[None], 2, axis=0), 1, creep=5e-9)[0].done
 
 
-@pytest.mark.parametrize(("bed", "lowest", "end"), [(HEIGHT, 36e-3, 59e-3), (HEIGHT * 0 + 1e-3, 0.0, None)])
+@pytest.mark.parametrize("bed, lowest, end", [(HEIGHT, 36e-3, 59e-3), (HEIGHT * 0 + 1e-3, 0.0, None)])
 def test_a_click_presses_no_deeper_than_the_floor_and_ends_above_all_pins(bed, lowest, end):
     stroke, poses = path(release(start(1, 0.01, 0.005, 4e-3)), bed=bed)
     assert stroke.done
@@ -173,8 +173,8 @@ def test_a_click_presses_no_deeper_than_the_floor_and_ends_above_all_pins(bed, l
     assert end is None or z[-1] == pytest.approx(end, abs=1e-9)
 
 
-@pytest.mark.parametrize(("by", "depth"), [(-1.0, 0.1e-3), (1.0, DEEPEST), (1e-3, 5e-3)])
-def test_the_depth_stays_within_what_can_be_pressed(by: float, depth: float) -> None:
+@pytest.mark.parametrize("by, depth", [(-1.0, 0.1e-3), (1.0, DEEPEST), (1e-3, 5e-3)])
+def test_the_depth_stays_within_what_can_be_pressed(by, depth):
     assert deepen(start(1, 0.0, 0.0, 4e-3), by).samples[-1].depth == pytest.approx(depth, rel=1e-12)
 
 
@@ -192,7 +192,7 @@ IMAGES = {
 
 
 @pytest.mark.parametrize("name", IMAGES)
-def test_the_finger_goes_along_the_path_and_along_each_of_its_images(name: str) -> None:
+def test_the_finger_goes_along_the_path_and_along_each_of_its_images(name):
     images, turn = IMAGES[name]
     stroke, poses = path(release(line(images=images)))
     assert stroke.done
@@ -205,7 +205,7 @@ def test_the_finger_goes_along_the_path_and_along_each_of_its_images(name: str) 
     assert np.count_nonzero(np.diff(top.astype(int)) == 1) == 1 + len(images)
 
 
-def test_a_finger_slows_down_above_the_highest_pin_below_it() -> None:
+def test_a_finger_slows_down_above_the_highest_pin_below_it():
     beside = np.where(CELLS.x > 5e-3, 0.050, 0.040)  # 1 mm beyond where the surface below the finger counts
     _, poses = path(release(start(1, 0.0, 0.0, 4e-3)), bed=beside)
     z = poses[:, 2]
@@ -219,7 +219,7 @@ def test_a_finger_slows_down_above_the_highest_pin_below_it() -> None:
 
 
 @pytest.mark.parametrize(
-    ("place", "mouse", "string", "pulled"),
+    "place, mouse, string, pulled",
     [
         ((1e-3, 2e-3), (3e-3, 2e-3), 2.5e-3, (1e-3, 2e-3)),
         ((0.0, 0.0), (10e-3, 0.0), 4e-3, (6e-3, 0.0)),
@@ -227,11 +227,11 @@ def test_a_finger_slows_down_above_the_highest_pin_below_it() -> None:
     ],
     ids=["within the string", "at its length", "without a string"],
 )
-def test_the_mouse_pulls_a_place_behind_it(place: Place, mouse: Place, string: float, pulled: Place) -> None:
+def test_the_mouse_pulls_a_place_behind_it(place, mouse, string, pulled):
     assert pull(place, mouse, string) == pytest.approx(pulled, rel=1e-12, abs=1e-15)
 
 
-def test_a_ring_keeps_its_radius_and_is_closed_and_a_laid_path_is_let_go() -> None:
+def test_a_ring_keeps_its_radius_and_is_closed_and_a_laid_path_is_let_go():
     points = lay_ring((2e-3, -1e-3), (2e-3, 9e-3))
     np.testing.assert_allclose(np.linalg.norm(points - [2e-3, -1e-3], axis=1), 10e-3, rtol=1e-12)
     np.testing.assert_allclose(points[0], points[-1], atol=1e-15)
@@ -256,7 +256,7 @@ def matrix(turn: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.parametrize("lean", [(0.5, 0.0), (0.0, 0.5), (-0.3, 0.4)])
-def test_the_top_of_the_finger_goes_where_it_leans_by_the_angle(lean: tuple[float, float]) -> None:
+def test_the_top_of_the_finger_goes_where_it_leans_by_the_angle(lean):
     top = matrix(lean_finger(UPRIGHT, lean))[:, 2]
     angle = np.hypot(*lean)
     np.testing.assert_allclose(top[:2], np.array(lean) / angle * np.sin(angle), atol=1e-12)
@@ -264,7 +264,7 @@ def test_the_top_of_the_finger_goes_where_it_leans_by_the_angle(lean: tuple[floa
 
 
 @pytest.mark.parametrize("name", IMAGES)
-def test_the_orientation_of_an_image_is_that_of_the_ellipsoids_image_and_near_to_its_own(name: str) -> None:
+def test_the_orientation_of_an_image_is_that_of_the_ellipsoids_image_and_near_to_its_own(name):
     turn, form = lean_finger(TWISTED, (0.4, -0.2)), np.diag([1.0, 4.0, 9.0])
     for image in IMAGES[name][0]:
         flat = np.array([[image.xx, image.xy, 0.0], [image.yx, image.yy, 0.0], [0.0, 0.0, 1.0]])
@@ -274,7 +274,7 @@ def test_the_orientation_of_an_image_is_that_of_the_ellipsoids_image_and_near_to
         assert np.trace(there @ own.T) >= 0.8, "it turns by no more than some 90 degrees"
 
 
-def test_a_pen_that_is_jerked_turns_the_finger_no_faster_than_a_hand_to_its_aim() -> None:
+def test_a_pen_that_is_jerked_turns_the_finger_no_faster_than_a_hand_to_its_aim():
     aim, turn, angles = -lean_finger(UPRIGHT, (0.5, 0.0)), UPRIGHT, []
     for _ in range(6):
         before, turn = turn, turn_toward(turn, aim, 0.1)
@@ -288,7 +288,7 @@ def test_a_pen_that_is_jerked_turns_the_finger_no_faster_than_a_hand_to_its_aim(
 
 
 @pytest.mark.parametrize("name", ["none", "both", "three turns"])
-def test_the_finger_leans_with_the_pen_on_each_image_and_ends_as_it_began(name: str) -> None:
+def test_the_finger_leans_with_the_pen_on_each_image_and_ends_as_it_began(name):
     images = IMAGES[name][0]
     stroke = start(1, 0.0, 0.005, 4e-3, images, lean=(0.4, 0.2))
     for part in np.arange(1, 21) / 20:
@@ -305,7 +305,7 @@ def test_the_finger_leans_with_the_pen_on_each_image_and_ends_as_it_began(name: 
         np.testing.assert_allclose(side[:, 3:], np.broadcast_to(wanted, (len(side), 4)), atol=1e-9)
 
 
-def test_a_stroke_that_is_dropped_leaves_a_finger_that_does_not_lean() -> None:
+def test_a_stroke_that_is_dropped_leaves_a_finger_that_does_not_lean():
     session, number = queue_stroke(started(), 0.0, 0.0, 4e-3, lean=(0.5, 0.0))
     before = session.pose[3:].copy()
     for step in range(1, 10):
@@ -326,7 +326,7 @@ def tap(session: Running, x: float, y: float) -> Running:
     return let_go(session, number)
 
 
-def test_of_several_the_last_is_taken_back_first_and_never_begins() -> None:
+def test_of_several_the_last_is_taken_back_first_and_never_begins():
     session = tap(tap(started(), -15.0, 0.0), 15.0, 0.0)
     number = session.strokes[-1].number
     assert sculpting.reset(session).strokes == ()
@@ -342,7 +342,7 @@ def test_of_several_the_last_is_taken_back_first_and_never_begins() -> None:
 CURVES = [item[0] for item in CURVE_ITEMS]
 
 
-def test_a_curve_goes_from_nothing_to_all_a_soft_pen_s_deepest_and_nonsense_does_no_harm() -> None:
+def test_a_curve_goes_from_nothing_to_all_a_soft_pen_s_deepest_and_nonsense_does_no_harm():
     soft, linear, firm = (find_share(0.5, curve) for curve in CURVES)
     assert (soft, linear, firm) == (pytest.approx(math.sqrt(0.5)), 0.5, 0.25)
     for curve in CURVES:
@@ -363,7 +363,7 @@ TURNED = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
 
 
 @pytest.mark.parametrize(
-    ("tilt", "seen", "lean"),
+    "tilt, seen, lean",
     [
         ((1.0, 0.0), ABOVE, (1.0, 0.0)),
         ((1.0, 0.0), FRONT, (1.0, 0.0)),
@@ -399,7 +399,7 @@ def is_up(begins: tuple[str, tuple[str, str]], *events: tuple[str, tuple[str, st
 
 
 @pytest.mark.parametrize("kind", ["TIMER", "TIMER_REPORT", "TIMER_JOBS", "MOUSEMOVE", "INBETWEEN_MOUSEMOVE"])
-def test_the_release_of_the_stroke_before_is_not_that_of_this_one(kind: str) -> None:
+def test_the_release_of_the_stroke_before_is_not_that_of_this_one(kind):
     # Timers of Blender, such as that of a message in the status bar, and copied moves name it all along.
     copied = [(kind, UP), ("TIMER", UP)] * 3
     assert not any(is_up(("PRESS", UP), *copied))
@@ -431,6 +431,6 @@ LEFT_PRESSED = ("leave it pressed", "what was before")
 
 
 @pytest.mark.parametrize("words", STROKES)
-def test_a_release_is_told_by_what_later_events_name(words: str) -> None:
+def test_a_release_is_told_by_what_later_events_name(words):
     begins, *events = STROKES[words]
     assert is_up(begins, *events) == [False] * (len(events) - 1) + [not words.endswith(LEFT_PRESSED)]

@@ -84,7 +84,7 @@ def test_the_command_of_the_page_runs_points_that_are_missing_and_all_is_as_befo
     assert files(Path("again")) == files(whole)
 
 
-def test_runs_that_fail_are_counted_and_leave_no_hole_in_the_indices(here: Path) -> None:
+def test_runs_that_fail_are_counted_and_leave_no_hole_in_the_indices(here):
     # A bed of 3 x 4 has no room for a recording of a million seconds.
     durations = ["--vary", "simulation.duration=0.08,0.1,1e6", "--vary", "control.position_gain=100:1000"]
     options = "--samples 4 --workers 1 --metric rfd --quiet --out out"
@@ -96,7 +96,7 @@ def test_runs_that_fail_are_counted_and_leave_no_hole_in_the_indices(here: Path)
     assert all(row["index"] for row in rows(here / "out" / "indices.csv"))
 
 
-@pytest.mark.parametrize(("fingers", "batches"), [(1, True), (2, False)])
+@pytest.mark.parametrize("fingers, batches", [(1, True), (2, False)])
 def test_the_time_a_study_takes_is_less_in_batches_where_there_are_some(fingers, batches, here, capsys):
     bed, _, path = SCENE.partition("[trajectory]")
     fingers_of = "".join(f"[[finger]]\n[finger.trajectory]{path}" for _ in range(fingers))
@@ -112,8 +112,8 @@ def test_the_time_a_study_takes_is_less_in_batches_where_there_are_some(fingers,
 
 
 def test_other_outputs_can_be_had_of_a_finished_study_and_one_that_no_run_has_is_omitted_and_told(
-    whole: Path, here: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+    whole, here, capsys
+):
     shutil.copytree(whole, here / "out")
     assert main([*STUDY[:-1], "highest,relief", "--second", "--out", "out"]) == 0
     assert "No run that keeps the fingertip has the metric ridge_error." in capsys.readouterr().out
@@ -121,7 +121,7 @@ def test_other_outputs_can_be_had_of_a_finished_study_and_one_that_no_run_has_is
 
 
 @pytest.mark.parametrize(
-    ("words", "message"),
+    "words, message",
     [
         ("--samples 0", "digiclay study: argument --samples: must be a power of two"),
         ("--samples 100", "digiclay study: argument --samples: must be a power of two"),
@@ -142,18 +142,18 @@ def test_a_mistake_is_told_in_one_line_and_leaves_no_point(words, message, here,
     assert len(list(here.glob("out/points/*"))) <= 1
 
 
-def test_a_folder_of_another_study_is_refused(whole: Path, here: Path, refused: Any) -> None:
+def test_a_folder_of_another_study_is_refused(whole, here, refused):
     shutil.copytree(whole, here / "out")
     before = files(here / "out")
     for change, said in (
         (["--second", "--samples", "4"], "samples 8"), (["--second", "--seed", "2"], "seed 1"),
-        (["--second", "--set", "layout.pitch=2.9 mm"], "with another scene"), ([], "orders first, second"),
+        (["--second", "--set", "layout.pitch=2.9 mm"], "with another scene"), ([], "orders first, second")
     ):  # fmt: skip
         refused([*QUIET, *change], f"out holds another study ({said}): choose another folder with --out.\n")
     assert files(here / "out") == before
 
 
-@pytest.mark.parametrize(("command", "library"), [("study", "SALib"), ("tune", "optuna")])
+@pytest.mark.parametrize("command, library", [("study", "SALib"), ("tune", "optuna")])
 def test_a_missing_library_is_told_with_the_extra_that_has_it(command, library, monkeypatch, refused):
     monkeypatch.setitem(sys.modules, library, None)  # as Python marks what cannot be imported
     said = f"digiclay {command} needs {library}: run 'pip install digiclay[study]'.\n"
@@ -161,7 +161,7 @@ def test_a_missing_library_is_told_with_the_extra_that_has_it(command, library, 
 
 
 @pytest.mark.parametrize(
-    ("said", "range_", "words"),
+    "said, range_, words",
     [
         ("a.b=-1:2", Range("a.b", -1.0, 2.0), ["-1.0", "0.5", "2.0"]),
         ("a.b=1:100:log", Range("a.b", 1.0, 100.0, logarithmic=True), ["1.0", "10.0", "100.0"]),
@@ -178,7 +178,7 @@ def fit(*said: str, settings: tuple[Setting, ...] = ()) -> list[Range]:
     return fit_ranges([read_range(one) for one in said], find("slow_press"), settings)
 
 
-def test_a_parameter_is_given_once_with_the_values_it_can_have() -> None:
+def test_a_parameter_is_given_once_with_the_values_it_can_have():
     rows, stroke = fit("layout.rows=11:15", "valve.stroke=20 um:40 um")
     # Every whole number of a range has an equal share, and stays one in SI.
     words = [rows.find_word(share) for share in (0.0, 0.19, 0.21, 0.5, 0.79, 0.81, 1.0)]
@@ -192,7 +192,7 @@ def test_a_parameter_is_given_once_with_the_values_it_can_have() -> None:
 
 
 @pytest.mark.parametrize(
-    ("said", "rule"),
+    "said, rule",
     [
         ("a.b", "--vary must be KEY=LOW:HIGH, KEY=LOW:HIGH:log or KEY=A,B,C (got 'a.b')."),
         ("a.b=3", "--vary a.b must be LOW:HIGH, LOW:HIGH:log or at least two different values A,B"),
@@ -209,13 +209,13 @@ def test_a_parameter_is_given_once_with_the_values_it_can_have() -> None:
         ("blister.profile=cone,con", "--vary: blister.profile must be one of"),
     ],
 )
-def test_what_is_no_range_of_the_parameter_is_refused_with_key_rule_and_value(said: str, rule: str) -> None:
+def test_what_is_no_range_of_the_parameter_is_refused_with_key_rule_and_value(said, rule):
     with pytest.raises(DigiclayError) as error:
         fit(said)
     assert str(error.value).startswith(rule)
 
 
-def test_a_file_that_is_wrong_by_itself_is_told_first(tmp_path: Path) -> None:
+def test_a_file_that_is_wrong_by_itself_is_told_first(tmp_path):
     (tmp_path / "my.toml").write_text("[layout]\nrows = 0\n", encoding="utf-8")
     with pytest.raises(DigiclayError, match="rows"):
         fit_ranges([read_range("a.b=1:2")], tmp_path / "my.toml", ())

@@ -54,7 +54,7 @@ def league(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "league"
 
 
-def test_the_folder_holds_plots_and_tables_with_a_row_a_trial_that_differs_by_seed(league: Path) -> None:
+def test_the_folder_holds_plots_and_tables_with_a_row_a_trial_that_differs_by_seed(league):
     files = {path.name for path in league.iterdir() if not path.name.startswith(".")}
     wanted = "index.html league.csv trajectories.csv results.csv rfd.svg measures.svg suite.json points"
     assert files == set(wanted.split())
@@ -95,7 +95,7 @@ def test_tables_and_page_name_their_origin_and_no_other_suite_goes_there(league,
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    "words, said",
     [
         ("--suite --trajectories figure-eigth", "Did you mean figure-eight?"),
         ("--suite --trajectories ,", "--trajectories must name at least one trajectory"),
@@ -114,18 +114,18 @@ def test_tables_and_page_name_their_origin_and_no_other_suite_goes_there(league,
         ("", "The following arguments are required: SCENE, or --suite."),
     ],
 )
-def test_a_mistake_is_one_line_and_leaves_nothing(words: str, said: str, here: Path, refused: Any) -> None:
+def test_a_mistake_is_one_line_and_leaves_nothing(words, said, here, refused):
     refused(["compare", *(["my.toml"] if words else []), *words.split()], said)
     assert left(here) == []
 
 
-def test_a_scene_without_a_finger_has_no_suite(here: Path, refused: Any) -> None:
+def test_a_scene_without_a_finger_has_no_suite(here, refused):
     (here / "my.toml").write_text("finger = []\nsimulation.duration = 1\n", encoding="utf-8")
     refused(["compare", "my.toml", "--suite"], "scene.fingers must be at least 1 (got 0)")
     assert left(here) == []
 
 
-def test_a_method_of_one_s_own_enters_by_one_option(here: Path) -> None:
+def test_a_method_of_one_s_own_enters_by_one_option(here):
     write_method(here)
     with forgotten():
         arguments = ["--methods", "virtual_master", "--method", "pad.py:SoftPad", "--repeats", "1"]
@@ -137,21 +137,19 @@ def test_a_method_of_one_s_own_enters_by_one_option(here: Path) -> None:
     assert "--methods virtual_master,pad.py:SoftPad" in comments[1]
 
 
-def test_an_interval_is_student_s_and_one_value_has_none() -> None:
+def test_an_interval_is_student_s_and_one_value_has_none():
     found, single = find_interval([1.0, 2.0, None, 3.0, math.nan]), find_interval([1.0])
     assert (found.mean, found.number, single.half) == (2.0, 3, None)
     assert found.half == pytest.approx(4.302652729911275 / math.sqrt(3.0))  # t(0.975, 2), table
     assert find_interval([None, math.inf]) is None
 
 
-@pytest.mark.parametrize(
-    ("value", "shown"), [(1652.4, "1650"), (390.1, "390"), (0.0186, "0.0186"), (32.0, "32")]
-)
-def test_a_cost_above_a_millisecond_has_no_exponent(value: float, shown: str) -> None:
+@pytest.mark.parametrize("value, shown", [(1652.4, "1650"), (390.1, "390"), (0.0186, "0.0186"), (32.0, "32")])
+def test_a_cost_above_a_millisecond_has_no_exponent(value, shown):
     assert show_digits(value) == shown
 
 
-def test_the_league_counts_worse_trajectories_and_random_drags_as_one() -> None:
+def test_the_league_counts_worse_trajectories_and_random_drags_as_one():
     def figures(rfd: float, cost: float = 1e-4) -> dict[str, float | None]:
         return {"rfd": rfd, "period_cost": cost, "max_total_force": 10.0 * rfd, "losses": 1.0}
 
@@ -174,7 +172,7 @@ def test_the_league_counts_worse_trajectories_and_random_drags_as_one() -> None:
     assert second.searched == {"lift-limit"}
 
 
-def test_every_trajectory_can_be_placed_and_judged_and_random_drags_follow_their_seed() -> None:
+def test_every_trajectory_can_be_placed_and_judged_and_random_drags_follow_their_seed():
     scene = resolve({"control": {"method": "virtual_master"}})
     names = list_trajectories(GROUPS, 3)
     assert [name for name in names if name.startswith(RANDOM)] == ["random-1", "random-2", "random-3"]
@@ -188,10 +186,10 @@ def test_every_trajectory_can_be_placed_and_judged_and_random_drags_follow_their
 
 
 @pytest.mark.parametrize(
-    ("name", "fingers", "nearest"),
+    "name, fingers, nearest",
     [("two-hands", 2, 24e-3), ("pinch", 2, 12e-3), ("crossing", 2, 11e-3), ("five-fingers", 5, 18.5e-3)],
 )
-def test_fingers_of_a_trajectory_come_as_near_as_it_says(name: str, fingers: int, nearest: float) -> None:
+def test_fingers_of_a_trajectory_come_as_near_as_it_says(name, fingers, nearest):
     placed, _ = place_trial(resolve({}), name)
     ways = [path.poses(np.arange(0.0, 9.0, 1e-3))[:, :2] for path in placed.trajectories()]
     assert len(ways) == fingers
@@ -200,7 +198,7 @@ def test_fingers_of_a_trajectory_come_as_near_as_it_says(name: str, fingers: int
     assert min(apart) == pytest.approx(nearest, abs=0.2e-3)
 
 
-def test_a_trial_of_several_fingers_is_judged_by_the_worst() -> None:
+def test_a_trial_of_several_fingers_is_judged_by_the_worst():
     scene = resolve({"layout": {"rows": 15, "columns": 25}, "control": {"method": "virtual_master"}})
     placed, measure = place_trial(scene, "two-hands")
     short = replace(placed, simulation=replace(placed.simulation, duration=4.0))
@@ -219,7 +217,7 @@ def placed_lift(method: str) -> tuple[Scene, Any]:
     return place_trial(scene, "lift")
 
 
-def test_a_phase_is_judged_alone_and_a_method_that_counts_nothing_itself_loses_the_fingertip() -> None:
+def test_a_phase_is_judged_alone_and_a_method_that_counts_nothing_itself_loses_the_fingertip():
     placed, _ = placed_lift("virtual_master")
     short = placed.with_sections(simulation=replace(placed.simulation, duration=2.5))
     whole, part = (measure_trial(short, phase=phase)["figures"] for phase in (None, (2.0, 2.4)))
@@ -231,7 +229,7 @@ def test_a_phase_is_judged_alone_and_a_method_that_counts_nothing_itself_loses_t
     assert (phase["losses"], whole["losses"]) == (1.0, 1.0)
 
 
-def test_a_relief_of_two_fingers_is_that_of_both_and_an_error_under_either_is_found() -> None:
+def test_a_relief_of_two_fingers_is_that_of_both_and_an_error_under_either_is_found():
     scene = resolve({"layout": {"rows": 25, "columns": 25}, "control": {"method": "virtual_master"}})
     rest, place = scene.actuator.rest_height, assemble(scene).grid.positions
     tips = np.zeros((61, 2, 7))
@@ -252,7 +250,7 @@ def test_a_relief_of_two_fingers_is_that_of_both_and_an_error_under_either_is_fo
         assert found.largest == pytest.approx(1e-3)
 
 
-def test_the_losses_of_two_fingers_are_counted_of_each() -> None:
+def test_the_losses_of_two_fingers_are_counted_of_each():
     placed, _ = placed_lift("elastic")
     (finger,) = placed.fingers
     moved = tuple(replace(one, position=(10e-3, *one.position[1:])) for one in finger.trajectory.waypoints)

@@ -13,6 +13,8 @@ from digiclay.core.metrics.metric_table import METRICS, describe_losses
 from digiclay.core.model.control_interface import SetPoint
 from digiclay.core.model.layout import Layout, make_grid
 
+from tests.assemble import table
+
 TIME = np.linspace(0.0, 10.0, 2001)
 #: Rounding of sums over 2001 rows.
 ROUNDING = 1e-12
@@ -33,23 +35,20 @@ def history(total: np.ndarray, time: np.ndarray = TIME) -> dict[str, np.ndarray]
             "fingertip": fingertip, "total_force": total, "position": position}  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    ("total", "wanted"),
-    [
-        pytest.param(np.full(2001, 0.4), 0.0, id="a force at its set point"),
+@table(
+    "total, wanted",
+    {
+        "a force at its set point": (np.full(2001, 0.4), 0.0),
         # 0.43 - 0.4 loses two digits.
-        pytest.param(np.full(2001, 0.43), pytest.approx(0.03, rel=1e-10), id="a constant offset"),
+        "a constant offset": (np.full(2001, 0.43), pytest.approx(0.03, rel=1e-10)),
         # The trapezium rule is exact for sin² over whole periods.
-        pytest.param(
-            0.4 + 0.1 * np.sin(2.0 * np.pi * TIME), pytest.approx(0.1 / np.sqrt(2.0), rel=ROUNDING),
-            id="a sine",
+        "a sine": (0.4 + 0.1 * np.sin(2.0 * np.pi * TIME), pytest.approx(0.1 / np.sqrt(2.0), rel=ROUNDING)),
+        "the time without contact is left out": (
+            np.where((TIME > 2.0) & (TIME < 6.0), 0.43, 0.0),
+            pytest.approx(0.03, rel=1e-10),
         ),
-        pytest.param(
-            np.where((TIME > 2.0) & (TIME < 6.0), 0.43, 0.0), pytest.approx(0.03, rel=1e-10),
-            id="the time without contact is left out",
-        ),
-    ],
-)  # fmt: skip
+    },
+)
 def test_the_rfd_is_the_rms_deviation_in_contact(total, wanted):
     assert summary.compute_rfd(TIME, total, 0.4) == wanted
 
@@ -137,7 +136,7 @@ def test_the_summary_has_lag_extremes_volumes_and_share_of_contact():
 
 
 @pytest.mark.parametrize(
-    ("layout", "square_millimeters"),
+    "layout, square_millimeters",
     [
         (Layout(rows=4, columns=3), 9.0),
         (Layout(rows=4, columns=3, arrangement="staggered"), 9.0),
@@ -210,40 +209,41 @@ RESPONSE = 1.0 - np.exp(-0.5 * FINE) * (np.cos(DAMPED * FINE) + 0.5 / DAMPED * n
 OVERSHOOT = pytest.approx(np.exp(-np.pi * 0.5 / DAMPED), abs=1e-6)
 
 
-@pytest.mark.parametrize(
-    ("values", "target", "wanted"),
-    [
-        pytest.param(RESPONSE, 1.0, OVERSHOOT, id="a second-order system, by its formula"),
-        pytest.param(-RESPONSE, -1.0, OVERSHOOT, id="a falling signal, like its mirror image"),
-        pytest.param([2.0, 7.0], 4.0, 1.5, id="a share of the way"),
-        pytest.param(1.0 - np.exp(-FINE), 1.0, 0.0, id="a signal that never passes its target"),
-        pytest.param([1.0, 2.0], 1.0, None, id="a signal that starts at its target"),
-    ],
+@table(
+    "values, target, wanted",
+    {
+        "a second-order system, by its formula": (RESPONSE, 1.0, OVERSHOOT),
+        "a falling signal, like its mirror image": (-RESPONSE, -1.0, OVERSHOOT),
+        "a share of the way": ([2.0, 7.0], 4.0, 1.5),
+        "a signal that never passes its target": (1.0 - np.exp(-FINE), 1.0, 0.0),
+        "a signal that starts at its target": ([1.0, 2.0], 1.0, None),
+    },
 )
-def test_the_overshoot_is_known(values: Any, target: float, wanted: Any) -> None:
+def test_the_overshoot_is_known(values, target, wanted):
     assert summary.measure_overshoot(values, target) == wanted
 
 
-@pytest.mark.parametrize(
-    ("time", "values", "target", "band", "wanted"),
-    [
-        pytest.param(
-            FINE, 1.0 - np.exp(-FINE), 1.0, 0.05, pytest.approx(np.log(20.0), abs=1e-3), id="an exponential"
+@table(
+    "time, values, target, band, wanted",
+    {
+        "an exponential": (FINE, 1.0 - np.exp(-FINE), 1.0, 0.05, pytest.approx(np.log(20.0), abs=1e-3)),
+        "a signal that leaves its band again": (
+            FINE,
+            np.where((FINE > 4.0) & (FINE < 5.0), 1.2, 1.0),
+            1.0,
+            0.1,
+            pytest.approx(5.0, abs=1e-9),
         ),
-        pytest.param(
-            FINE, np.where((FINE > 4.0) & (FINE < 5.0), 1.2, 1.0), 1.0, 0.1,
-            pytest.approx(5.0, abs=1e-9), id="a signal that leaves its band again",
-        ),
-        pytest.param(FINE, np.sin(FINE), 0.0, 0.1, None, id="a signal outside its band at the end"),
-        pytest.param([0.0, 1.0], [1.0, np.nan], 1.0, 0.1, None, id="a signal that is not a number"),
-        pytest.param(FINE, np.ones(10001), 1.0, 0.1, 0.0, id="a signal always in its band"),
-    ],
-)  # fmt: skip
-def test_the_settling_time_is_known(time: Any, values: Any, target: float, band: float, wanted: Any) -> None:
+        "a signal outside its band at the end": (FINE, np.sin(FINE), 0.0, 0.1, None),
+        "a signal that is not a number": ([0.0, 1.0], [1.0, np.nan], 1.0, 0.1, None),
+        "a signal always in its band": (FINE, np.ones(10001), 1.0, 0.1, 0.0),
+    },
+)
+def test_the_settling_time_is_known(time, values, target, band, wanted):
     assert summary.measure_settling_time(time, values, target, band) == wanted
 
 
-def test_a_sine_has_its_amplitude_and_frequency_and_mean_and_deviation_are_weighted() -> None:
+def test_a_sine_has_its_amplitude_and_frequency_and_mean_and_deviation_are_weighted():
     assert summary.measure_amplitude(3.0 + 0.2 * np.sin(8.0 * FINE)) == pytest.approx(0.2, rel=1e-4)
     # Ten rises; each is found to a row of 1 ms.
     assert summary.measure_frequency(FINE, np.sin(2.0 * np.pi * 1.3 * FINE + 0.3)) == pytest.approx(
@@ -265,31 +265,32 @@ ALL_ROWS = np.ones(len(MOMENTS), dtype=bool)
 
 
 @pytest.mark.parametrize("frequency", [1.0, 2.0, 4.0, 9.0])
-def test_of_a_sine_the_share_beside_its_moving_average_counts_as_oscillation(frequency: float) -> None:
+def test_of_a_sine_the_share_beside_its_moving_average_counts_as_oscillation(frequency):
     found = summary.measure_oscillation(MOMENTS, 3.0 + np.sin(2.0 * np.pi * frequency * MOMENTS), ALL_ROWS)
     # The moving average of a sine is its sinc; 29.75 s are no whole number of periods.
     assert found == pytest.approx((1.0 - np.sinc(frequency * summary.WINDOW)) / np.sqrt(2.0), rel=0.01)
 
 
-@pytest.mark.parametrize(
-    ("values", "rows", "wanted"),
-    [
-        pytest.param(2.0 * MOMENTS - 7.0, ALL_ROWS, 0.0, id="a straight line"),
-        pytest.param(
-            np.where(MOMENTS < 1.5, 0.0, 5.0), (MOMENTS < 1.0) | (MOMENTS > 2.0), 0.0,
-            id="a jump between two stretches",
+@table(
+    "values, rows, wanted",
+    {
+        "a straight line": (2.0 * MOMENTS - 7.0, ALL_ROWS, 0.0),
+        "a jump between two stretches": (
+            np.where(MOMENTS < 1.5, 0.0, 5.0),
+            (MOMENTS < 1.0) | (MOMENTS > 2.0),
+            0.0,
         ),
-        pytest.param(MOMENTS, MOMENTS < summary.WINDOW + 4e-3, 0.0, id="a stretch longer than the window"),
-        pytest.param(MOMENTS, MOMENTS < summary.WINDOW - 2e-3, None, id="a stretch shorter than the window"),
-    ],
-)  # fmt: skip
-def test_what_follows_its_moving_average_does_not_oscillate(values: Any, rows: Any, wanted: Any) -> None:
+        "a stretch longer than the window": (MOMENTS, MOMENTS < summary.WINDOW + 4e-3, 0.0),
+        "a stretch shorter than the window": (MOMENTS, MOMENTS < summary.WINDOW - 2e-3, None),
+    },
+)
+def test_what_follows_its_moving_average_does_not_oscillate(values, rows, wanted):
     found = summary.measure_oscillation(MOMENTS, values, rows)
     assert found is None if wanted is None else found == pytest.approx(0.0, abs=1e-9)
 
 
 @pytest.mark.parametrize(
-    ("force", "fractions"),
+    "force, fractions",
     [
         # Gueorguiev and others 2022; Pang, Tan and Durlach 1991 have 7 % from 2.5 to 10 N.
         *((force, (0.07, 0.10)) for force in (0.5, 0.76, 2.5, 10.0)),
@@ -300,7 +301,7 @@ def test_a_jnd_is_7_to_10_percent_from_half_a_newton_on_and_15_to_27_below(force
     assert summary.find_weber_fractions(force) == fractions
 
 
-def test_deviations_are_counted_in_units_of_touch() -> None:
+def test_deviations_are_counted_in_units_of_touch():
     assert list(summary.perceive(0.15 * 0.4, 0.4, None).values())[:2] == pytest.approx([15 / 27, 1.0])
     assert list(summary.perceive(0.10 * 2.5, 2.5, None).values())[:2] == pytest.approx([1.0, 10 / 7])
     # Van Boven and Johnson 1994: 0.94 mm at the finger.
@@ -310,7 +311,7 @@ def test_deviations_are_counted_in_units_of_touch() -> None:
 
 
 @pytest.mark.parametrize(
-    ("values", "said"),
+    "values, said",
     [
         ((-0.1, 0.4, 0.0), "Perception.deviation must be at least 0 N"),
         ((math.nan, 0.4, 0.0), "Perception.deviation must be at least 0 N"),
@@ -320,7 +321,7 @@ def test_deviations_are_counted_in_units_of_touch() -> None:
         ((0.1, 0.4, math.inf), "Perception.unevenness must be at least 0 m"),
     ],
 )
-def test_what_is_no_deviation_is_refused(values: tuple[float, float, float], said: str) -> None:
+def test_what_is_no_deviation_is_refused(values, said):
     with pytest.raises(ParameterError, match=said):
         summary.perceive(*values)
 
@@ -336,7 +337,7 @@ def errors(final: np.ndarray, rows: np.ndarray = ALL, tip: np.ndarray = TIP) -> 
     return summary.measure_ridge_errors(PLACE, final, tip, rows, 11e-3) * 1e3
 
 
-def test_a_ridge_has_its_height_over_the_path_at_each_pin() -> None:
+def test_a_ridge_has_its_height_over_the_path_at_each_pin():
     np.testing.assert_array_equal(errors(np.full(21, 50e-3)), 0.0)
     np.testing.assert_allclose(errors(np.full(21, 51.5e-3)), 1.5, rtol=1e-12)
     climbing = TIP.copy()
@@ -348,7 +349,7 @@ def test_a_ridge_has_its_height_over_the_path_at_each_pin() -> None:
     np.testing.assert_array_equal(errors(np.full(21, 51e-3), np.ones(2010, dtype=bool), fine).size, 17)
 
 
-def test_pins_the_finger_did_not_go_on_from_no_travel_no_rows_and_what_follows_a_loss_do_not_count() -> None:
+def test_pins_the_finger_did_not_go_on_from_no_travel_no_rows_and_what_follows_a_loss_do_not_count():
     # Of the 21 pins the last four are less than 11 mm before the end of the way.
     final = np.where(LINE > 18.5e-3, 90e-3, 50e-3)
     found = errors(final)
@@ -409,7 +410,7 @@ def of_two(places: tuple[float, float], force: dict[int, float], own: tuple[floa
 
 
 @pytest.mark.parametrize(
-    ("places", "force", "own", "lags"),
+    "places, force, own, lags",
     [
         ((-6e-3, 6e-3), {0: 0.3, 4: 0.1}, (0.3, 0.1), (0.0, 0.0)),  # apart
         ((-3e-3, 3e-3), {1: 0.2, 2: 0.2, 3: 0.2}, (0.3, 0.3), (1.5e-3, 1.5e-3)),  # the middle pin is of both
@@ -430,7 +431,7 @@ def test_a_pin_counts_for_the_nearest_of_two_fingers_whose_forces_stay_as_they_a
         assert [one["lag_mean"] for one in each] == [lag and pytest.approx(lag, abs=1e-12) for lag in lags]
 
 
-def test_of_two_fingers_the_lower_one_presses_a_pin_between_them_that_stands_low() -> None:
+def test_of_two_fingers_the_lower_one_presses_a_pin_between_them_that_stands_low():
     # The second pin is 5 and 8 mm from them.
     given = of_two((-5e-3, 8e-3), {1: 0.1, 2: 0.2, 4: 0.3}, (0.1, 0.5))
     given["fingertip"][:, 1, 2] = 35e-3
@@ -441,7 +442,7 @@ def test_of_two_fingers_the_lower_one_presses_a_pin_between_them_that_stands_low
 
 
 @pytest.mark.parametrize(
-    ("name", "each", "worst"),
+    "name, each, worst",
     [
         ("rfd", (0.1, 0.3, None), 0.3),
         ("rfd", (None, None, None), None),
@@ -451,20 +452,20 @@ def test_of_two_fingers_the_lower_one_presses_a_pin_between_them_that_stands_low
         ("settling_time", (0.2, None, 0.3), None),
     ],
 )
-def test_the_worst_of_several_fingers_is_told(name, each, worst) -> None:
+def test_the_worst_of_several_fingers_is_told(name, each, worst):
     assert summary.take_worst([{name: value} for value in each]) == {name: worst}
 
 
-@pytest.mark.parametrize(
-    ("touching", "quick", "wanted"),
-    [
-        pytest.param([(0.0, 4.0)], 99.0, [(4.0, 6.0)], id="lost until the end"),
-        pytest.param([(0.0, 4.0), (6.5, 9.0)], 8.9, [(4.0, 2.5)], id="felt again, then lifted"),
-        pytest.param([(0.0, 4.0)], 7.0, [(4.0, 3.0)], id="lost, and lifted later"),
-        pytest.param([(0.0, 4.0)], 3.95, [], id="lifted"),
-        pytest.param([(0.0, 4.0), (4.5, 5.0)], 99.0, [(4.0, 0.5), (5.0, 5.0)], id="lost twice"),
-        pytest.param([], 99.0, [], id="never felt"),
-    ],
+@table(
+    "touching, quick, wanted",
+    {
+        "lost until the end": ([(0.0, 4.0)], 99.0, [(4.0, 6.0)]),
+        "felt again, then lifted": ([(0.0, 4.0), (6.5, 9.0)], 8.9, [(4.0, 2.5)]),
+        "lost, and lifted later": ([(0.0, 4.0)], 7.0, [(4.0, 3.0)]),
+        "lifted": ([(0.0, 4.0)], 3.95, []),
+        "lost twice": ([(0.0, 4.0), (4.5, 5.0)], 99.0, [(4.0, 0.5), (5.0, 5.0)]),
+        "never felt": ([], 99.0, []),
+    },
 )
 def test_a_finger_is_lost_where_contact_ends_though_it_rises_no_faster_than_a_pin(touching, quick, wanted):
     """At 20 mm/s from the time `quick` on it is at 30 mm/s, where pins rise at 24."""
@@ -476,14 +477,14 @@ def test_a_finger_is_lost_where_contact_ends_though_it_rises_no_faster_than_a_pi
 
 
 @pytest.mark.parametrize("rows", [1, 2])
-def test_a_history_of_a_row_or_two_has_no_losses_unless_contact_ends(rows: int) -> None:
+def test_a_history_of_a_row_or_two_has_no_losses_unless_contact_ends(rows):
     """A single row has no gradient."""
     force, ends = np.array([0.4, 0.0])[:rows], rows - 1
     assert len(summary.find_losses(TIME[:rows], force, np.zeros(rows), 24e-3)) == ends
 
 
 @pytest.mark.parametrize(
-    ("lost", "said"),
+    "lost, said",
     [
         ([(0, 0.0)], ""),
         ([(1, 2.71)], "lost once, 2.7 s without contact"),

@@ -55,13 +55,13 @@ READ = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize(("said", "words"), READ.items())
-def test_what_varies_is_read_from_a_line(said: str, words: tuple[str, ...]) -> None:
+@pytest.mark.parametrize("said, words", READ.items())
+def test_what_varies_is_read_from_a_line(said, words):
     assert read_axis(said) == Axis(said.partition("=")[0], words, said.endswith("log"))
 
 
 @pytest.mark.parametrize(
-    ("said", "message"),
+    "said, message",
     [
         ("a.b", " must be KEY=START:STOP:COUNT, KEY=START:STOP:COUNT:log or KEY=A,B,C (got 'a.b')."),
         ("a.b=1:2", " a.b must be START:STOP:COUNT or START:STOP:COUNT:log (got '1:2')."),
@@ -74,13 +74,13 @@ def test_what_varies_is_read_from_a_line(said: str, words: tuple[str, ...]) -> N
         ("a.b=1,2,1", " a.b must not name a value twice (got '1,2,1')."),
     ],
 )
-def test_what_cannot_vary_is_told_with_key_rule_and_value(said: str, message: str) -> None:
+def test_what_cannot_vary_is_told_with_key_rule_and_value(said, message):
     with pytest.raises(ParameterError, match=f"^{re.escape(f'--vary{message}')}"):
         read_axis(said)
 
 
 @pytest.mark.parametrize(
-    ("words", "message"),
+    "words, message",
     [
         ("--vary control.force_gian=1,2", "--vary: control.force_gian must be a known key (got 1)."),
         ("--vary control.force_gain=-1,2", "--vary: control.force_gain must be at least 0 1/N (got -1"),
@@ -104,14 +104,14 @@ def test_a_mistake_is_told_in_one_line_and_leaves_no_folder(words, message, here
 
 
 @pytest.mark.parametrize("tolerance", ["", "50 um"])
-def test_a_point_is_the_run_with_that_setting_also_within_a_tolerance(tolerance: str) -> None:
+def test_a_point_is_the_run_with_that_setting_also_within_a_tolerance(tolerance):
     assert main([*GAINS, *(["--tolerance", tolerance] if tolerance else [])]) == 0
     settings = [Setting("simulation.stepper", "adaptive"), Setting("simulation.tolerance", tolerance)]
     alone = run(load(find("my.toml"), [Setting("control.force_gain", "5"), *settings[: 2 * bool(tolerance)]]))
     assert rows("out")[1]["rfd (N)"] == repr(alone.metrics["rfd"])
 
 
-def test_the_table_names_axes_and_metrics_with_their_si_units() -> None:
+def test_the_table_names_axes_and_metrics_with_their_si_units():
     axes = ["--vary", "layout.pitch=3 mm:3.5 mm:2", "--metric", "rfd,lag,contact_share"]
     main(["sweep", "my.toml", "--quiet", *axes, "--out", "out"])
     assert list(rows("out")[0]) == [
@@ -135,7 +135,7 @@ def test_a_point_that_fails_or_is_no_scene_is_recorded_and_the_others_go_on(caps
     assert "must be below spring_trigger, 0.02 N (got 0.03 N)" in rows("mixed")[2]["error"]
 
 
-def test_finished_points_are_kept_for_another_metric_too_and_unreadable_ones_run_again(here: Path) -> None:
+def test_finished_points_are_kept_for_another_metric_too_and_unreadable_ones_run_again(here):
     main(GAINS)
     before, files, points = timeless(here / "out/sweep.csv"), kept("out"), here / "out" / "points"
     assert main([*GAINS, "--metric", "highest"]) == 0
@@ -149,7 +149,7 @@ def test_finished_points_are_kept_for_another_metric_too_and_unreadable_ones_run
     assert rows("out")[0]["rfd (N)"] == "42.0"
 
 
-def test_a_folder_with_another_sweep_is_refused_in_one_line(refused: Any) -> None:
+def test_a_folder_with_another_sweep_is_refused_in_one_line(refused):
     main(GAINS)
     before = kept("out")
     for change in ("--vary layout.rows=11,13", "--set layout.rows=13", "--stepper runge_kutta_4"):
@@ -162,7 +162,7 @@ def test_a_folder_with_another_sweep_is_refused_in_one_line(refused: Any) -> Non
 ERRORS = ["--metric", "rfd,height_error,force_error,total_force_error"]
 
 
-def test_errors_are_estimated_where_they_are_asked_for_and_then_stay() -> None:
+def test_errors_are_estimated_where_they_are_asked_for_and_then_stay():
     main(GAINS)
     before = rows("out")
     assert main([*GAINS, *ERRORS]) == 0
@@ -180,7 +180,7 @@ def test_errors_are_estimated_where_they_are_asked_for_and_then_stay() -> None:
     assert all(line["rfd (N)"] for line in rows("thin"))
 
 
-def test_a_sweep_estimates_errors_at_the_ends_of_what_varies_and_says_where(capsys) -> None:
+def test_a_sweep_estimates_errors_at_the_ends_of_what_varies_and_says_where(capsys):
     grid = ["--vary", "control.force_gain=1:5:3", "--vary", "control.dead_band=1e-5,2e-5,3e-5"]
     sweep = ["sweep", "my.toml", *grid, "--metric", "rfd", "--workers", "1", "--out", "grid"]
     assert main(sweep) == 0
@@ -221,7 +221,7 @@ ENDS: dict[str, tuple[list[tuple[str, ...]], list[int]]] = {
 
 
 @pytest.mark.parametrize("name", ENDS)
-def test_points_at_the_ends_are_found_whatever_their_order(name: str) -> None:
+def test_points_at_the_ends_are_found_whatever_their_order(name):
     words, expected = ENDS[name]
     keys = (
         ["blister.profile"] if "cone" in words[0] else ["control.force_gain", "layout.rows"][: len(words[0])]
@@ -242,7 +242,7 @@ AXES = [
 SHORT = [Setting("simulation.duration", "0.1")]
 
 
-def test_a_point_is_the_scene_with_its_values_in_the_same_batch_whatever_is_known_of_others() -> None:
+def test_a_point_is_the_scene_with_its_values_in_the_same_batch_whatever_is_known_of_others():
     keys = [axis.partition("=")[0] for axis in AXES]
     rows = itertools.product(*(axis.partition("=")[2].split(",") for axis in AXES))
     known, points = Findings(), make_points(find("slow_press"), SHORT, [read_axis(axis) for axis in AXES])
@@ -286,7 +286,7 @@ def test_a_point_that_fails_is_recorded_and_a_stopped_one_is_not(monkeypatch):
     assert evaluate(scene) == {"error": "ZeroDivisionError: one line and another"}
 
 
-def test_a_piece_whose_task_fails_is_told_of_and_the_others_go_on_unless_the_workers_die() -> None:
+def test_a_piece_whose_task_fails_is_told_of_and_the_others_go_on_unless_the_workers_die():
     faults = {1: DigiclayError("killed too often"), 2: KeyError("own fault"), 4: BrokenExecutor("gone")}
 
     def task(bundle: list[Point]) -> list[Record | None]:
@@ -311,10 +311,10 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> list[dict[str, str]]:
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no signals to send")
-@pytest.mark.parametrize(("number", "workers"), [(signal.SIGINT, "2"), (signal.SIGTERM, "1")])
+@pytest.mark.parametrize("number, workers", [(signal.SIGINT, "2"), (signal.SIGTERM, "1")])
 def test_a_sweep_stopped_half_way_keeps_what_is_done_and_goes_on_from_there(
-    number: int, workers: str, here: Path, whole: list[dict[str, str]], monkeypatch: pytest.MonkeyPatch
-) -> None:
+    number, workers, here, whole, monkeypatch
+):
     with monkeypatch.context() as patch:
         interrupt_after(2, patch, number)
         assert main([*QUICK, "--workers", workers, "--out", "out"]) == 130
@@ -328,7 +328,7 @@ def test_a_sweep_stopped_half_way_keeps_what_is_done_and_goes_on_from_there(
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no process groups to signal")
-def test_ctrl_c_on_a_terminal_ends_sessions_of_hours_without_a_word(here: Path) -> None:
+def test_ctrl_c_on_a_terminal_ends_sessions_of_hours_without_a_word(here):
     hours = ["--set", "simulation.duration=1e4", "--set", "recorder.every=1000"]
     process = start(PROGRAM, *MANY, *hours, "--out", "out", start_new_session=True)
     wait_until((here / "out" / "sweep.json").exists)
@@ -343,9 +343,7 @@ def idle() -> Processes[Evaluator]:
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no signals to send")
-def test_a_sweep_whose_worker_is_killed_comes_to_the_same_table(
-    here: Path, whole: list[dict[str, str]]
-) -> None:
+def test_a_sweep_whose_worker_is_killed_comes_to_the_same_table(here, whole):
     out = here / "out"
     sweep = start(PROGRAM, *QUICK, "--out", str(out))
     wait_until(lambda: list(out.glob("points/*.json")))
@@ -357,7 +355,7 @@ def test_a_sweep_whose_worker_is_killed_comes_to_the_same_table(
     assert (code, err, timeless(out / "sweep.csv")) == (0, "", whole)
 
 
-def test_a_worker_is_out_of_reach_of_ctrl_c_and_ends_when_it_cannot_read_its_bundle() -> None:
+def test_a_worker_is_out_of_reach_of_ctrl_c_and_ends_when_it_cannot_read_its_bundle():
     with idle() as processes:
         worker = processes.start(Evaluator)
         assert worker is not None

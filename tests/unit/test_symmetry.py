@@ -88,7 +88,7 @@ def alone(method: str, brush: Brush) -> int:
 
 
 @pytest.mark.parametrize(
-    ("method", "brush", "images"),
+    "method, brush, images",
     [
         ("virtual_master", Brush.LOWER, "four turns"),
         ("virtual_master", Brush.LOWER, "both"),
@@ -182,7 +182,7 @@ def meet(name: str) -> tuple[Running, float, Floats]:
 
 
 @pytest.mark.parametrize("name", MEETING)
-def test_images_that_meet_give_way_and_all_of_them_form(name: str) -> None:
+def test_images_that_meet_give_way_and_all_of_them_form(name):
     method, brush, path, images, longest = MEETING[name]
     single, *_ = follow_to_the_end(queue(begin(method), path, ALONE, brush), 64)
     session, force, _ = meet(name)
@@ -202,11 +202,11 @@ def test_images_that_meet_give_way_and_all_of_them_form(name: str) -> None:
         "a click in a small ring, every other one",
     ],
 )
-def test_a_take_in_which_images_give_way_is_replayed_bit_for_bit(name: str) -> None:
+def test_a_take_in_which_images_give_way_is_replayed_bit_for_bit(name):
     assert is_replayed(keep(meet(name)[0]))
 
 
-def test_images_begin_no_error_estimate_of_their_own() -> None:
+def test_images_begin_no_error_estimate_of_their_own():
     session = begin()
     assert session.monitor is not None
     session = replace(session, monitor=session.monitor._replace(age=100))
@@ -217,7 +217,7 @@ def test_images_begin_no_error_estimate_of_their_own() -> None:
     assert (session.monitor.age, session.monitor.state) == (101, None)
 
 
-def test_no_fingertip_lifts_again_for_another_one_that_is_down() -> None:
+def test_no_fingertip_lifts_again_for_another_one_that_is_down():
     images = make_images("RADIAL", 12, (1.1e-3, -0.7e-3), 0.4)
     session, pressing, lifted = queue(begin(), line((3.7, 0.9), (11.6, 5.4)), images, RAISE), set[int](), 0
     while session.strokes:
@@ -230,14 +230,14 @@ def test_no_fingertip_lifts_again_for_another_one_that_is_down() -> None:
 
 
 @pytest.mark.parametrize("name", ["lines that pass each other", "so with Method I, about another place"])
-def test_what_near_images_leave_does_not_depend_on_the_periods_of_a_tick(name: str) -> None:
+def test_what_near_images_leave_does_not_depend_on_the_periods_of_a_tick(name):
     method, brush, path, images, _ = MEETING[name]
     *_, left = follow_to_the_end(queue(begin(method), path, images, brush), 1)
     np.testing.assert_array_equal(left, meet(name)[2])
 
 
 @pytest.mark.parametrize("drawn", [0, 12, 29])
-def test_rays_leave_their_nominal_surface_whenever_the_hand_lets_go(drawn: int) -> None:
+def test_rays_leave_their_nominal_surface_whenever_the_hand_lets_go(drawn):
     path = line((2, 1), (18, -6))
     session = queue(begin("hybrid"), path[: drawn + 1], RAYS, RAISE, held=True)
     for _ in range(40):  # as far as the hand has drawn
@@ -250,7 +250,7 @@ def test_rays_leave_their_nominal_surface_whenever_the_hand_lets_go(drawn: int) 
     np.testing.assert_allclose(heights(session), nominal.height, rtol=0, atol=2e-6)
 
 
-def test_there_are_no_more_fingertips_than_a_bed_can_have_and_the_others_stay() -> None:
+def test_there_are_no_more_fingertips_than_a_bed_can_have_and_the_others_stay():
     session = begin(fingers=10)
     stood, most = session.poses.copy(), 0
     session = queue(session, line((24, 0), (24, 0)), make_images("RADIAL", 24))
@@ -266,7 +266,7 @@ def test_there_are_no_more_fingertips_than_a_bed_can_have_and_the_others_stay() 
 
 
 @pytest.mark.parametrize("brush", [Brush.SMOOTH, Brush.LOCK])
-def test_what_the_valves_do_alone_takes_no_further_fingertips(brush: Brush) -> None:
+def test_what_the_valves_do_alone_takes_no_further_fingertips(brush):
     session = queue(begin("hybrid"), line((8, 8), (9, 8)), make_images("XY"), brush)
     while session.strokes:
         session = sculpting.follow_finger(session, session.poses, 16)
@@ -281,7 +281,7 @@ def middle() -> Running:
     return session
 
 
-def test_a_stroke_that_is_taken_back_in_its_middle_leaves_nothing_and_another_symmetry_goes_on() -> None:
+def test_a_stroke_that_is_taken_back_in_its_middle_leaves_nothing_and_another_symmetry_goes_on():
     session = sculpting.rewind(middle())
     assert (session.poses.shape, session.system.fingers, session.strokes) == ((1, 7), 1, ())
     np.testing.assert_array_equal(heights(session), 40e-3)
@@ -292,7 +292,7 @@ def test_a_stroke_that_is_taken_back_in_its_middle_leaves_nothing_and_another_sy
     assert is_replayed(take)
 
 
-def test_a_recording_begins_and_ends_in_the_middle_of_a_stroke() -> None:
+def test_a_recording_begins_and_ends_in_the_middle_of_a_stroke():
     session = sculpting.set_recording(middle(), True)
     session = go_on(session, 20)
     assert set(keep(session).fingers) == {4}
@@ -304,7 +304,7 @@ def test_a_recording_begins_and_ends_in_the_middle_of_a_stroke() -> None:
 
 
 @pytest.mark.parametrize("change", ["settings", "a second fingertip", "both"])
-def test_settings_and_fingertips_change_in_the_middle_of_a_stroke(change: str) -> None:
+def test_settings_and_fingertips_change_in_the_middle_of_a_stroke(change):
     session = middle()
     scene, numbers = session.scene, session.numbers
     if change != "a second fingertip":
@@ -330,7 +330,7 @@ def test_settings_and_fingertips_change_in_the_middle_of_a_stroke(change: str) -
     np.testing.assert_allclose(heights(back), 40e-3, rtol=0, atol=1e-9)
 
 
-def test_a_session_begins_from_the_state_that_was_kept_in_the_middle_of_a_stroke() -> None:
+def test_a_session_begins_from_the_state_that_was_kept_in_the_middle_of_a_stroke():
     session = middle()
     again, lost = sculpting.begin_session(
         7, "Bed", session.scene, session.poses[:1], session.snapshot, 0, session.numbers, session.names

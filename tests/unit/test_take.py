@@ -3,7 +3,6 @@
 import io
 from dataclasses import replace
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -65,7 +64,7 @@ def difference(take: Take, parts: int) -> float:
     return max(float(np.abs(one.row(0) - other.row(0)).max()) for one, other in both)
 
 
-def test_a_replay_from_rest_or_a_formed_bed_ends_in_the_same_state_bit_for_bit() -> None:
+def test_a_replay_from_rest_or_a_formed_bed_ends_in_the_same_state_bit_for_bit():
     _, take, _ = taken()
     assert replayed(take)
     assert replayed(taken(True)[1])
@@ -75,7 +74,7 @@ def test_a_replay_from_rest_or_a_formed_bed_ends_in_the_same_state_bit_for_bit()
     assert not replayed(replace(take, poses=poses))
 
 
-def test_bytes_bring_a_take_and_its_orders_back_and_damaged_ones_are_refused_in_one_line() -> None:
+def test_bytes_bring_a_take_and_its_orders_back_and_damaged_ones_are_refused_in_one_line():
     _, take, _ = taken()
     data = to_bytes(take)
     back = from_bytes(data)
@@ -94,7 +93,7 @@ def test_bytes_bring_a_take_and_its_orders_back_and_damaged_ones_are_refused_in_
     assert (replayed(back), replayed(from_bytes(plain))) == (True, False)
 
 
-def test_a_finer_step_moves_heights_by_less_than_the_integrations_error() -> None:
+def test_a_finer_step_moves_heights_by_less_than_the_integrations_error():
     # 1 ms steps leave about 1 µm; a difference of nothing at all would mean that nothing was refined.
     _, take, _ = taken()
     assert 0.0 < difference(take, 4) < 5e-6
@@ -104,7 +103,7 @@ def test_a_finer_step_moves_heights_by_less_than_the_integrations_error() -> Non
             refine(scene(), parts)
 
 
-def test_a_take_as_a_scene_file_runs_to_the_same_heights(tmp_path: Path) -> None:
+def test_a_take_as_a_scene_file_runs_to_the_same_heights(tmp_path):
     system, take, last = taken()
     made = to_scene(take, "my take")
     # The finger was read every 6th period, and goes straight in between: only turning points are waypoints.
@@ -124,7 +123,7 @@ def test_a_take_as_a_scene_file_runs_to_the_same_heights(tmp_path: Path) -> None
 
 
 @pytest.mark.parametrize(
-    ("poses", "rule"),
+    "poses, rule",
     [
         (np.zeros((1, 1, 7)), "must hold one control period at least"),
         (np.zeros((3, 1, 6)), "must hold one control period at least"),
@@ -132,7 +131,7 @@ def test_a_take_as_a_scene_file_runs_to_the_same_heights(tmp_path: Path) -> None
         (np.full((3, 1, 7), np.nan), "must be finite numbers"),
     ],
 )
-def test_a_path_that_is_none_is_refused(poses: Floats, rule: str) -> None:
+def test_a_path_that_is_none_is_refused(poses, rule):
     with pytest.raises(ParameterError, match=rule):
         Take(scene(), b"", poses, b"")
 
@@ -167,7 +166,7 @@ def change_file(take: Take, **parts: object) -> bytes:
     return written.getvalue()
 
 
-def test_a_take_of_version_3_whose_orders_have_no_verb_is_replayed_bit_for_bit() -> None:
+def test_a_take_of_version_3_whose_orders_have_no_verb_is_replayed_bit_for_bit():
     rows = make_orders(30, -6e-3, 6e-3, 0.0, 10e-3, 10).rows
     system, take = assemble(SCENE), replace(ordered_take(), poses=stay_away(len(rows)), orders=None)
     *_, last = simulate_path(system, snapshot.load(system, take.start), take.poses, Orders(rows))
@@ -185,7 +184,7 @@ def rows_with(at: int, **columns: float) -> Floats:
 
 
 @pytest.mark.parametrize(
-    ("parts", "said"),
+    "parts, said",
     [
         ({"orders": np.full(ORDERS.rows.shape, "a")}, "damaged and cannot be read"),
         ({"orders": ORDERS.rows[1:]}, "got an array of the shape"),
@@ -205,13 +204,13 @@ def rows_with(at: int, **columns: float) -> Floats:
         ({"version": np.array(6)}, "its version must be at most 5"),
     ],
 )
-def test_hostile_orders_and_a_version_yet_to_come_are_refused_in_one_line(parts, said) -> None:
+def test_hostile_orders_and_a_version_yet_to_come_are_refused_in_one_line(parts, said):
     with pytest.raises(OutputError, match=said) as refused:
         from_bytes(change_file(ordered_take(), **parts))
     assert "\n" not in str(refused.value)
 
 
-def test_a_take_with_smooth_strokes_is_no_scene_file_and_a_bake_shows_what_was_smoothed() -> None:
+def test_a_take_with_smooth_strokes_is_no_scene_file_and_a_bake_shows_what_was_smoothed():
     take = ordered_take()
     system = assemble(SCENE)
     with pytest.raises(OutputError, match="has strokes in which the valves drive pins"):

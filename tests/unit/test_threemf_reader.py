@@ -121,7 +121,7 @@ ITEM = '<item objectid="1"/>'
 
 
 @pytest.mark.parametrize(
-    ("resources", "build", "head", "said"),
+    "resources, build, head, said",
     [
         (OBJECT, ITEM, ENTITIES, "must not have a document type"),
         (OBJECT, ITEM, '<!DOCTYPE x SYSTEM "file:///dev/zero">', "must not have a document type"),
@@ -147,7 +147,7 @@ def test_what_would_break_a_reader_is_refused(tmp_path, resources, build, head, 
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize(("prefixes", "taken"), [("p", True), ("p b", False), ("unheard", False)])
+@pytest.mark.parametrize("prefixes, taken", [("p", True), ("p b", False), ("unheard", False)])
 def test_a_3mf_that_needs_an_extension_is_refused_with_its_name(tmp_path, prefixes, taken):
     beams = "http://schemas.microsoft.com/3dmanufacturing/beamlattice/2017/02"
     path = packed(tmp_path / "x.3mf", OBJECT, ITEM)
@@ -189,7 +189,7 @@ def test_a_tag_of_many_megabytes_is_not_kept_waiting_for(tmp_path, filler):
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "said"),
+    "old, new, said",
     [
         (r"(?s)(.{300}).*", rb"\1", "not a zip"),
         ("(?s).*", b"", "not a zip"),

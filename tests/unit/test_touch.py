@@ -11,7 +11,7 @@ from tests.assemble import make_system, path, record
 
 
 @pytest.mark.parametrize("turn", [LEVEL, (0.8, 0.0, 0.6, 0.0), (0.5, -0.5, 0.5, 0.5), (-0.6, 0.1, 0.0, 0.8)])
-def test_a_finger_that_does_not_turn_is_that_of_the_same_poses_among_turned_ones(turn: object) -> None:
+def test_a_finger_that_does_not_turn_is_that_of_the_same_poses_among_turned_ones(turn):
     tip, rng = Fingertip(length=12e-3), np.random.default_rng(3)
     poses = np.concatenate([rng.normal(0.0, 0.02, (6, 3)), np.tile(turn, (6, 1))], axis=1)
     among = np.concatenate([poses, [[0.0, 0.0, 0.0, 0.6, 0.0, 0.0, 0.8]]])
@@ -22,7 +22,7 @@ def test_a_finger_that_does_not_turn_is_that_of_the_same_poses_among_turned_ones
     assert (together[:5] == alone).all()
 
 
-def test_a_finger_presses_the_pins_below_it_and_over_the_rim_what_there_is() -> None:
+def test_a_finger_presses_the_pins_below_it_and_over_the_rim_what_there_is():
     system = make_system(Layout(9, 9))
 
     def pressed(x: float, y: float, depth: float) -> np.ndarray:
@@ -39,7 +39,7 @@ def test_a_finger_presses_the_pins_below_it_and_over_the_rim_what_there_is() -> 
     assert not outside[:, :6].any()
 
 
-def test_the_pulp_over_a_pin_goes_on_relaxing_after_contact() -> None:
+def test_the_pulp_over_a_pin_goes_on_relaxing_after_contact():
     # Press, leave, come near again without touching: the filters have decayed all the while.
     system = make_system(Layout(1, 1))
     state, filters = begin(system), range(*system.cell.pulp_rows.indices(system.rows.physics))

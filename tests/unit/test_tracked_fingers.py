@@ -35,7 +35,7 @@ def at(*places: tuple[float, float, float]) -> list[tuple[int, tuple[float, ...]
     return [(1 + row, (*place, *LEVEL)) for row, place in enumerate(places)]
 
 
-def test_a_finger_that_is_not_named_lifts_after_100_ms_and_its_fingertip_is_free() -> None:
+def test_a_finger_that_is_not_named_lifts_after_100_ms_and_its_fingertip_is_free():
     simulated, tracks = np.tile([0.0, 0.0, 0.05, *LEVEL], (2, 1)), begin_tracks(np.zeros((2, 7)))
     tracks = name_fingers(tracks, at((0.0, 0.0, 0.05), (0.02, 0.0, 0.05)))
     lifted = []
@@ -61,9 +61,7 @@ EXCHANGED = [
 ]
 
 
-@pytest.mark.parametrize(
-    ("before", "after", "held"), [r[1:] for r in EXCHANGED], ids=[r[0] for r in EXCHANGED]
-)
+@pytest.mark.parametrize("before, after, held", [r[1:] for r in EXCHANGED], ids=[r[0] for r in EXCHANGED])
 @pytest.mark.parametrize("turn", [0.0, 2.0])
 def test_exchanged_identities_do_not_move_a_fingertip_through_the_clay(before, after, held, turn):
     way = np.array([math.cos(turn), math.sin(turn), 0.0])
@@ -89,9 +87,7 @@ RENAMED = [
 ]
 
 
-@pytest.mark.parametrize(
-    ("before", "time", "after", "held"), [r[1:] for r in RENAMED], ids=[r[0] for r in RENAMED]
-)
+@pytest.mark.parametrize("before, time, after, held", [r[1:] for r in RENAMED], ids=[r[0] for r in RENAMED])
 @pytest.mark.parametrize("turn", [0.0, 2.0])
 def test_a_finger_that_goes_on_under_another_identity_keeps_its_fingertip(before, time, after, held, turn):
     def tell(fingers: Any) -> list[tuple[int, tuple[float, ...]]]:
@@ -107,7 +103,7 @@ def test_a_finger_that_goes_on_under_another_identity_keeps_its_fingertip(before
 
 
 @pytest.mark.parametrize("far", [0.02, 1e300])
-def test_a_finger_that_is_elsewhere_all_at_once_is_not_believed_and_rises_if_it_stays(far: float) -> None:
+def test_a_finger_that_is_elsewhere_all_at_once_is_not_believed_and_rises_if_it_stays(far):
     here, there, found = np.array([[0.0, 0.0, 0.038, *LEVEL]]), (far, 0.0, 0.038), []
     tracks = replace(name_fingers(begin_tracks(here), at((0.0, 0.0, 0.038))), there=np.ones(1, bool))
     for _ in range(20):
@@ -120,7 +116,7 @@ def test_a_finger_that_is_elsewhere_all_at_once_is_not_believed_and_rises_if_it_
 
 
 @pytest.mark.parametrize("bias", [-0.011, 0.0, 0.011, 1.06])
-def test_a_clutch_takes_away_any_bias_of_height_and_slips_where_the_hand_is_raised(bias: float) -> None:
+def test_a_clutch_takes_away_any_bias_of_height_and_slips_where_the_hand_is_raised(bias):
     tracks, heights = begin_tracks(np.array([[0.0, 0.0, PARKED, *LEVEL]])), []
     for height in (0.060, 0.055, 0.045, 0.070, 0.060):
         for step in range(2):  # at first it goes over its place, whose pins it feels then
@@ -142,7 +138,7 @@ def filtered(signal: Callable[[float], float], cutoff: float, seconds: float, st
 
 
 @pytest.mark.parametrize("step", [1e-3, 5e-3])
-def test_the_filter_calms_a_trembling_hand_and_follows_a_quick_one(step: float) -> None:
+def test_the_filter_calms_a_trembling_hand_and_follows_a_quick_one(step):
     still = filtered(lambda _: 0.05, 1.0, 0.5, step)
     assert np.ptp(still) == 0.0
     # A tremor of 0.1 mm at 10 Hz, of 4 mm/s, raises the cutoff of 1 Hz by 0.1 Hz at most: a tenth passes.
@@ -155,7 +151,7 @@ def test_the_filter_calms_a_trembling_hand_and_follows_a_quick_one(step: float) 
     assert 0.1 * (4.0 - step) - ramp[-1] == pytest.approx(0.1 / (2.0 * math.pi * 3.0), rel=0.02)
 
 
-def test_a_turn_and_its_negative_are_one_to_the_filter() -> None:
+def test_a_turn_and_its_negative_are_one_to_the_filter():
     turn = np.array([0.8, 0.0, 0.0, 0.6])
     tracks = name_fingers(begin_tracks(np.zeros((1, 7))), [(1, (*PLACE, *turn))])
     tracks = name_fingers(tracks, [(1, (*PLACE, *-np.array([0.6, 0.0, 0.0, 0.8])))])
@@ -166,7 +162,7 @@ def test_a_turn_and_its_negative_are_one_to_the_filter() -> None:
 
 @pytest.mark.parametrize("deep", [1e-4, 1e-3, 5e-3, 20e-3])
 @pytest.mark.parametrize("far", [1.0, 4.0])
-def test_the_coupling_comes_to_its_balance_from_any_force(deep: float, far: float) -> None:
+def test_the_coupling_comes_to_its_balance_from_any_force(deep, far):
     exponent, unit, spring = 2000.0, 0.5, 100.0  # of the whole fingertip's force, N; N/m
 
     def press(height: float) -> float:
@@ -184,7 +180,7 @@ def test_the_coupling_comes_to_its_balance_from_any_force(deep: float, far: floa
     assert spring * (height - 0.03) == pytest.approx(balance, rel=1e-3)
 
 
-def test_a_coupled_fingertip_lands_deep_rises_over_what_is_in_its_way_and_sticks_to_nothing() -> None:
+def test_a_coupled_fingertip_lands_deep_rises_over_what_is_in_its_way_and_sticks_to_nothing():
     contact = felt([[0, 0, 0.041, *LEVEL], [0, 0, 0.0385, *LEVEL]])
     for time, then in ((5e-3, 0.03845), (1e-3, 0.03849)):
         after = give_way(np.tile([0, 0, 0.03, *LEVEL], (2, 1)), contact, 100.0, time)

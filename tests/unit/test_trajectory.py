@@ -14,7 +14,7 @@ LINEAR = Trajectory(TIMES, POSITIONS, TURNS, "linear")
 
 
 @pytest.mark.parametrize("path", [SMOOTH, LINEAR], ids=["smooth", "linear"])
-def test_the_path_passes_its_waypoints_and_stays_between_them(path: Trajectory) -> None:
+def test_the_path_passes_its_waypoints_and_stays_between_them(path):
     assert path.duration == TIMES[-1]
     there = path.poses(TIMES)
     assert there[:, :3] == pytest.approx(POSITIONS, abs=1e-17)
@@ -33,7 +33,7 @@ def test_the_path_passes_its_waypoints_and_stays_between_them(path: Trajectory) 
     assert before_and_after[:, :3] == pytest.approx(POSITIONS[[0, -1]], abs=1e-17)
 
 
-def test_the_smooth_path_has_one_velocity_on_both_sides_of_a_waypoint_and_none_at_its_ends() -> None:
+def test_the_smooth_path_has_one_velocity_on_both_sides_of_a_waypoint_and_none_at_its_ends():
     dt = 1e-6
     before, at, after = (SMOOTH.poses(TIMES + side)[:, :3] for side in (-dt, 0.0, dt))
     # One-sided differences: acceleration, up to 100 m/s², times dt; rounding 1e-17/1e-6.
@@ -42,7 +42,7 @@ def test_the_smooth_path_has_one_velocity_on_both_sides_of_a_waypoint_and_none_a
 
 
 @pytest.mark.parametrize(
-    ("times", "heights", "at", "wanted"),
+    "times, heights, at, wanted",
     [
         ([0, 1, 2, 3], [1, 2, 2, 3], np.linspace(1, 2, 50), 2.0),  # through equal values it stays
         ([0, 1], [0, 3], 0.5, 1.5),  # of two waypoints it is half way at half time
@@ -55,7 +55,7 @@ def test_the_smooth_path_of_few_waypoints(times, heights, at, wanted):
     assert poses[:, 2] == pytest.approx(wanted, abs=1e-15)
 
 
-def test_the_finger_turns_along_the_shortest_arc_at_constant_rate_by_quaternions_of_any_length() -> None:
+def test_the_finger_turns_along_the_shortest_arc_at_constant_rate_by_quaternions_of_any_length():
     # SciPy's slerp goes the short way about as well.
     times = np.linspace(TIMES[0], TIMES[-1], 300)
     slerp = Slerp(TIMES, Rotation.from_quat(TURNS[:, [1, 2, 3, 0]]))(times)

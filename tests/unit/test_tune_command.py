@@ -58,7 +58,7 @@ def files(folder: Path) -> dict[str, Any]:
     return texts | {name: timeless(folder / name) for name in ("points.csv", "front.csv")}
 
 
-def test_a_tuning_leaves_tables_a_plot_and_a_scene_that_gives_the_same_metrics(whole: Path) -> None:
+def test_a_tuning_leaves_tables_a_plot_and_a_scene_that_gives_the_same_metrics(whole):
     left = {path.name for path in whole.iterdir() if not path.name.startswith(".")}
     assert left == {"chosen.toml", "front.csv", "front.png", "points", "points.csv", "tuning.json"}
     assert len(rows(whole / "points.csv")) == len(list((whole / "points").iterdir())) == ALL
@@ -106,7 +106,7 @@ def test_points_of_another_search_are_refused_and_without_any_contact_there_is_n
 
 
 @pytest.mark.parametrize(
-    ("words", "message"),
+    "words, message",
     [
         ("--metric rfd", "--metric must name two metrics (got 'rfd')."),
         ("--metric rfd,lag,relief", "--metric must name two metrics"),
@@ -126,7 +126,7 @@ def test_a_mistake_is_told_in_one_line_and_leaves_no_folder(words, message, here
 POINTS = np.array([[1.0, 5.0], [2.0, 2.0], [3.0, 3.0], [2.0, 4.0], [5.0, 1.0], [np.nan, 0.0], [2.0, 2.0]])
 
 
-def test_a_front_has_the_points_that_none_dominates_in_order() -> None:
+def test_a_front_has_the_points_that_none_dominates_in_order():
     assert find_front(POINTS).tolist() == [0, 1, 4]
     values = np.random.default_rng(5).random((200, 2))
     front = find_front(values)
@@ -137,12 +137,12 @@ def test_a_front_has_the_points_that_none_dominates_in_order() -> None:
 
 
 @pytest.mark.parametrize(
-    ("front", "knee"),
+    "front, knee",
     [
         ([[0.0, 100.0], [1.0, 20.0], [6.0, 10.0], [10.0, 0.0]], 1),
         ([[1.0, 2.0]], 0),
         ([[1.0, 2.0], [2.0, 1.0]], 0),
     ],
 )
-def test_the_knee_is_where_both_are_small(front: list[list[float]], knee: int) -> None:
+def test_the_knee_is_where_both_are_small(front, knee):
     assert find_knee(np.array(front)) == knee

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from digiclay.core.model.conduit import Conduit, OrificeAndConduit
 from digiclay.core.model.physics import compute_rates
-from digiclay.core.model.valve import Fluid, Orifice, Valve, make_orifice
+from digiclay.core.model.valve import Fluid, Valve, make_orifice
 from scipy.integrate import quad
 
 from tests.assemble import one_cell
@@ -16,7 +16,7 @@ OPENINGS = np.array([0.05, 0.2, 0.5, 0.8, 1.0])
 #: A wide valve and a thin fluid: the flow of a free cell is turbulent.
 WIDE = Valve(orifice_diameter=0.8e-3)
 THIN = Fluid(density=760.0, viscosity=0.65e-6)
-BOTH = pytest.mark.parametrize(("valve", "fluid"), [(Valve(), Fluid()), (WIDE, THIN)])
+BOTH = pytest.mark.parametrize("valve, fluid", [(Valve(), Fluid()), (WIDE, THIN)])
 #: For the wide valve, the thin fluid and a narrow conduit: both branches, and drops of like size.
 MESH, DROPS = (grid.ravel() for grid in np.meshgrid([0.03, 0.2, 0.6, 1.0], np.geomspace(10.0, 1e6, 9)))
 #: Relative errors of some ten products; steps of 2e-13 of a drop to either side move the flow by 4e-13.
@@ -30,7 +30,7 @@ def critical(valve: Valve, fluid: Fluid, opening: Any) -> Any:
 
 
 @BOTH
-def test_the_branches_meet_at_the_critical_drop(valve: Valve, fluid: Fluid) -> None:
+def test_the_branches_meet_at_the_critical_drop(valve, fluid):
     law, drop = make_orifice(valve, fluid), critical(valve, fluid, OPENINGS)
     # Re* = sqrt(Q/(ν h_v)) = 200 is the same as Q = 4e4 ν h_v, whatever the opening.
     meeting = pytest.approx(np.full(5, 4e4 * fluid.viscosity * valve.stroke), rel=ROUNDING)
@@ -46,7 +46,7 @@ def test_the_branches_meet_at_the_critical_drop(valve: Valve, fluid: Fluid) -> N
         assert share == pytest.approx(3.0, rel=ROUNDING)
 
 
-def test_with_the_opening_as_gap_all_openings_turn_turbulent_at_one_drop() -> None:
+def test_with_the_opening_as_gap_all_openings_turn_turbulent_at_one_drop():
     valve = Valve(orifice_diameter=0.8e-3, gap="opening")
     law = make_orifice(valve, THIN)
     sides = (1.0 - 2e-13, 1.0, 1.0 + 2e-13)
@@ -72,7 +72,7 @@ def series(gap: str = "stroke") -> OrificeAndConduit:
     [make_orifice(Valve(), Fluid()), make_orifice(WIDE, THIN), series(), series("opening")],
     ids=["default", "wide", "series", "series by opening"],
 )
-def test_flow_has_the_sign_of_the_drop_alone_and_is_none_without_opening_or_drop(law: Orifice) -> None:
+def test_flow_has_the_sign_of_the_drop_alone_and_is_none_without_opening_or_drop(law):
     flow = law.flow(MESH, DROPS)
     assert np.array_equal(law.flow(MESH, -DROPS), -flow)
     assert np.array_equal(law.flow(-MESH, DROPS), flow)
@@ -81,8 +81,8 @@ def test_flow_has_the_sign_of_the_drop_alone_and_is_none_without_opening_or_drop
     assert not law.flow(MESH, np.zeros(MESH.size)).any()
 
 
-@pytest.mark.parametrize(("gap", "power"), [("stroke", 2), ("opening", 1)])
-def test_the_drops_of_valve_and_conduit_add_up(gap: str, power: int) -> None:
+@pytest.mark.parametrize("gap, power", [("stroke", 2), ("opening", 1)])
+def test_the_drops_of_valve_and_conduit_add_up(gap, power):
     law = series(gap)
     flow = law.flow(MESH, DROPS)
     # The drop over the valve alone is the inverse of each branch, told apart by Re* (Q = 4e4 ν h).
@@ -95,7 +95,7 @@ def test_the_drops_of_valve_and_conduit_add_up(gap: str, power: int) -> None:
     assert np.all(flow < law.valve.flow(MESH, DROPS))
 
 
-def test_the_resistance_is_that_of_a_parabolic_profile_and_behind_a_wide_valve_it_is_all() -> None:
+def test_the_resistance_is_that_of_a_parabolic_profile_and_behind_a_wide_valve_it_is_all():
     fluid, conduit = Fluid(), Conduit()
     edge, gradient = conduit.diameter / 2.0, 1e5 / conduit.length
 
@@ -115,7 +115,7 @@ def test_the_resistance_is_that_of_a_parabolic_profile_and_behind_a_wide_valve_i
     assert wide.flow(np.ones(3), drop) * wide.resistance == pytest.approx(drop, rel=1e-6)
 
 
-def test_the_drop_between_reservoir_and_load_moves_the_pin() -> None:
+def test_the_drop_between_reservoir_and_load_moves_the_pin():
     cell = one_cell(valve_lag=None, relaxation=None).cell
     contact, lift = cell.touch.contact, 0.5e5 * np.pi * 1e-6  # P_s A_a = 0.157 N
 

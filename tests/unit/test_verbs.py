@@ -78,7 +78,7 @@ CASES = [
 
 
 @pytest.mark.parametrize("drawn", CASES)
-def test_each_is_one_gesture_that_is_taken_back_whole_and_replayed_bit_for_bit(drawn: PointerStroke) -> None:
+def test_each_is_one_gesture_that_is_taken_back_whole_and_replayed_bit_for_bit(drawn):
     session = sculpting.set_recording(begin_hollow(), True)
     before, kept = heights(session), locked(session)
     done = play(session, drawn)
@@ -92,7 +92,7 @@ def test_each_is_one_gesture_that_is_taken_back_whole_and_replayed_bit_for_bit(d
     np.testing.assert_array_equal(locked(back), kept)
 
 
-@pytest.mark.parametrize(("strength", "left"), [(1.0, 0.02), (0.05, 5.5)])
+@pytest.mark.parametrize("strength, left", [(1.0, 0.02), (0.05, 5.5)])
 def test_one_stroke_erases_what_is_in_its_ring_and_a_weak_one_part_of_it(strength, left):
     formed = begin_hollow()
     before = relief(formed)
@@ -111,7 +111,7 @@ OTHERS = [
 
 
 @pytest.mark.parametrize(
-    ("brush", "keys", "method"),
+    "brush, keys, method",
     [*((*one, "hybrid") for one in OTHERS), (*OTHERS[0], "virtual_master"), (*OTHERS[1], "cell_states")],
 )
 def test_a_locked_pin_keeps_its_height_under_every_brush_and_no_finger_presses_into_it(brush, keys, method):
@@ -127,11 +127,11 @@ def test_a_locked_pin_keeps_its_height_under_every_brush_and_no_finger_presses_i
     assert max(force) < 0.5
 
 
-def test_locks_are_taken_off_by_ctrl_turned_over_and_cleared() -> None:
+def test_locks_are_taken_off_by_ctrl_turned_over_and_cleared():
     session, counts = begin(), []
     for drawn in (
         stroke("lock"), stroke("lock", ((12e-3, 0.0), (18e-3, 0.0)), ctrl=True),
-        stroke("invert_locks", CLICK), stroke("invert_locks", CLICK), stroke("clear_locks", CLICK),
+        stroke("invert_locks", CLICK), stroke("invert_locks", CLICK), stroke("clear_locks", CLICK)
     ):  # fmt: skip
         session = play(session, drawn)
         counts.append(int(locked(session).sum()))
@@ -145,7 +145,7 @@ def ramp(session: Running) -> Floats:
 
 
 @pytest.mark.parametrize(
-    ("keys", "turned"),
+    "keys, turned",
     [
         ({}, 0.0),
         ({"places": ((0.0, 0.0), (0.0, 15e-3))}, 90.0),
@@ -171,7 +171,7 @@ def test_a_stamp_has_the_drawn_size_turn_and_strength_up_or_down(tmp_path, keys,
 
 
 @pytest.mark.parametrize(
-    ("symmetry", "axis"), [("x", 0.0), ("y", 0.0), ("xy", 0.0), ("x", 90.0), ("radial", 0.0)]
+    "symmetry, axis", [("x", 0.0), ("y", 0.0), ("xy", 0.0), ("x", 90.0), ("radial", 0.0)]
 )
 def test_images_of_a_stamp_are_mirrored_and_turned_about_the_placed_center(tmp_path, symmetry, axis):
     np.save(tmp_path / "ramp.npy", np.tile(np.linspace(0.0, 1.0, 40), (40, 1)))
@@ -185,7 +185,7 @@ def test_images_of_a_stamp_are_mirrored_and_turned_about_the_placed_center(tmp_p
         np.testing.assert_allclose(formed, image(formed), rtol=0, atol=2e-3)
 
 
-def test_a_click_stamps_at_the_size_of_the_ring() -> None:
+def test_a_click_stamps_at_the_size_of_the_ring():
     done = play(begin(), stroke("stamp", CLICK, stamp="pyramid"))
     x = ramp(done)
     radius = 1e3 * find_radius(done.scene.fingers[0].fingertip, done.scene.layout)
@@ -194,7 +194,7 @@ def test_a_click_stamps_at_the_size_of_the_ring() -> None:
     assert raised.sum() >= 9
 
 
-def test_every_sample_can_be_stamped_and_what_is_no_shape_is_refused_in_one_line(tmp_path) -> None:
+def test_every_sample_can_be_stamped_and_what_is_no_shape_is_refused_in_one_line(tmp_path):
     from digiclay.core.shapes.fitting import list_shapes
 
     for name in list_shapes():

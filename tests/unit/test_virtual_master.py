@@ -25,7 +25,7 @@ from digiclay.core.model.control_interface import Commands, Measurement
 from digiclay.core.model.layout import Layout, make_grid
 from digiclay.core.model.valve import Fluid, Valve
 
-from tests.assemble import make_basis, make_system, master, path, record
+from tests.assemble import make_basis, make_system, master, path, record, table
 
 
 def control() -> VirtualMasterControl:
@@ -48,14 +48,14 @@ def touched(*presses: tuple[float, float, float], height: float = 40.0) -> Measu
 NOISY = [(0, 0, 0.1), (6, 0, 9e-3), (-3, 0, 0.1)]
 
 
-@pytest.mark.parametrize(
-    ("before", "floor", "presses", "place"),
-    [
-        pytest.param(None, 0.0, [(0, 0, 0.1), (3, 0, 0.1), (0, 3, 0.2)], (0.75e-3, 1.5e-3), id="centroid"),
-        pytest.param(None, 0.0, [(-20, 0, 0.1), (20, 0, 0.3)], (10e-3, 0.0), id="at first of all cells"),
-        pytest.param(master(), 0.0, [(0, 0, 0.1), (6, 0, 0.1), (9, 0, 5.0)], (3e-3, 0.0), id="later near"),
-        pytest.param(master(), 10e-3, NOISY, (-1.5e-3, 0.0), id="noise draws it not aside"),
-    ],
+@table(
+    "before, floor, presses, place",
+    {
+        "centroid": (None, 0.0, [(0, 0, 0.1), (3, 0, 0.1), (0, 3, 0.2)], (0.75e-3, 1.5e-3)),
+        "at first of all cells": (None, 0.0, [(-20, 0, 0.1), (20, 0, 0.3)], (10e-3, 0.0)),
+        "later near": (master(), 0.0, [(0, 0, 0.1), (6, 0, 0.1), (9, 0, 5.0)], (3e-3, 0.0)),
+        "noise draws it not aside": (master(), 10e-3, NOISY, (-1.5e-3, 0.0)),
+    },
 )
 def test_the_master_is_at_the_centroid_of_the_forces(before, floor, presses, place):
     method = replace(control(), floor=floor)
@@ -63,7 +63,7 @@ def test_the_master_is_at_the_centroid_of_the_forces(before, floor, presses, pla
     assert (memory.x, memory.y) == pytest.approx(place, abs=1e-15)
 
 
-def test_the_reference_is_the_surface_at_first_touch_and_the_cells_reach_to_the_edge_ring() -> None:
+def test_the_reference_is_the_surface_at_first_touch_and_the_cells_reach_to_the_edge_ring():
     memory, _ = control().locate(control().begin(), touched((0, 0, 0.05), height=52.0))
     assert memory.reference == pytest.approx(52e-3)
     assert control().locate(master(), touched((0, 0, 0.4)))[1] == pytest.approx((0.0, 0.0, 18.5e-3))
@@ -98,7 +98,7 @@ PHASES: dict[str, tuple[Master, float, list[tuple[float, float, float]], Phase, 
 }
 
 
-@pytest.mark.parametrize(("before", "floor", "presses", "phase", "losses"), PHASES.values(), ids=PHASES)
+@table("before, floor, presses, phase, losses", PHASES)
 def test_forces_set_the_phase(before, floor, presses, phase, losses):
     memory, _ = replace(control(), floor=floor).locate(before, touched(*presses))
     assert (memory.phase, memory.losses) == (phase, losses)
@@ -108,7 +108,7 @@ def test_forces_set_the_phase(before, floor, presses, phase, losses):
 
 
 @pytest.mark.parametrize(
-    ("before", "force", "count", "height"),
+    "before, force, count, height",
     [
         # 0.2 N / 200 N/m is 1 mm. The flow goes with the error squared: after 3 s some 60 µm are left.
         (master(phase=Phase.SPRING, height=40e-3), 0.2, 600, pytest.approx(39e-3, abs=0.1e-3)),
@@ -130,14 +130,14 @@ def test_a_steady_force_takes_the_master_to_a_height(before, force, count, heigh
 # Direction and loss
 
 
-@pytest.mark.parametrize(
-    ("before", "path_x", "toward"),
-    [
-        pytest.param(master(), np.linspace(0, 1.6, 500), (1.0, 0.0), id="slow, far enough"),
-        pytest.param(master(), np.linspace(0, 1.4, 500), (0.0, 0.0), id="not far enough"),
-        pytest.param(master(0.0, 1.0), [0.3, -0.4] * 200, (0.0, 1.0), id="at rest it keeps its direction"),
-        pytest.param(master(), [-5.0], (-1.0, 0.0), id="fast, in one period"),
-    ],
+@table(
+    "before, path_x, toward",
+    {
+        "slow, far enough": (master(), np.linspace(0, 1.6, 500), (1.0, 0.0)),
+        "not far enough": (master(), np.linspace(0, 1.4, 500), (0.0, 0.0)),
+        "at rest it keeps its direction": (master(0.0, 1.0), [0.3, -0.4] * 200, (0.0, 1.0)),
+        "fast, in one period": (master(), [-5.0], (-1.0, 0.0)),
+    },
 )
 def test_a_fingertip_gets_its_direction_once_it_has_gone_far_enough(before, path_x, toward):
     method, memory = control(), before
@@ -154,19 +154,19 @@ def alone(memory: Master, count: int) -> Master:
 
 
 @pytest.mark.parametrize(
-    ("phase", "count", "after"),
+    "phase, count, after",
     [
         (Phase.SHAPING, 10, (Phase.SHAPING, 0)),  # 50 ms
         (Phase.SHAPING, 11, (Phase.IDLE, 1)),
         (Phase.SPRING, 11, (Phase.IDLE, 0)),  # lost before shaping is no loss
     ],
 )
-def test_a_fingertip_is_lost_after_the_loss_time(phase: Phase, count: int, after: tuple[Phase, int]) -> None:
+def test_a_fingertip_is_lost_after_the_loss_time(phase, count, after):
     memory = alone(master(phase=phase), count)
     assert (memory.phase, memory.losses) == after
 
 
-def test_a_fingertip_felt_in_time_also_without_a_loss_time_is_not_lost_and_later_is_a_new_one() -> None:
+def test_a_fingertip_felt_in_time_also_without_a_loss_time_is_not_lost_and_later_is_a_new_one():
     waiting = alone(master(felt=44e-3), 9)
     assert waiting.felt == 44e-3 < waiting.height  # where the fingertip was felt last
     memory, _ = control().locate(waiting, touched((0, 0, 0.4)))
@@ -192,7 +192,7 @@ CELLS: dict[str, dict[str, Any]] = {
 
 @pytest.mark.parametrize("name", CELLS)
 @pytest.mark.parametrize("opening", [-1.0, -0.3, 0.0, 1e-9, 0.07, 1.0])
-def test_the_speed_is_that_of_the_valve_s_flow_law(name: str, opening: float) -> None:
+def test_the_speed_is_that_of_the_valve_s_flow_law(name, opening):
     one = make_system(**CELLS[name]).cell
     assert (one.flow.knee <= one.supply.largest) == (name == "turbulent")
     supply = one.supply.high if opening > 0.0 else one.supply.low
@@ -201,7 +201,7 @@ def test_the_speed_is_that_of_the_valve_s_flow_law(name: str, opening: float) ->
     assert make_master_cell(one, 5e-3).speed(opening) == pytest.approx(flow / one.actuator.area, rel=1e-14)
 
 
-def test_in_a_period_it_goes_the_way_its_opening_lets_it() -> None:
+def test_in_a_period_it_goes_the_way_its_opening_lets_it():
     one, period, start, command = make_system().cell, 5e-3, 0.3, 0.9
     found, last = make_master_cell(one, period).advance(40e-3, start, command)
     times = (np.arange(2000) + 0.5) / 2000 * period
@@ -242,13 +242,13 @@ def created(memory: Master, seen: Measurement, blister: Blister | None = None) -
 CONE, BELL = Blister(), Blister(profile="gaussian")
 
 
-@pytest.mark.parametrize(
-    ("blister", "distance", "profile"),
-    [
-        pytest.param(CONE, [0.0, 3e-3, 6e-3], [1.0, 1.0, 1.0], id="flat on top"),
-        pytest.param(CONE, [8.25e-3, 10.5e-3, 15e-3], [0.75, 0.5, 0.0], id="linear to its radius"),
-        pytest.param(BELL, [0.0, 7e-3, 14e-3], [1.0, np.exp(-0.5), np.exp(-2.0)], id="a Gaussian"),
-    ],
+@table(
+    "blister, distance, profile",
+    {
+        "flat on top": (CONE, [0.0, 3e-3, 6e-3], [1.0, 1.0, 1.0]),
+        "linear to its radius": (CONE, [8.25e-3, 10.5e-3, 15e-3], [0.75, 0.5, 0.0]),
+        "a Gaussian": (BELL, [0.0, 7e-3, 14e-3], [1.0, np.exp(-0.5), np.exp(-2.0)]),
+    },
 )
 def test_a_profile_has_its_formula_over_any_surface(blister, distance, profile):
     places, part = np.array(distance), np.array(profile)
@@ -257,8 +257,8 @@ def test_a_profile_has_its_formula_over_any_surface(blister, distance, profile):
         assert blister.interpolate(places, edge, top) == pytest.approx(edge + part * (top - edge), abs=1e-16)
 
 
-@pytest.mark.parametrize(("name", "rule"), [("flat_radius", "below"), ("edge_radius", "above")])
-def test_radii_in_the_wrong_order_are_refused(name: str, rule: str) -> None:
+@pytest.mark.parametrize("name, rule", [("flat_radius", "below"), ("edge_radius", "above")])
+def test_radii_in_the_wrong_order_are_refused(name, rule):
     with pytest.raises(ParameterError, match=rf"^Blister\.{name} must be {rule} the radius, 0\.015 m"):
         Blister(**{name: 15e-3})
 
@@ -267,7 +267,7 @@ def test_radii_in_the_wrong_order_are_refused(name: str, rule: str) -> None:
 
 
 @pytest.mark.parametrize("profile", ["cone", "gaussian"])
-def test_cells_of_the_blister_are_commanded_to_its_profile(profile: str) -> None:
+def test_cells_of_the_blister_are_commanded_to_its_profile(profile):
     blister = Blister(profile=profile)
     _, orders = created(master(), bed(), blister)
     inside = np.hypot(BED.x, BED.y) <= 15e-3
@@ -276,7 +276,7 @@ def test_cells_of_the_blister_are_commanded_to_its_profile(profile: str) -> None
     assert orders.target[inside] == pytest.approx(expected, abs=1e-10)
 
 
-def test_targets_stay_within_the_stroke_and_outside_the_blister_whose_next_cells_are_the_edge() -> None:
+def test_targets_stay_within_the_stroke_and_outside_the_blister_whose_next_cells_are_the_edge():
     outside, seen = np.hypot(BED.x, BED.y) > 15.1e-3, bed()
     seen.target[outside] = 47e-3
     assert np.all(created(master(), seen)[1].target[outside] == 47e-3)
@@ -287,8 +287,8 @@ def test_targets_stay_within_the_stroke_and_outside_the_blister_whose_next_cells
     assert np.array_equal(created(master(**BESIDE), bed())[1].mode == Mode.EDGE, ring)
 
 
-@pytest.mark.parametrize(("phase", "mode"), [(Phase.SHAPING, Mode.FORCE_FOLLOW), (Phase.SPRING, Mode.SPRING)])
-def test_cells_under_the_fingertip_show_the_phase(phase: Phase, mode: Mode) -> None:
+@pytest.mark.parametrize("phase, mode", [(Phase.SHAPING, Mode.FORCE_FOLLOW), (Phase.SPRING, Mode.SPRING)])
+def test_cells_under_the_fingertip_show_the_phase(phase, mode):
     seen = bed()
     seen.force[at(0, 0)] = 0.1
     assert created(master(phase=phase), seen)[1].mode[at(0, 0)] == mode
@@ -297,18 +297,18 @@ def test_cells_under_the_fingertip_show_the_phase(phase: Phase, mode: Mode) -> N
 @pytest.mark.parametrize(
     "place", [(15, 0), (-15, 0), (0, 15), (0, -15), (9, 12), (-9, 12), (12, -9), (-12, -9)]
 )
-def test_cells_exactly_on_the_rim_belong_to_the_blister_on_every_side(place: tuple[float, float]) -> None:
+def test_cells_exactly_on_the_rim_belong_to_the_blister_on_every_side(place):
     # Else a bell, which is still a tenth of its height there, would be lopsided by rounding alone.
     assert created(master(), bed())[1].mode[at(*place)] == Mode.BLISTER
 
 
-def test_cells_exactly_on_the_rim_of_the_flat_top_are_treated_alike_on_every_side() -> None:
+def test_cells_exactly_on_the_rim_of_the_flat_top_are_treated_alike_on_every_side():
     ways = EAST, WEST, (0, 1), (0, -1)
     modes = [created(master(x, y), ridge())[1].mode[at(-6 * x, -6 * y)] for x, y in ways]
     assert len(set(modes)) == 1
 
 
-def test_the_edge_height_is_the_mean_of_the_whole_ring_at_rest_and_of_that_ahead_while_moving() -> None:
+def test_the_edge_height_is_the_mean_of_the_whole_ring_at_rest_and_of_that_ahead_while_moving():
     seen = bed()
     seen.height[BED.x > 0] += 2e-3
     seen.height[BED.x < 0] -= 1e-3
@@ -331,20 +331,20 @@ def ridge(mode: Mode = Mode.BLISTER) -> Measurement:
 EAST, WEST = (1.0, 0.0), (-1.0, 0.0)
 
 
-@pytest.mark.parametrize(
-    ("toward", "before", "place", "force", "after"),
-    [
-        pytest.param(EAST, Mode.BLISTER, (-12, 0), 0.0, Mode.FROZEN, id="behind"),
-        pytest.param(EAST, Mode.BLISTER, (12, 0), 0.0, Mode.BLISTER, id="ahead"),
-        pytest.param(EAST, Mode.BLISTER, (0, 12), 0.0, Mode.BLISTER, id="abeam"),
-        pytest.param(EAST, Mode.BLISTER, (0, -12), 0.0, Mode.BLISTER, id="abeam on the other side"),
-        pytest.param(EAST, Mode.BLISTER, (-3, 0), 0.0, Mode.BLISTER, id="on the flat top"),
-        pytest.param((0.0, 0.0), Mode.BLISTER, (-12, 0), 0.0, Mode.BLISTER, id="before any direction"),
-        pytest.param(WEST, Mode.FROZEN, (-12, 0), 0.0, Mode.FROZEN, id="ahead again after a turn"),
-        pytest.param(EAST, Mode.FROZEN, (-12, 0), 0.019, Mode.FROZEN, id="touched lightly"),
-        pytest.param(EAST, Mode.FROZEN, (-12, 0), 0.02, Mode.FORCE_FOLLOW, id="pressed: freed"),
-        pytest.param(EAST, Mode.FROZEN, (-21, 0), 0.0, Mode.HOLD, id="out of the blister"),
-    ],
+@table(
+    "toward, before, place, force, after",
+    {
+        "behind": (EAST, Mode.BLISTER, (-12, 0), 0.0, Mode.FROZEN),
+        "ahead": (EAST, Mode.BLISTER, (12, 0), 0.0, Mode.BLISTER),
+        "abeam": (EAST, Mode.BLISTER, (0, 12), 0.0, Mode.BLISTER),
+        "abeam on the other side": (EAST, Mode.BLISTER, (0, -12), 0.0, Mode.BLISTER),
+        "on the flat top": (EAST, Mode.BLISTER, (-3, 0), 0.0, Mode.BLISTER),
+        "before any direction": ((0.0, 0.0), Mode.BLISTER, (-12, 0), 0.0, Mode.BLISTER),
+        "ahead again after a turn": (WEST, Mode.FROZEN, (-12, 0), 0.0, Mode.FROZEN),
+        "touched lightly": (EAST, Mode.FROZEN, (-12, 0), 0.019, Mode.FROZEN),
+        "pressed: freed": (EAST, Mode.FROZEN, (-12, 0), 0.02, Mode.FORCE_FOLLOW),
+        "out of the blister": (EAST, Mode.FROZEN, (-21, 0), 0.0, Mode.HOLD),
+    },
 )
 def test_cells_freeze_behind_a_traveling_fingertip(toward, before, place, force, after):
     seen = ridge(before)
@@ -354,22 +354,22 @@ def test_cells_freeze_behind_a_traveling_fingertip(toward, before, place, force,
     assert (orders.target[at(*place)] == 44e-3) == (after in (Mode.FROZEN, Mode.HOLD))
 
 
-@pytest.mark.parametrize(
-    ("height", "target", "after"),
-    [
+@table(
+    "height, target, after",
+    {
         # 12 mm from the master a third of the cone is left: a third of 15 mm up, or of 9 mm down.
-        pytest.param(55e-3, 44e-3, 45e-3, id="a blister"),
-        pytest.param(31e-3, 39e-3, 37e-3, id="a dent"),
-    ],
+        "a blister": (55e-3, 44e-3, 45e-3),
+        "a dent": (31e-3, 39e-3, 37e-3),
+    },
 )
-def test_what_outgrows_a_frozen_cell_takes_it_along(height: float, target: float, after: float) -> None:
+def test_what_outgrows_a_frozen_cell_takes_it_along(height, target, after):
     seen = ridge(Mode.FROZEN)._replace(target=np.full(BED.count, target))
     _, orders = created(master(*EAST, height=height), seen)
     assert orders.mode[at(-12, 0)] == Mode.FROZEN
     assert orders.target[at(-12, 0)] == pytest.approx(after, abs=1e-9)
 
 
-@pytest.mark.parametrize(("risen", "kept"), [(1.4e-3, False), (1.6e-3, True)])
+@pytest.mark.parametrize("risen, kept", [(1.4e-3, False), (1.6e-3, True)])
 def test_a_blister_in_search_of_the_finger_takes_frozen_cells_along_by_a_tenth_of_its_radius(risen, kept):
     # It has not felt the finger for a period.
     searching = master(*EAST, height=55e-3)._replace(felt=55e-3 - risen, alone=1)
@@ -377,7 +377,7 @@ def test_a_blister_in_search_of_the_finger_takes_frozen_cells_along_by_a_tenth_o
     assert target == pytest.approx(44e-3 if kept else 45e-3, abs=1e-9)
 
 
-def test_noise_neither_frees_a_frozen_cell_nor_marks_one_as_touched() -> None:
+def test_noise_neither_frees_a_frozen_cell_nor_marks_one_as_touched():
     noisy = replace(make_system(Layout(15, 15), control=VirtualMaster()).controller, floor=30e-3)
     seen = ridge(Mode.BLISTER)
     seen.mode[at(-12, 0)] = Mode.FROZEN
@@ -386,7 +386,7 @@ def test_noise_neither_frees_a_frozen_cell_nor_marks_one_as_touched() -> None:
     assert [mode[at(-12, 0)], mode[at(0, 0)]] == [Mode.FROZEN, Mode.BLISTER]
 
 
-def test_a_cell_rests_until_it_is_formed_and_without_a_fingertip_goes_to_its_target() -> None:
+def test_a_cell_rests_until_it_is_formed_and_without_a_fingertip_goes_to_its_target():
     assert created(master(*EAST), bed())[1].mode[at(-21, 0)] == Mode.REST
     seen = bed()
     seen.target[5] += 1e-3
@@ -409,13 +409,13 @@ def formed(x: float, y: float, profile: str = "cone") -> np.ndarray:
 
 
 @pytest.mark.parametrize("profile", ["cone", "gaussian"])
-def test_a_lifting_finger_takes_the_surface_along(profile: str) -> None:
+def test_a_lifting_finger_takes_the_surface_along(profile):
     # From 4.5 mm below the surface to 3 mm above; with its pulp pressed 1.5 mm the pin stands at 44.5 mm.
     assert formed(0.0, 0.0, profile)[7, 7] == pytest.approx(44.5e-3, abs=0.7e-3)
 
 
-@pytest.mark.parametrize(("x", "y", "row", "column"), [(21, 0, 7, 14), (-21, -21, 0, 0), (23, 23, 14, 14)])
-def test_a_blister_partly_off_the_bed_rises_as_well(x: float, y: float, row: int, column: int) -> None:
+@pytest.mark.parametrize("x, y, row, column", [(21, 0, 7, 14), (-21, -21, 0, 0), (23, 23, 14, 14)])
+def test_a_blister_partly_off_the_bed_rises_as_well(x, y, row, column):
     heights = formed(x, y)
     assert heights[row, column] > 43e-3
     assert heights.min() > 39.9e-3
@@ -423,7 +423,7 @@ def test_a_blister_partly_off_the_bed_rises_as_well(x: float, y: float, row: int
 
 
 @pytest.mark.parametrize("laminar", [True, False])
-def test_many_masters_decide_side_by_side_as_each_alone_bit_for_bit(laminar: bool) -> None:
+def test_many_masters_decide_side_by_side_as_each_alone_bit_for_bit(laminar):
     draw = np.random.default_rng(3)
     one, runs = control(), []
     valve = replace(one.model.flow.valve, turbulent=one.model.flow.valve.turbulent / 50.0)

@@ -77,7 +77,7 @@ def test_a_client_that_floods_or_answers_no_ping_is_closed_and_leaves_the_finger
     assert link.counts["poses"] == 2
 
 
-def test_the_fingertip_is_anothers_when_its_client_is_silent(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_fingertip_is_anothers_when_its_client_is_silent(monkeypatch):
     async def take_turns() -> list[str]:
         link, moved = make_link(), []
         for client in ("one", "two", "one"):
