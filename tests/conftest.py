@@ -1,5 +1,6 @@
 """What every test shares: one random source, no user settings, no window unless one is named."""
 
+import gc
 import os
 import tempfile
 from collections.abc import Callable
@@ -36,6 +37,15 @@ settings.register_profile("many", settings.get_profile("repeatable"), max_exampl
 settings.load_profile(os.environ.get("DIGICLAY_HYPOTHESIS", "repeatable"))
 
 WINDOW = Path(__file__).parent / "window"
+
+# Thousands of tests are collected, none of which is garbage: it is looked for in what tests leave alone.
+gc.disable()
+
+
+def pytest_collection_finish() -> None:
+    """Begin to collect garbage."""
+    gc.freeze()
+    gc.enable()
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
