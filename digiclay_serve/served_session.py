@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import math
 import operator
-import queue
-import threading
 from collections.abc import Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import AbstractContextManager, ExitStack
 from dataclasses import dataclass, replace
 from functools import cache
@@ -271,25 +270,26 @@ class PartWriter(AbstractContextManager["PartWriter"]):
         self.efforts: dict[int, dict[str, Any]] = {}
         self._old: list[Path] = []
         self._claim = ExitStack()
-        self._parts: queue.Queue[tuple[Path, Take] | None] = queue.Queue(WAITING)
-        self._thread = threading.Thread(target=self._write_all, daemon=True)
+        self._writing = ThreadPoolExecutor(1)
+        self._waiting: list[Future[None]] = []
         self.session = self._part = 1
 
     def __enter__(self) -> PartWriter:
         claim = claim_folder(self.folder, overwrite=self._overwrite, content=TAKE)
         self._claim.enter_context(claim)
         self._old = TAKE.find(self.folder)
-        self._thread.start()
         return self
 
     def put(self, take: Take) -> None:
         """Hand over a part without waiting for the disk; after a failure nothing is written any more."""
         if self.failure:
             return
-        try:
-            self._parts.put_nowait((self.folder / f"take_{self.session:03}_part_{self._part:05}.npz", take))
-        except queue.Full:
+        self._waiting = [part for part in self._waiting if not part.done()]
+        if len(self._waiting) > WAITING:
             self.failure = f"The disk is too slow for the take: {self.folder} has what was written until now."
+            return
+        path = self.folder / f"take_{self.session:03}_part_{self._part:05}.npz"
+        self._waiting.append(self._writing.submit(self._write, path, take))
         self._part += 1
 
     def end_session(self) -> None:
@@ -299,7 +299,7 @@ class PartWriter(AbstractContextManager["PartWriter"]):
 
     def finish(self) -> list[Path]:
         """Wait for the disk, and join the parts of each take; return the takes."""
-        self._end()
+        self._writing.shutdown()
         files = sorted(set(self.folder.glob("take_*_part_*.npz")).difference(self._old))
         written = []
         for name, group in groupby(files, lambda path: path.name.partition("_part_")[0]):
@@ -310,28 +310,21 @@ class PartWriter(AbstractContextManager["PartWriter"]):
             written.append(target)
         return written
 
-    def _end(self) -> None:
-        """End the thread when all is written."""
-        if self._thread.is_alive():
-            self._parts.put(None)
-            self._thread.join()
-
     def __exit__(self, *raised: object) -> None:
-        self._end()
+        self._writing.shutdown()
         self._claim.close()
 
-    def _write_all(self) -> None:
-        """Write what is handed over."""
-        while (part := self._parts.get()) is not None:
-            if self.failure:
-                continue
-            try:
-                make_folder(self.folder)
-                while self._old:
-                    self._old.pop().unlink()
-                write_whole(part[0], to_bytes(part[1]))
-            except (DigiclayError, OSError) as error:
-                self.failure = f"The take ends here: {error}"
+    def _write(self, path: Path, take: Take) -> None:
+        """Write a part, unless one before it could not be written."""
+        if self.failure:
+            return
+        try:
+            make_folder(self.folder)
+            while self._old:
+                self._old.pop().unlink()
+            write_whole(path, to_bytes(take))
+        except (DigiclayError, OSError) as error:
+            self.failure = f"The take ends here: {error}"
 
 
 def join_parts(parts: Sequence[Take]) -> Take:
