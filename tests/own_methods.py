@@ -41,6 +41,8 @@ class MethodOne(virtual_master.VirtualMaster):
     def build(self, device):
         return virtual_master.build(self, device)
 """
+COPY_TWO = COPY.replace("virtual_master", "cell_states").replace(".VirtualMaster", ".CellStates")
+COPY_THREE = COPY.replace("virtual_master", "hybrid").replace(".VirtualMaster", ".Hybrid")
 #: A memory as of a controller that follows a fingertip, and none.
 PLACED = (
     PAD.replace("    def command", "    def begin(self, device):\n        return Kept()\n\n    def command")

@@ -18,7 +18,7 @@ from digiclay.core.session.run_scene import Result, run, save
 from digiclay.core.studies.omissions import propose_omissions
 from digiclay.plugins.method_loader import load_method
 
-from tests.own_methods import COPY, PAD, PLACED, forgotten, small, write_method
+from tests.own_methods import COPY, COPY_THREE, COPY_TWO, PAD, PLACED, forgotten, small, write_method
 from tests.scene_files import folder_with, rows, timeless
 
 WAY = """trajectory.waypoints = [
@@ -169,7 +169,13 @@ def test_a_run_of_two_fingers_is_read_back_and_one_with_too_few_is_refused(broke
 
 @pytest.mark.parametrize(
     ("code", "word", "like"),
-    [(COPY, "one.py:MethodOne", "virtual_master"), (PAD, "pad.py:SoftPad", ""), (PLACED, "p.py:SoftPad", "")],
+    [
+        (COPY, "one.py:MethodOne", "virtual_master"),
+        (COPY_TWO, "two.py:MethodOne", "cell_states"),
+        (COPY_THREE, "three.py:MethodOne", "hybrid"),
+        (PAD, "pad.py:SoftPad", ""),
+        (PLACED, "p.py:SoftPad", ""),
+    ],
 )
 def test_a_method_of_ones_own_takes_several_fingers(code, word, like, tmp_path, monkeypatch) -> None:
     monkeypatch.chdir(tmp_path)
