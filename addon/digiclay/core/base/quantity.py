@@ -138,7 +138,8 @@ class Parameters:
         for name, field in vars(cls).items():
             declared = field.metadata.get("quantity") if isinstance(field, dataclasses.Field) else None
             if declared and declared.unit not in EXTENTS:
-                rule = f"must have one of the units {', '.join(filter(None, EXTENTS))}, or none for a number"
+                units = ", ".join(filter(None, EXTENTS))
+                rule = f"must have one of the units {units}, or none for a number"
                 raise ParameterError(cls.__name__, name, rule, repr(declared.unit))
 
     def __post_init__(self) -> None:
@@ -184,7 +185,7 @@ def _typed(owner: Parameters, name: str, value: Any, default: Any) -> Any:
     number = isinstance(value, (int, float)) and not isinstance(value, bool)
     if kind is float and number:
         return float(value) if _finite(value) else value
-    if kind is int and number and not isinstance(value, int) and math.isfinite(value) and value == int(value):
+    if kind is int and isinstance(value, float) and value.is_integer():
         return int(value)
     if kind is tuple and isinstance(value, (list, tuple)) and value:
         return tuple(_typed(owner, name, item, default[0]) for item in value)

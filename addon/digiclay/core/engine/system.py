@@ -76,9 +76,10 @@ def make_segments(
         times = {t for t in times if abs(t - cut) > 1e-9 * period} | {cut}
     edges = sorted(times)
     pairs = list(pairwise(edges))
-    instants = sorted({a + node * (b - a) if node < 1.0 else b for a, b in pairs for node in stepper.nodes})
-    parts = tuple(
-        Segment(a, b - a, tuple(instants.index(a + n * (b - a) if n < 1.0 else b) for n in stepper.nodes))
-        for a, b in pairs
+    times_of_nodes = [[a + node * (b - a) if node < 1.0 else b for node in stepper.nodes] for a, b in pairs]
+    instants = sorted({time for nodes in times_of_nodes for time in nodes})
+    segments = tuple(
+        Segment(a, b - a, tuple(map(instants.index, nodes)))
+        for (a, b), nodes in zip(pairs, times_of_nodes, strict=True)
     )
-    return parts, np.array(instants)
+    return segments, np.array(instants)

@@ -83,8 +83,10 @@ def remove_abandoned(folder: Path, name: str = "") -> None:
         return
     for path in paths:
         match = re.fullmatch(UNFINISHED, path.name)
+        if match is None or (name and match["name"] != name):
+            continue
         # Whether processes of other machines still run, on a shared drive, cannot be known here.
-        if match is None or (name and match["name"] != name) or match["host"] not in (None, find_host()):
+        if match["host"] not in (None, find_host()):
             continue
         with suppress(OSError):
             if may_have_made(int(match["pid"]), path.lstat().st_mtime):

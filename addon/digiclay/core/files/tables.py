@@ -71,7 +71,8 @@ def refuse_unknown(section: str, table: Table, names: Sequence[str]) -> None:
 def read_part(section: str, kind: type[Part], defaults: Table, table: Table) -> Part:
     """Return a part from the table of its section; `defaults`: values in place of those of the class."""
     quantities = list_quantities(kind)
-    refuse_unknown(section, table, (*quantities, "method") if section == "control" else tuple(quantities))
+    names = (*quantities, "method") if section == "control" else tuple(quantities)
+    refuse_unknown(section, table, names)
     given = {key: _measured(section, key, value, quantities[key].unit) for key, value in table.items()}
     try:
         return kind(**{**defaults, **given})

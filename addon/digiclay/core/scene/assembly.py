@@ -51,15 +51,15 @@ class Motion(NamedTuple):
 
 def make_motion(scene: Scene) -> Motion:
     """Return the cells of a scene and the plan of their steps."""
-    kind = import_part(*STEPPERS[scene.simulation.stepper])
-    stepper: Stepper = kind(scene.simulation.tolerance) if scene.simulation.stepper == "adaptive" else kind()
-    period = scene.simulation.control_period
+    simulation = scene.simulation
+    kind, period = import_part(*STEPPERS[simulation.stepper]), simulation.control_period
+    stepper: Stepper = kind(simulation.tolerance) if simulation.stepper == "adaptive" else kind()
     lag = scene.valve_lag or InstantValve()
     cell = Cell(scene.actuator, _make_flow(scene), scene.supply, lag, _make_touch(scene))
     line = split_delay(scene.delay, period) if scene.delay else Queue()
     # At the next command an opening with lag has a kink, and one without a jump.
     cut = 0.0 if stepper.bridges and cell.lag.rows else line.cut
-    steps, instants = make_segments(stepper, cut, period, scene.simulation.steps)
+    steps, instants = make_segments(stepper, cut, period, simulation.steps)
     return Motion(cell, line, stepper, stepper.plan(cell, line, steps), steps, instants)
 
 
@@ -119,7 +119,8 @@ def _assemble_hands(scene: Scene) -> System:
         if parts not in different:
             different[parts] = make_motion(replace(scene, fingers=(finger,)))
         motions.append(different[parts])
-    first, system = motions[0], assemble(replace(scene, fingers=scene.fingers[:1], control=None, shape=None))
+    first = motions[0]
+    system = assemble(replace(scene, fingers=scene.fingers[:1], control=None, shape=None))
     touches = [motion.cell.touch for motion in motions if motion.cell.touch]
     if 0 < len(touches) < len(motions):
         rule = "must all have a fingertip, or none of them"
@@ -242,7 +243,8 @@ def _build_method(scene: Scene, devices: list[DeviceInfo]) -> Controller:
     if not following:
         return controllers[0]
     tips = [touch.fingertip for touch in touches if touch]
-    sizes, heights = tuple(max(tip.length, tip.width) for tip in tips), tuple(tip.height for tip in tips)
+    sizes = tuple(max(tip.length, tip.width) for tip in tips)
+    heights = tuple(tip.height for tip in tips)
     felt = max(getattr(scene.control, "felt_force", 0.0), devices[0].force_floor)
     kind: type[PinDivision] = import_part("control.pin_division", following[0].division)
     division, each = kind(following, sizes, heights, felt), tuple(controllers)

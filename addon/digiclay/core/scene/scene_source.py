@@ -53,7 +53,8 @@ def load_recorded(path: Path) -> Scene:
     control = table.get("control")
     method = control.get("method") if isinstance(control, dict) else None
     if isinstance(method, str) and method.isidentifier() and method not in list_methods():
-        table = {key: value for key, value in table.items() if key != "blister"} | {"control": ABSENT}
+        table.pop("blister", None)
+        table["control"] = ABSENT
     return make_scene(path, table)
 
 
@@ -105,9 +106,10 @@ def _find_beside(table: Mapping[str, Any], folder: Path) -> Mapping[str, Any]:
     """Return the table with the path of a shape's file beside the scene file, or in a folder there."""
     shape = table.get("shape")
     name = shape.get("file") if isinstance(shape, dict) else None
-    if isinstance(name, str) and Path(name).suffix and "\0" not in name and (folder / name).is_file():
-        return {**table, "shape": {**table["shape"], "file": str((folder / name).resolve())}}
-    return table
+    if not isinstance(name, str) or not Path(name).suffix or "\0" in name:
+        return table
+    file = folder / name
+    return {**table, "shape": {**table["shape"], "file": str(file.resolve())}} if file.is_file() else table
 
 
 def _override(table: Mapping[str, Any], settings: Sequence[Setting]) -> dict[str, Any]:

@@ -228,7 +228,8 @@ class Scene:
     def with_sections(self, **parts: Any) -> Scene:
         """Return the scene with other parts, by the names of sections; those of a finger in all fingers."""
         of_finger = {name: parts.pop(name) for name in FINGER_SECTIONS if name in parts}
-        return replace(self, fingers=tuple(replace(finger, **of_finger) for finger in self.fingers), **parts)
+        fingers = tuple(replace(finger, **of_finger) for finger in self.fingers)
+        return replace(self, fingers=fingers, **parts)
 
     def with_fingers(self, count: int) -> Scene:
         """Return the scene with at least `count` fingers: its own, and further ones like the first."""

@@ -211,7 +211,8 @@ def _write_lines(scene: Scene, write: Writer) -> Iterator[str]:
             break
         yield f"\n[[{FINGERS}]]"
         parts = {name: getattr(finger, name) for name in FINGER_PARTS}
-        yield from (f'{name} = "{ABSENT}"' for name in parts if name in OPTIONAL and parts[name] is None)
+        absent = [name for name in parts if name in OPTIONAL and parts[name] is None]
+        yield from (f'{name} = "{ABSENT}"' for name in absent)
         for name, part in parts.items():
             yield from write(f"{FINGERS}.{name}", part)
         yield from write(f"{FINGERS}.trajectory", finger.trajectory)

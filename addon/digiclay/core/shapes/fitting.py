@@ -75,7 +75,8 @@ def unpack(text: str, grid: Grid) -> Floats:
     heights = np.frombuffer(data, "<f4").astype(np.float64)
     if not np.all(np.isfinite(heights)):
         cell = int(np.flatnonzero(~np.isfinite(heights))[0])
-        raise ParameterError("shape", "heights", "must be finite numbers", f"{heights[cell]} at cell {cell}")
+        value = f"{heights[cell]} at cell {cell}"
+        raise ParameterError("shape", "heights", "must be finite numbers", value)
     return heights
 
 

@@ -93,7 +93,8 @@ def _read_tags(file: BinaryIO, start: int) -> dict[int, Any]:
     file.seek(start + struct.unpack(order + offset, read(offset))[0])
     (count,) = struct.unpack(order + number, read(number))
     tags: dict[int, Any] = {}
-    for tag, kind, items, content in struct.iter_unpack(order + entry, read(entry, min(count, MOST_TAGS))):
+    entries = read(entry, min(count, MOST_TAGS))
+    for tag, kind, items, content in struct.iter_unpack(order + entry, entries):
         if ITEMS.get(kind, 0) * items > len(content):
             file.seek(start + struct.unpack(order + offset, content)[0])
             content = file.read(min(items, 99))
@@ -180,7 +181,8 @@ def read_pixels(path: Path) -> Pixels:
     else:
         if READERS:  # Blender gives whole numbers as shares of the largest one
             bits = head.tags.get(BITS, 1)
-            absent /= {1: 2.0**bits - 1, 2: 2.0 ** (bits - 1) - 1}.get(head.tags.get(FORMAT, 1), 1.0)
+            largest = {1: 2.0**bits - 1, 2: 2.0 ** (bits - 1) - 1}  # unsigned and signed
+            absent /= largest.get(head.tags.get(FORMAT, 1), 1.0)
             if pixels.shape[::-1] != head.size:
                 rule = "must be as small as Blender reads it unscaled where it has pixels without data"
                 raise make_refusal(rule, str(path), "{} x {}".format(*head.size or ()))
@@ -341,7 +343,8 @@ class HeightMap:
         across, along = (grid.x - at.x) / at.factor_x, (grid.y - at.y) / at.factor_y
         covered = _within(across, self.pixels[1]) & _within(along, self.pixels[0])
         under_a_pin = min(grid.layout.pitch / at.factor_x, grid.layout.row_spacing / at.factor_y)
-        block = max(1, int(min(under_a_pin / self.block, max(self.values.shape)) + RELATIVE_TOLERANCE))
+        values_under_a_pin = min(under_a_pin / self.block, max(self.values.shape))
+        block = max(1, int(values_under_a_pin + RELATIVE_TOLERANCE))
 
         def interpolate(table: Floats) -> Floats:
             means = average_blocks(table, block)
@@ -379,7 +382,8 @@ def make_height_map(
         row, column = (bad[0] * block).tolist()
         rule = f"must hold finite numbers only, of at most {LARGEST:g}"
         raise make_refusal(rule, name, f"{means[tuple(bad[0])]} at {row}, {column}")
-    return HeightMap(name, means, (values.shape[0], values.shape[1]), block, value_length, length, share)
+    rows, columns = values.shape
+    return HeightMap(name, means, (rows, columns), block, value_length, length, share)
 
 
 #: Grids of numbers as texts, by extension.
@@ -451,7 +455,8 @@ def _scale(position: Floats, pixels: int, block: int, count: int) -> Floats:
 def _bilinear(values: Floats, rows: Floats, columns: Floats) -> Floats:
     """Return values between the numbers of a table, shape (n,)."""
     row, column = rows.astype(np.intp), columns.astype(np.intp)
-    below, right = np.minimum(row + 1, values.shape[0] - 1), np.minimum(column + 1, values.shape[1] - 1)
+    last_row, last_column = values.shape[0] - 1, values.shape[1] - 1
+    below, right = np.minimum(row + 1, last_row), np.minimum(column + 1, last_column)
     up, over = rows - row, columns - column
     first = values[row, column] * (1.0 - over) + values[row, right] * over
     second = values[below, column] * (1.0 - over) + values[below, right] * over

@@ -91,7 +91,9 @@ def _hard(cell: Cell, to_load: float, steepest: float) -> float:
     spare = cell.flow.knee - cell.supply.largest
     if spare <= 0.0:
         return -math.inf
-    return min(0.5 * LARGE, math.log1p(spare / to_load), math.log(0.5 * LARGE / max(steepest, TINY)))
+    turbulent = math.log1p(spare / to_load)
+    overflow = math.log(0.5 * LARGE / max(steepest, TINY))
+    return min(0.5 * LARGE, turbulent, overflow)
 
 
 def _moves(supply: Supply, steps: Floats, deviations: Floats, decay: Floats, exponent: float) -> Floats:
@@ -196,7 +198,8 @@ class BernoulliExponential(Alike):
             deviations[s, points] = steps[s, points] * (0.5 - (times[points] - part.start) / part.length)
         widest = float(cell.flow.laminar_conductance(1.0))
         hard = _hard(cell, to_load, to_decay * widest * float(steps.sum(axis=1).max()))
-        moves = _moves(supply, steps, m * deviations, to_decay * np.array(shares)[:, None] * steps, m)
+        decay = to_decay * np.array(shares)[:, None] * steps
+        moves = _moves(supply, steps, m * deviations, decay, m)
         path = m * _path(segments)
         return BernoulliPlan(
             cell,

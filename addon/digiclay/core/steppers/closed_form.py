@@ -137,15 +137,9 @@ class StepStart(NamedTuple):
     idle: NDArray[np.bool_]
     """Cells that the pulp does not push at the start."""
 
-    def conductance(self, load: Floats) -> Floats:
-        """Return the secant conductance under a load, Pa, at each Gauss point."""
-        return self.cell.flow.conductance(self.openings, self.pressure - load)
-
     def rises(self, load: Floats | float) -> Floats:
         """Return the rise, m, by the flow at each Gauss point, times its weight, under a load, Pa."""
-        drop = self.pressure - load
-        rises: Floats = self.weights * (self.cell.flow.conductance(self.openings, drop) * drop)
-        return rises
+        return self.weights * self.cell.flow.flow(self.openings, self.pressure - load)
 
 
 def find_loaded_path(

@@ -180,7 +180,8 @@ def plan_together(cells: Sequence[Cell], queue: Queue, segments: tuple[Segment, 
                 rows.append(np.zeros(count))
                 rows[-1][list(segment.nodes)] = row
             for instant in at * (len(nodes) - 1):
-                beside.append((segment.nodes[math.floor(instant)], segment.nodes[math.ceil(instant)]))
+                before, after = math.floor(instant), math.ceil(instant)
+                beside.append((segment.nodes[before], segment.nodes[after]))
             length = segment.length / PARTS
             parts.append(Segment(segment.start + part * length, length, (first, first + 1, first + 2)))
     stepper = BernoulliExponential()
