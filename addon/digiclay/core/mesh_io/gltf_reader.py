@@ -159,11 +159,14 @@ class _File:
             raise make_refusal(rule, self._path.name, f"accessor {accessor}")
         if entry["type"] != kind or entry["componentType"] not in NUMBERS:
             raise ValueError(f"accessor {accessor} is no {kind} of a known type")
-        number, width, count = np.dtype(NUMBERS[entry["componentType"]]), ITEMS[kind], self.size(accessor)
+        number = np.dtype(NUMBERS[entry["componentType"]])
+        width, count = ITEMS[kind], self.size(accessor)
         view = self._entry("bufferViews", entry["bufferView"])
         item = number.itemsize * width
-        offset, stride = read_count(entry.get("byteOffset", 0)), read_count(view.get("byteStride", item))
-        start, length = read_count(view.get("byteOffset", 0)), read_count(view["byteLength"])
+        offset = read_count(entry.get("byteOffset", 0))
+        stride = read_count(view.get("byteStride", item))
+        start = read_count(view.get("byteOffset", 0))
+        length = read_count(view["byteLength"])
         buffer = self._buffer(view["buffer"])
         if stride < item or (count and offset + (count - 1) * stride + item > length):
             raise ValueError(f"accessor {accessor} reaches beyond its view")

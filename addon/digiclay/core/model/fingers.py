@@ -37,7 +37,8 @@ def gather_places(inside: Flags, basis: Floats) -> Places:
     present = np.arange(sizes.max(initial=0)) < sizes[:, None]
     cells = np.zeros(present.shape, np.intp)
     cells[present] = inside[fingers].nonzero()[1]
-    return Places(fingers, np.ascontiguousarray(np.moveaxis(basis[:, cells], 0, 1)), np.flatnonzero(present))
+    of_fingers = np.ascontiguousarray(np.moveaxis(basis[:, cells], 0, 1))
+    return Places(fingers, of_fingers, np.flatnonzero(present))
 
 
 @dataclass(frozen=True)

@@ -49,7 +49,8 @@ def select_law(section: str, parameters: Any) -> Any:
 def _load(section: str, law: str) -> Any:
     """Import the class of a law's parameters, and refuse one with which the steppers cannot compute."""
     kind, (base, needed) = import_part(*LAWS[section][law]), NEEDED[section]
-    missing = [parent.__name__ for parent in (import_part(*base), Parameters) if not issubclass(kind, parent)]
+    parents = import_part(*base), Parameters
+    missing = [parent.__name__ for parent in parents if not issubclass(kind, parent)]
     missing += [name for name in needed if not hasattr(kind, name)]
     if missing:
         rule = f"must derive from Parameters and {base[1]}, and have {', '.join(needed)}"

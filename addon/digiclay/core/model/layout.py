@@ -157,7 +157,8 @@ class Grid:
             return lines
 
         row = span((y - size - bottom) / plan.row_spacing, 2.0 * size / plan.row_spacing, plan.rows)
-        first, width = (x - size - left - plan.shift) / plan.pitch, (2.0 * size + plan.shift) / plan.pitch
+        first = (x - size - left - plan.shift) / plan.pitch
+        width = (2.0 * size + plan.shift) / plan.pitch
         cells = row.transpose(0, 2, 1) * plan.columns + span(first, width, plan.columns)
         square = (self.x.take(cells) - x) ** 2 + (self.y.take(cells) - y) ** 2
         covered[cells[square <= radius * np.abs(radius) * (1.0 + RELATIVE_TOLERANCE)]] = True

@@ -122,7 +122,8 @@ def play(take: Take, scene: Scene | None = None) -> Iterator[tuple[System, State
         return other, snapshot.change_fingers(system, other, state, former)
 
     system = assemble(scene.with_fingers(snapshot.count_fingers(take.start)))
-    state, first, end = snapshot.load(system, take.start), 0, take.end and snapshot.count_fingers(take.end)
+    state, first = snapshot.load(system, take.start), 0
+    end = take.end and snapshot.count_fingers(take.end)
     yield system, state
     for count, group in groupby(take.fingers):
         system, state = change(system, state, count)

@@ -38,8 +38,8 @@ _ALL_BUT_GONE = float(np.nextafter(-1.0, 0.0))
 def solve_pressed(grown: Floats, growth: Floats, decay: Floats) -> Floats:
     """Return the relief of cells that stay under load: ``e(1) - e(0) = growth - relief``.
 
-    It is ``log(1 + q)``, ``q = decay grown (exp(growth) - 1)/growth``, with `grown` = ``exp(e(0))``; relief
-    / decay is the mean of exp(e). Growth and decay must not be zero (use `TINY`), nor an exponent above
+    It is ``log(1 + q)``, ``q = decay grown (exp(growth) - 1)/growth``, with `grown` = ``exp(e(0))``. The mean
+    of exp(e) is ``relief / decay``. Growth and decay must not be zero (use `TINY`), nor an exponent above
     `LARGE`.
     """
     q: Floats = np.expm1(growth)

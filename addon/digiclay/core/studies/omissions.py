@@ -147,7 +147,8 @@ def find_omissions(
 
 def _change(scene: Scene, section: str, **values: float) -> Scene:
     """Return a scene with other parameters of a part, or without the part if none are given."""
-    return scene.with_sections(**{section: replace(scene.section(section), **values) if values else None})
+    part = replace(scene.section(section), **values) if values else None
+    return scene.with_sections(**{section: part})
 
 
 def _measure(full: Scene, less: Scene, budget: float) -> tuple[float, float, float]:

@@ -76,8 +76,9 @@ def _make_folder(path: Path, kind: Kind, during_creation: ExitStack, until_the_e
 def _is_bare(path: Path, kind: Kind) -> bool:
     """Return whether a folder has no results: only lock, description and empty folders of a series."""
     for entry in path.iterdir():
-        frame = entry.name in (LOCK, kind.mark) or run_folder.is_unfinished(entry)
-        if not frame and not (entry.name in kind.folders and entry.is_dir() and not any(entry.iterdir())):
+        if entry.name in (LOCK, kind.mark) or run_folder.is_unfinished(entry):
+            continue
+        if entry.name not in kind.folders or not entry.is_dir() or any(entry.iterdir()):
             return False
     return True
 

@@ -75,8 +75,8 @@ class Field:
         for start in range(0, len(position), rows):
             part = slice(start, start + rows)
             here = position[part, None] + steps[:, None] * direction[part, None]
-            above = np.column_stack([self.bed.at(self.off, position[part]), self.bed.at(self.off, here)])
-            above -= level[part, None]
+            at_start, on_path = self.bed.at(self.off, position[part]), self.bed.at(self.off, here)
+            above = np.column_stack([at_start, on_path]) - level[part, None]
             fallen = above < 0.0  # not where the bed has ended: NaN
             first = np.argmax(fallen | np.isnan(above), axis=1)
             row = np.arange(len(first))
@@ -229,7 +229,8 @@ class Field:
         pitch = self.bed.spacing
         run = measure_run(line)
         # Its last pins may turn aside, at the edge of the bed more of them: the line goes straight on there.
-        around = line[-1] + (half + pitch) * np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])
+        directions = np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])
+        around = line[-1] + (half + pitch) * directions
         at_edge = bool(np.isnan(self.bed.at(self.off, around)).any())
         aside_at_end = half if at_edge else min(half, pitch)
         before = run <= run[-1] - (aside_at_end if run[-1] > 4.0 * half else 0.0)
@@ -265,8 +266,11 @@ class Field:
             fallen = along[k - 1] + (along[k] - along[k - 1]) * share
             aside = np.array([-direction[1], direction[0]])
             sides = self.falls(fine[[at, at]], np.stack([aside, -aside]), np.full(2, 0.5 * level))
-            wide = 0.5 * float(sides.sum()) if np.isfinite(sides).all() else min(float(sides.min()), half)
-            end = float(fallen) - min(wide, WIDE * half)
+            if np.isfinite(sides).all():
+                half_here = 0.5 * float(sides.sum())
+            else:
+                half_here = min(float(sides.min()), half)
+            end = float(fallen) - min(half_here, WIDE * half)
         if end <= 0.0:
             return line[:1]
         before = along < end - 0.25 * pitch
@@ -280,7 +284,8 @@ def space_evenly(points: Floats, step: float) -> Floats | None:
     run = measure_run(points)
     if run[-1] < 1e-9:
         return None
-    return place_along(np.linspace(0.0, run[-1], max(2, int(np.ceil(run[-1] / step - TIE)) + 1)), run, points)
+    count = max(2, int(np.ceil(run[-1] / step - TIE)) + 1)
+    return place_along(np.linspace(0.0, run[-1], count), run, points)
 
 
 def _straight(leg: Floats) -> tuple[Floats, Floats]:
@@ -299,7 +304,10 @@ def _turns(line: Floats, width: int, closed: bool) -> Floats:
     count = len(line) - 1
     at = np.arange(count + 1)
     before, after = at - width, at + width
-    before, after = (before % count, after % count) if closed else (before.clip(0), after.clip(None, count))
+    if closed:
+        before, after = before % count, after % count
+    else:
+        before, after = before.clip(0), after.clip(None, count)
     arriving, leaving = line - line[before], line[after] - line
     sine = arriving[:, 0] * leaving[:, 1] - arriving[:, 1] * leaving[:, 0]
     return np.asarray(settle(np.abs(np.arctan2(sine, np.sum(arriving * leaving, axis=1)))))
@@ -419,7 +427,9 @@ def _parted(chain: Chain, field: Field, half: float, least: float) -> list[Chain
         if off[at] >= SADDLE * banks[at]:
             return [chain]
         first, last = find_stretch(off < off[at] + LEVEL * (banks[at] - off[at]), at)
-        if banks[at] - off[at] >= least and run[last] - run[first] <= NOTCH * half and 0 < at < len(off) - 1:
+        deep = banks[at] - off[at] >= least
+        short = run[last] - run[first] <= NOTCH * half
+        if deep and short and 0 < at < len(off) - 1:
             first, last = find_stretch(off < SADDLE * banks[at], at)
             part = replace(chain, points=points[: max(first, 1)], joined=(chain.joined[0], False))
             rest = points[min(last + 1, len(off) - 1) :]

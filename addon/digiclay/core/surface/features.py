@@ -271,7 +271,9 @@ def _divide(
     others: Region | None = region
     while len(every) > 1 and rest is not None:
         piece, rest = divide(rest, _nearer(rest, every))
-        apart, others = divide(others or region, _nearer(others or region, every), GAP * grid.formed.pitch)
+        undivided = others or region
+        gap = GAP * grid.formed.pitch
+        apart, others = divide(undivided, _nearer(undivided, every), gap)
         if piece is not None:
             yield every[-1], pins[owner == len(every) - 1], piece, apart or piece
         every = every[:-1]
@@ -313,6 +315,8 @@ def make_table(features: list[Feature]) -> list[tuple[str, ...]]:
 
 def summarize(features: list[Feature]) -> str:
     """Return the numbers of bosses and creases in words."""
-    kinds = (("boss", "bosses"), ("crease", "creases"))
-    counts = [(sum(feature.kind == kind for feature in features), kind, plural) for kind, plural in kinds]
-    return " and ".join(f"{count} {kind if count == 1 else plural}" for count, kind, plural in counts)
+    parts = []
+    for kind, plural in (("boss", "bosses"), ("crease", "creases")):
+        count = sum(feature.kind == kind for feature in features)
+        parts.append(f"{count} {kind if count == 1 else plural}")
+    return " and ".join(parts)

@@ -50,7 +50,8 @@ def make_parts(formed: Formed) -> Parts:
     order = np.argsort(sides)
     rank = np.minimum(np.searchsorted(sides, end * size + start, sorter=order), len(sides) - 1)
     twin = order[rank]
-    return Parts(corner, start, end, pin, np.where((start[twin] == end) & (end[twin] == start), twin, -1))
+    opposite = (start[twin] == end) & (end[twin] == start)
+    return Parts(corner, start, end, pin, np.where(opposite, twin, -1))
 
 
 def make_pins_solid(formed: Formed, base_thickness: float = BASE_THICKNESS) -> tuple[Floats, Faces, Indices]:

@@ -24,9 +24,11 @@ def find_ray(lens: Floats, seen: Floats, screen: Floats) -> tuple[Floats, Floats
     """
     across = np.array([lens[0, 0], lens[1, 1]])
     if lens[3, 2]:
-        eye, direction = np.zeros(3), np.array([*((screen + lens[:2, 2]) / across), -1.0])
+        eye = np.zeros(3)
+        direction = np.array([*((screen + lens[:2, 2]) / across), -1.0])
     else:
-        eye, direction = np.array([*((screen - lens[:2, 3]) / across), BEHIND]), np.array([0.0, 0.0, -1.0])
+        eye = np.array([*((screen - lens[:2, 3]) / across), BEHIND])
+        direction = np.array([0.0, 0.0, -1.0])
     inverse = np.linalg.inv(seen)
     direction = inverse[:3, :3] @ direction
     return inverse[:3, :3] @ eye + inverse[:3, 3], direction / np.linalg.norm(direction)

@@ -89,10 +89,12 @@ def _straight(formed: Formed, pins: Floats, parts: int) -> Floats:
         a, b = pins[row, :-1, None, None], pins[row, 1:, None, None]
         d, c = pins[row + 1, :-1, None, None], pins[row + 1, 1:, None, None]
         if (formed.shift > 0.0) == (row % 2 == 0):
-            near, far = a + along * (b - a) + up * (d - a), c + (1 - along) * (d - c) + (1 - up) * (b - c)
+            near = a + along * (b - a) + up * (d - a)
+            far = c + (1 - along) * (d - c) + (1 - up) * (b - c)
             patch = np.where(along + up <= 1.0, near, far)
         else:
-            near, far = a + along * (b - a) + up * (c - b), a + along * (c - d) + up * (d - a)
+            near = a + along * (b - a) + up * (c - b)
+            far = a + along * (c - d) + up * (d - a)
             patch = np.where(along >= up, near, far)
         rows = slice(row * parts + 1, (row + 1) * parts)
         fine[rows, :-1] = np.moveaxis(patch, 0, 1)[1:].reshape(parts - 1, -1)
