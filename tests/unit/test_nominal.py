@@ -4,12 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from digiclay.core.base.arrays import Floats
 from digiclay.core.control.blister import Blister
 from digiclay.core.model.fingertip import Fingertip
 from digiclay.core.model.layout import Layout, make_grid
-from digiclay.strokes.nominal import Device, Ghost, Nominal, extend, find_ghosts, find_nominal
-from digiclay.strokes.stroke import Brush, Stroke, deepen, lay_path, lay_ring, make_images, start
+from digiclay.strokes.nominal import Device, extend, find_ghosts, find_nominal
+from digiclay.strokes.stroke import Brush, deepen, lay_path, lay_ring, make_images, start
+from numpy.testing import assert_allclose, assert_array_equal
 
 from tests.assemble import table
 
@@ -34,12 +34,12 @@ PATHS = {
 }
 
 
-def stroke(path: Floats, brush: Brush = Brush.RAISE, amount: float = 4e-3, **more: object) -> Stroke:
+def stroke(path, brush=Brush.RAISE, amount=4e-3, **more):
     """Return a stroke along a path (k, 2), m."""
     return lay_path(start(1, *path[0], amount, brush=brush, **more), path)
 
 
-def measure_distance(path: Floats) -> Floats:
+def measure_distance(path):
     """Return the distances of all pins from a path, (n,), m, by its points some 20 µm apart."""
     steps = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path, axis=0).T))])
     fine = np.linspace(0.0, steps[-1], 1 + int(steps[-1] / 20e-6))
@@ -58,7 +58,7 @@ def test_the_height_follows_from_the_distance_to_the_path_alone(name, brush):
     section = np.where(distance <= 7.5e-3, np.clip((7.5e-3 - distance) / 4.5e-3, 0.0, 1.0), 0.0)
     sign = 1.0 if brush is Brush.RAISE else -1.0
     # The flank goes 0.9 mm up a mm, and the points cut the path's corners by up to 0.5 µm.
-    np.testing.assert_allclose(found, sign * 4e-3 * section, rtol=0, atol=1e-6)
+    assert_allclose(found, sign * 4e-3 * section, rtol=0, atol=1e-6)
 
 
 @pytest.mark.parametrize("name", PATHS)
@@ -69,7 +69,7 @@ def test_where_no_blister_is_the_fingertip_leaves_its_underside(name):
     )
     gap = 4e-3 - np.sqrt(np.maximum(16e-6 - measure_distance(path) ** 2, 0.0))
     # Of a ball 1.5 mm from one place of the path to the next: 0.07 mm between two.
-    np.testing.assert_allclose(found.height - REST, np.minimum(gap - 2e-3, 0.0), rtol=0, atol=0.15e-3)
+    assert_allclose(found.height - REST, np.minimum(gap - 2e-3, 0.0), rtol=0, atol=0.15e-3)
 
 
 @pytest.mark.parametrize("accumulate, height", [(False, 4e-3), (True, 8e-3)])
@@ -91,7 +91,7 @@ def test_mirror_images_are_alike_and_meet_without_a_seam(symmetry, brush):
     )
     for axis in (0, 1):
         if "YX"[axis] in symmetry:
-            np.testing.assert_allclose(found, np.flip(found, axis), rtol=0, atol=1e-12)
+            assert_allclose(found, np.flip(found, axis), rtol=0, atol=1e-12)
     assert np.ptp(found) > 2e-3
 
 
@@ -103,17 +103,17 @@ def test_images_about_a_center_are_alike_at_every_turn(count):
         find_nominal(stroke(np.array([image.place(*at) for at in LINE * 0.4 + [9e-3, 0.0]])), DEVICE, FLAT)
         for image in images
     ]
-    np.testing.assert_allclose(found, np.max([one.height for one in single], axis=0), rtol=0, atol=1e-12)
+    assert_allclose(found, np.max([one.height for one in single], axis=0), rtol=0, atol=1e-12)
 
 
 @pytest.mark.parametrize("accumulate", [False, True])
 def test_a_surface_that_is_extended_is_that_of_the_whole_path(accumulate):
     whole = stroke(PATHS["a figure eight"], accumulate=accumulate, images=make_images("X"))
-    part: Nominal | None = None
+    part = None
     for count in (1, 2, 50, 51, len(whole.samples)):
         shown = replace(whole, samples=whole.samples[:count])
         part = find_nominal(shown, DEVICE, FLAT) if part is None else extend(part, shown, DEVICE)
-    np.testing.assert_array_equal(part.height, find_nominal(whole, DEVICE, FLAT).height)
+    assert_array_equal(part.height, find_nominal(whole, DEVICE, FLAT).height)
 
 
 CLIFF = FLAT + np.where(BED.x > 0.0, 5e-3, 0.0)
@@ -148,7 +148,7 @@ def test_no_pin_is_pressed_below_the_floor_and_a_deepened_stroke_is_deeper_from_
 
 def test_a_ghost_that_is_drawn_on_is_that_of_the_whole_path_and_others_stay():
     first, last = stroke(LINE), replace(stroke(WAVE, Brush.LOWER), number=2)
-    kept: tuple[Ghost, ...] = ()
+    kept = ()
     for count in (1, 2, 60, 200):
         drawn = replace(last, samples=last.samples[:count])
         before, kept = kept, find_ghosts((first, drawn), DEVICE, FLAT.copy(), kept)

@@ -4,20 +4,18 @@ from functools import cache
 
 import numpy as np
 import pytest
-from digiclay.core.base.arrays import Floats
 from digiclay.core.base.modes import Mode
 from digiclay.core.control.drive import DriveParameters
 from digiclay.core.control.methods import METHODS
 from digiclay.core.control.orders import Orders, Verb, find_fault, order_periods, place, repeat_order
 from digiclay.core.control.virtual_master import Master, Phase
 from digiclay.core.engine.simulation import begin
-from digiclay.core.engine.state import State
-from digiclay.core.engine.system import System
-from digiclay.core.model.control_interface import Controller, Measurement
+from digiclay.core.model.control_interface import Measurement
 from digiclay.core.model.physics import find_speeds
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.toml_table import resolve
 from digiclay.core.session.live_session import has_arrived, simulate_path
+from numpy.testing import assert_allclose, assert_array_equal
 
 from tests.assemble import table
 from tests.reliefs import heighten, make_orders, make_spike_and_ridge, measure_roughness, stay_away
@@ -33,11 +31,11 @@ STROKE = make_orders(100, -9e-3, 9e-3, -3e-3, RADIUS)
 
 @cache
 def bed(
-    arrangement: str = "aligned", method: str = "virtual_master", size: int = 13, period: float = 5e-3,
-    *, shape: bool = False
-) -> System:  # fmt: skip
+    arrangement="aligned", method="virtual_master", size=13, period=5e-3,
+    *, shape=False
+):  # fmt: skip
     layout = {"rows": size, "columns": size, "arrangement": arrangement}
-    control: object = "absent" if method == "absent" else {"method": method}
+    control = "absent" if method == "absent" else {"method": method}
     simulation = {"control_period": period}
     shown = {"shape": {"file": "crater"}} if shape else {}
     return assemble(resolve({"layout": layout, "control": control, "simulation": simulation, **shown}))
@@ -89,10 +87,10 @@ def test_pins_are_in_the_mode_blister_until_they_arrive_and_are_driven_home_by_t
     state = heighten(system, np.where(system.grid.x < 0.0, 4e-3, 0.0))
     *_, state = simulate_path(system, state, stay_away(20), make_orders(20, 0.0, 0.0, 0.0, RADIUS, 0))
     inside = np.hypot(system.grid.x, system.grid.y) < RADIUS - 1e-9
-    np.testing.assert_array_equal(state.mode() == Mode.BLISTER, inside)
+    assert_array_equal(state.mode() == Mode.BLISTER, inside)
     *_, state = simulate_path(system, state, stay_away(60), make_orders(0, 0.0, 0.0, 0.0, RADIUS))
     formed = np.abs(state.row(system.rows.target) - rest) > BAND
-    np.testing.assert_array_equal(state.mode(), np.where(formed, Mode.HOLD, Mode.REST))
+    assert_array_equal(state.mode(), np.where(formed, Mode.HOLD, Mode.REST))
     system = bed()
     state = heighten(system, make_spike_and_ridge(system.grid))
     *_, state = simulate_path(system, state, stay_away(5), make_orders(5, 0.0, 0.0, 0.0, RADIUS, 0))
@@ -116,7 +114,7 @@ def test_a_finger_at_work_elsewhere_stays_under_the_methods_control():
     near = np.hypot(system.grid.x - 18e-3, system.grid.y - 18e-3) < 7e-3
     assert ends[0].min() < 38e-3
     # Sums over other cells round in another way.
-    np.testing.assert_allclose(ends[0][~near], ends[1][~near], rtol=0, atol=1e-12)
+    assert_allclose(ends[0][~near], ends[1][~near], rtol=0, atol=1e-12)
     assert (ends[0] - ends[1])[near].max() > 2e-3
 
 
@@ -153,14 +151,14 @@ def test_periods_without_an_order_or_with_locks_that_are_gone_are_those_of_the_m
     assert len(ends) == 1
 
 
-def bumpy(system: System, lowest: float = -8e-3, highest: float = 8e-3) -> Floats:
+def bumpy(system, lowest=-8e-3, highest=8e-3):
     """Return random heights for the pins of a disc about the middle, NaN elsewhere, (n,), m."""
     grid, rest = system.grid, system.cell.actuator.rest_height
     heights = rest + np.random.default_rng(1).uniform(lowest, highest, grid.count)
     return np.where(np.hypot(grid.x, grid.y) < 12e-3, heights, np.nan)
 
 
-def place_until_arrived(system: System, state: State, surface: Floats, patience: float = 2.0) -> State:
+def place_until_arrived(system, state, surface, patience=2.0):
     count = round(patience / system.period)
     for after in simulate_path(system, state, stay_away(count), place(count, surface)):
         if has_arrived(after):
@@ -223,7 +221,7 @@ def test_a_pin_under_a_finger_that_is_too_strong_is_waited_for_and_holds_up_no_o
     assert arrived.sum() > 10
 
 
-def lock(verb: Verb, x: float = 0.0, radius: float = 7e-3) -> Orders:
+def lock(verb, x=0.0, radius=7e-3):
     return Orders(repeat_order(1, verb, x, 0.0, radius))
 
 
@@ -238,7 +236,7 @@ def test_a_locked_pin_stays_whatever_the_method_and_orders_command(method, shape
     path[40:, 0, 0] = np.linspace(-9e-3, 9e-3, 121)
     *_, state = simulate_path(system, begin(system), stay_away(1), lock(Verb.LOCK))
     locked = np.hypot(system.grid.x, system.grid.y) <= 7e-3
-    np.testing.assert_array_equal(state.mode() == Mode.LOCKED, locked)
+    assert_array_equal(state.mode() == Mode.LOCKED, locked)
     before = state.row(0)
     everywhere = np.full(system.grid.count, 45e-3)
     orders = Orders(
@@ -251,8 +249,8 @@ def test_a_locked_pin_stays_whatever_the_method_and_orders_command(method, shape
     )  # fmt: skip
     for part in (None, orders):
         *_, state = simulate_path(system, state, path, part)
-        np.testing.assert_array_equal(state.row(0)[locked], before[locked])
-        np.testing.assert_array_equal(state.mode() == Mode.LOCKED, locked)
+        assert_array_equal(state.row(0)[locked], before[locked])
+        assert_array_equal(state.mode() == Mode.LOCKED, locked)
     *_, state = simulate_path(system, state, stay_away(1), lock(Verb.UNLOCK))
     assert not (state.mode() == Mode.LOCKED).any()
     assert np.abs(place_until_arrived(system, state, everywhere).row(0) - 45e-3).max() < 1e-6
@@ -329,7 +327,7 @@ def test_one_quick_pass_of_smooth_halves_what_varies_on_flat_ground_and_on_a_rid
     assert float(state.row(0)[line].std()) < 0.5 * before
 
 
-def order(system: System, x: float, y: float, radius: float) -> Controller:
+def order(system, x, y, radius):
     orders = Orders(repeat_order(1, Verb.AVERAGE, x, y, radius, 1.0))
     (control,) = order_periods(system.controller, system.grid, system.cell, system.period, orders)
     assert control is not None

@@ -27,7 +27,7 @@ COLOR = st.tuples(CHANNEL, CHANNEL, CHANNEL)
 ROOM = (0.0, 0.0, 900.0, 700.0)
 
 
-def session(**changes: object) -> Readings:
+def session(**changes):
     time = np.linspace(0.0, 10.0, 1001)
     told = Readings(
         name="Digital Clay", method="virtual_master", paused=False, waiting=False, factor=0.97,
@@ -39,7 +39,7 @@ def session(**changes: object) -> Readings:
     return replace(told, **changes)
 
 
-def said(picture: Picture) -> str:
+def said(picture):
     return " | ".join(words.text for words in picture.words)
 
 
@@ -52,13 +52,13 @@ def test_letters_and_curves_stand_out_from_any_theme(back, ink):
     assert contrast((0.0, 0.0, 0.0), (1.0, 1.0, 1.0)) == pytest.approx(21.0, rel=1e-12)
 
 
-def draw(told: Readings) -> Picture:
+def draw(told):
     return lay_out(told, choose_colors(DARK, LIGHT), ROOM, 1.0)
 
 
 EMPTY = np.empty(0)
 KNOCK = np.where(np.arange(1001) == 900, 180.0, 0.4)
-WORDS: dict[str, tuple[dict[str, object], tuple[str, ...], tuple[str, ...]]] = {
+WORDS = {
     "all it has": (
         {}, ("Digital Clay", "Method: virtual master", "0.97 x real time", "2.1 µm, 0.46 mN", "0.35 N",
              "set point 0.40 N", "312: 39.5 mm", "40: 35.0 mm", "600 rest", "10 hold", "15 blister"),
@@ -143,7 +143,7 @@ def test_a_row_too_long_for_its_box_has_smaller_letters():
 
 
 def test_a_low_view_leaves_sections_away_and_a_narrow_one_all():
-    def fit(width: float, height: float) -> Picture:
+    def fit(width, height):
         return lay_out(session(), choose_colors(DARK, LIGHT), (0.0, 0.0, width, height), 1.0)
 
     sections = ("Total force", "Heights", "Pins by mode")

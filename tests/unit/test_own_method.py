@@ -5,7 +5,6 @@ import pickle
 import re
 import subprocess
 import sys
-from collections.abc import Iterator
 from importlib.metadata import EntryPoint
 from pathlib import Path
 
@@ -21,13 +20,14 @@ from digiclay.core.session.finished_run import read_run
 from digiclay.core.session.run_scene import run
 from digiclay.plugins import method_loader
 from digiclay.plugins.method_loader import load_method
+from numpy.testing import assert_allclose, assert_array_equal
 
 from tests.own_methods import COPY, HEAD, PAD, forgotten, refused, small, write_method
 from tests.timeouts import TIMEOUT
 
 
 @pytest.fixture(autouse=True)
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+def here(tmp_path, monkeypatch):
     """Work in an empty folder; methods that a test loads are unknown after it."""
     monkeypatch.chdir(tmp_path)
     with forgotten():
@@ -97,7 +97,7 @@ def test_a_copy_of_method_one_gives_its_run_bit_for_bit(here):
     own, built_in = run(small(name)), run(small("virtual_master"))
     assert built_in.history["mode"].max() > 1
     for key, values in built_in.history.items():
-        np.testing.assert_array_equal(own.history[key], values, key)
+        assert_array_equal(own.history[key], values, key)
     assert own.metrics["losses"] == built_in.metrics["losses"]
 
 
@@ -118,7 +118,7 @@ def test_nothing_shown_leads_to_the_bed_and_openings_are_limited_to_those_of_a_v
     write_method(here, CHEAT, "cheat.py")
     honest, cheat = (run(small(load_method(word))) for word in ("pad.py:SoftPad", "cheat.py:Cheat"))
     for key, values in honest.history.items():
-        np.testing.assert_array_equal(cheat.history[key], values, key)
+        assert_array_equal(cheat.history[key], values, key)
     heights = []
     for number, opening in enumerate((-3, -1, 0, 1, 3)):
         orders = f"return memory, Orders(opening=np.full(cells.height.size, {opening}))"
@@ -134,7 +134,7 @@ def test_a_batch_gives_what_the_runs_give_alone_and_a_shape_is_displayed_before(
     scenes = [small(name, f"control.step={step} um", "sensors.force_noise=1 mN") for step in (20, 40, 80)]
     found = {number: result.history["height"].copy() for number, result in run_together(scenes)}
     for number, scene in enumerate(scenes):
-        np.testing.assert_allclose(found[number], run(scene).history["height"], rtol=0, atol=1e-12)
+        assert_allclose(found[number], run(scene).history["height"], rtol=0, atol=1e-12)
     assert np.abs(found[0] - found[2]).max() > 1e-5
     shown = run(small(name, "shape.file=saddle", "simulation.duration=0.4")).history["height"]
     assert np.ptp(shown[-1]) > 1e-3
@@ -155,13 +155,13 @@ RUN = Path("jobs", "runs", "tap-soft_pad-small")
 
 
 @pytest.fixture
-def jobs(here: Path) -> Path:
+def jobs(here):
     (here / "jobs.toml").write_text(JOBS, encoding="utf-8")
     write_method(here)
     return here
 
 
-def prepare() -> int:
+def prepare():
     code = main(["batch", "jobs.toml", "--method", "pad.py:SoftPad", "--prepare", "--quiet"])
     remove_method("soft_pad")
     return code
@@ -257,7 +257,7 @@ def test_the_code_of_the_page_runs(here, code):
 # Mistakes: each is one line with file and rule, and nothing is written
 
 
-def refusal(text: str, attribute: str = "Bad") -> str:
+def refusal(text, attribute="Bad"):
     write_method(Path(), text, "bad.py")
     with pytest.raises(MethodError) as caught:
         run(small(load_method(f"bad.py:{attribute}")))
@@ -267,24 +267,24 @@ def refusal(text: str, attribute: str = "Bad") -> str:
     return said
 
 
-def bad(body: str, fields: str = "") -> str:
+def bad(body, fields=""):
     inner = "\n".join(f"    {line}" for line in (*fields.splitlines(), *body.splitlines()))
     return f"{HEAD}\n@dataclass(frozen=True)\nclass Bad(OwnMethod):\n{inner}\n"
 
 
-def commanding(line: str) -> str:
+def commanding(line):
     return bad(f"def command(self, memory, cells, device):\n    {line}")
 
 
-def ordering(orders: str) -> str:
+def ordering(orders):
     return commanding(f"return memory, {orders}")
 
 
-def building(line: str) -> str:
+def building(line):
     return bad(f"def build(self, device):\n    {line}")
 
 
-def keeping(first: str, later: str) -> str:
+def keeping(first, later):
     return bad(
         f"def begin(self, device):\n    return {first}\n"
         f"def command(self, memory, cells, device):\n    return {later}, Orders()"
@@ -410,7 +410,7 @@ SLOW = bad(
 )
 
 
-def run_quickly(*more: str) -> int:
+def run_quickly(*more):
     period = ["--set", "simulation.control_period=0.2 ms", "--set", "simulation.physics_step=0.2 ms"]
     return main(["run", "tap", "--method", "bad.py:Bad", *period, "--quiet", *more])
 

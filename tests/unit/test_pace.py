@@ -5,19 +5,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
-from digiclay.core.base.arrays import Floats
 from digiclay.core.control.methods import ControlParameters, Pace
 from digiclay.core.engine.simulation import begin
-from digiclay.core.engine.system import System
 from digiclay.core.model.fingertip import LEVEL
 from digiclay.core.model.layout import Layout
 from digiclay.core.scene.assembly import assemble
-from digiclay.core.scene.schema import Scene
 from digiclay.core.session.live_session import simulate_path
 from digiclay.recorded.pointer_strokes import PointerStroke, play_strokes
 from digiclay.sessions.sculpting import begin_session, follow_finger
 from digiclay.settings.devices import BEDS, make_scene
-from digiclay.strokes.tracking import SUDDEN, Tracking, find_tracking
+from digiclay.strokes.tracking import SUDDEN, find_tracking
 
 #: Heights of the strokes over the bed at rest, m: a ridge, a valley.
 RIDGE, VALLEY = 8e-3, -6e-3
@@ -42,19 +39,19 @@ class Led:
     rms: float
     """By which heights along the stroke vary, m."""
 
-    def is_followed(self, method: str) -> bool:
+    def is_followed(self, method):
         """Tell whether pins that a method controls followed it."""
         most = OF_METHOD_II if method == "cell_states" else MOST_FORCE
         return self.force <= most and self.absent <= MOST_ABSENT and self.rms <= MOST_RMS
 
 
-def make_device(method: str, bed: str, preset: str) -> Scene:
+def make_device(method, bed, preset):
     """Return a scene of a method on pins of a bed of `BEDS`, just enough for a stroke."""
     (rows, columns), kind = SIZE, BEDS[bed]
     return make_scene(preset, Layout(rows=rows, columns=columns, pitch=kind.pitch), method, kind.share)
 
 
-def find_stated(scene: Scene, system: System) -> Tracking:
+def find_stated(scene, system):
     """Return what the method of a scene states for strokes from a bed at rest."""
     tracking = find_tracking(scene, system)
     assert tracking is not None  # the methods here form a blister
@@ -62,7 +59,7 @@ def find_stated(scene: Scene, system: System) -> Tracking:
     return replace(tracking, drag=drag, push=push)
 
 
-def lead(scene: Scene, system: System, tracking: Tracking, height: float) -> Led:
+def lead(scene, system, tracking, height):
     """Lead the pins along a stroke at a height over the bed at rest, m, and judge it."""
     corners = np.array(CORNERS) * scene.layout.pitch
     rest = scene.actuator.rest_height
@@ -82,9 +79,7 @@ def lead(scene: Scene, system: System, tracking: Tracking, height: float) -> Led
     return Led(float(force.max()), absent, float(state.row(0)[inside].std()))
 
 
-def lay_stroke(
-    rest: float, tracking: Tracking, height: float, corners: Floats, period: float
-) -> tuple[Floats, tuple[int, int]]:
+def lay_stroke(rest, tracking, height, corners, period):
     """Return poses (t + 1, 7) along a stroke, and in which periods its press and its drag end."""
     raised = height > 0.0
     down = rest - (tracking.press if raised else -height)

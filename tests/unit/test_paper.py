@@ -16,7 +16,6 @@ from digiclay_paper import scenes
 from digiclay_paper.evidence import (
     DEVIATIONS,
     WINDOWED,
-    Evidence,
     ahead,
     carried_out,
     deviations,
@@ -40,13 +39,13 @@ from digiclay_paper.simulations import GAUSSIAN, NO_RISE, STAGGERED, WINDOWS, lo
 GOOD = Follows(speed=15e-3, losses=0, loss_share=0.0, lag=1e-3, rfd=0.02)
 
 
-def results(*swings: Swing, **bad: Follows) -> Results:
+def results(*swings, **bad):
     simple = {(method, name): bad.get(method, GOOD) for method in scenes.METHODS for name in WAYS}
     session = Session(resolve({}), {}, {}, {}, [], 0.0, {})
     return Results(simple=simple, swings=list(swings), printed={scenes.METHODS[0]: session})
 
 
-def swing(gain: float, amplitude: float, settling: float | None, position_gain: float = 500.0) -> Swing:
+def swing(gain, amplitude, settling, position_gain=500.0):
     return Swing(gain, position_gain, amplitude, None if settling else 10.0, settling)
 
 
@@ -121,7 +120,7 @@ waypoints = [
 
 
 @pytest.fixture(scope="module")
-def lost(tmp_path_factory: pytest.TempPathFactory) -> Results:
+def lost(tmp_path_factory):
     path = tmp_path_factory.mktemp("lost") / "lifted.toml"
     path.write_text(LIFTED, encoding="utf-8")
     found = Results(lifting={"virtual_master": 20e-3, "cell_states": 6e-3})
@@ -152,14 +151,14 @@ HARD = EASY._replace(force=0.8, follows=replace(GOOD, rfd=0.08))
 BAD = EASY._replace(follows=replace(GOOD, lag=5e-3))
 
 
-def dragged(**found: Dragged) -> dict[tuple[str, str, str], Dragged]:
+def dragged(**found):
     variants = {"it": AS_IT_IS, "rise": NO_RISE, "staggered": STAGGERED, "gaussian": GAUSSIAN}
     keys = (name.split("_") for name in found)
     known = [(variants[what], scenes.METHODS[len(which) - 1], SURFACE) for what, which in keys]
     return dict(zip(known, found.values(), strict=True))
 
 
-def limits(third: float, lift: float | None = 20e-3) -> Results:
+def limits(third, lift=20e-3):
     """Return results of both methods with the speed of the second in a valley, and at a lift, m/s."""
     found, (one, two) = results(), scenes.METHODS
     found.printed[two], found.lifting = found.printed[one], {one: 20e-3, two: lift}
@@ -204,7 +203,7 @@ def test_a_claim_has_the_verdict_of_its_evidence(claim, found, verdict, words):
     assert words in evidence.measured + evidence.why
 
 
-def escaped(point: Swing) -> Results:
+def escaped(point):
     known = {method: resolve({"control": {"method": method}}) for method in scenes.METHODS}
     printed = {method: Session(scene, {}, {}, {}, [], 0.0, {}) for method, scene in known.items()}
     return Results(cell_swings=[swing(15.0, 0.001, None), point], printed=printed)
@@ -237,7 +236,7 @@ def test_a_search_radius_lowers_the_scatter_of_noisy_sensors_and_thresholds_do_a
 
 @pytest.mark.parametrize("variant", [STAGGERED, GAUSSIAN])
 def test_a_variant_holds_where_it_is_followed_as_the_scene_is(variant):
-    def judge(**drags: Dragged) -> Evidence:
+    def judge(**drags):
         return varied(variant, Results(dragged=dragged(**drags)))
 
     same = {"it_I": EASY, "it_II": BAD, f"{variant}_I": EASY, f"{variant}_II": BAD}
@@ -270,7 +269,7 @@ Floats = NDArray[np.float64]
 REST, RIDGE, MOUND, VALLEY = 40e-3, 13.5e-3, 23e-3, -10e-3
 
 
-def session(method: str, followers: int) -> Session:
+def session(method, followers):
     """Return the paper's session as if the bed were still at rest, the finger a row every 5 ms."""
     scene = load(find(SESSION), [Setting("control.method", method)])
     drag, line = np.linspace(-21e-3, 21e-3, 43), np.ones(43)
@@ -287,18 +286,18 @@ def session(method: str, followers: int) -> Session:
     return Session(scene, history, {}, {}, [], 0.0, {})
 
 
-def formed(bare: Session, over: Floats) -> Session:
+def formed(bare, over):
     return bare._replace(history={**bare.history, "height": (REST + over)[None]})
 
 
 @pytest.fixture(scope="module", params=[(METHODS[0], 8), (METHODS[1], 16)], ids=METHODS)
-def bare(request: pytest.FixtureRequest) -> Session:
+def bare(request):
     return session(*request.param)
 
 
-def at(bare: Session, x: float, y: float) -> NDArray[np.bool_]:
+def at(bare, x, y):
     """Tell which cells are within half a pitch of a place, mm."""
-    place: NDArray[np.bool_] = np.hypot(*(bare.history["position"] - (1e-3 * x, 1e-3 * y)).T) < 1.5e-3
+    place = np.hypot(*(bare.history["position"] - (1e-3 * x, 1e-3 * y)).T) < 1.5e-3
     return place
 
 
@@ -319,7 +318,7 @@ def test_the_flank_asked_for_is_that_of_the_profile_and_the_claim_names_the_sect
     assert relief(Results(session=both)).verdict == "holds"
 
 
-def missed(bare: Session, over: Floats) -> list[str]:
+def missed(bare, over):
     return [one.name for one in sections(formed(bare, over)) if not one.meets(LIMITS)]
 
 

@@ -17,12 +17,13 @@ from digiclay.plots.bed import ROOM
 from digiclay.plots.figure import save
 from digiclay.plots.sweep import sweep_figure
 from mpl_toolkits.mplot3d.proj3d import proj_transform
+from numpy.testing import assert_allclose, assert_array_equal
 
 from tests.other_process import finish, start
 
 
 @cache
-def _drag(rows: int, columns: int, arrangement: str) -> dict[str, np.ndarray]:
+def _drag(rows, columns, arrangement):
     time = np.linspace(0.0, 10.0, 201)
     place = make_grid(Layout(rows=rows, columns=columns, arrangement=arrangement)).positions
     reach = place[:, 0].max()
@@ -37,7 +38,7 @@ def _drag(rows: int, columns: int, arrangement: str) -> dict[str, np.ndarray]:
             "total_force": force.sum(axis=1), "position": place}  # fmt: skip
 
 
-def drag(rows: int = 12, columns: int = 14, arrangement: str = "aligned") -> dict[str, np.ndarray]:
+def drag(rows=12, columns=14, arrangement="aligned"):
     """A finger that touches down at 1 s, draws a ridge along x and lifts at 9 s."""
     return {name: array.copy() for name, array in _drag(rows, columns, arrangement).items()}
 
@@ -46,7 +47,7 @@ def axes(figure, label):
     return next(part for part in figure.axes if part.get_label() == label)
 
 
-def png_size(path) -> tuple[int, int]:
+def png_size(path):
     content = path.read_bytes()
     assert content[:8] == b"\x89PNG\r\n\x1a\n"
     return struct.unpack(">II", content[16:24])
@@ -79,18 +80,18 @@ def test_every_axis_has_its_unit_and_every_curve_its_name(session, surface):
 def test_the_session_shows_force_set_point_and_the_chosen_cells_over_one_time(session):
     case = drag()
     total, set_point = axes(session, "force").get_lines()
-    np.testing.assert_array_equal(total.get_ydata(), case["total_force"])
+    assert_array_equal(total.get_ydata(), case["total_force"])
     assert set(set_point.get_ydata()) == {0.37}
     lines, cells = axes(session, "heights").get_lines(), plots.session_cells(case)
     assert len(lines) == len(cells) == 6
     for line, cell in zip(lines, cells, strict=True):
-        np.testing.assert_array_equal(line.get_ydata(), case["height"][:, cell] * 1e3)
+        assert_array_equal(line.get_ydata(), case["height"][:, cell] * 1e3)
     assert axes(session, "heights").get_xlim() == axes(session, "force").get_xlim() == (0.0, 10.0)
     # They follow the finger from first to last contact, evenly spaced, each to the nearest pin.
     x = case["position"][cells, 0]
     touched = case["fingertip"][case["total_force"] > 0.0, 0]
     assert np.abs(x[[0, -1]] - touched[[0, -1]]).max() <= 1.5e-3
-    np.testing.assert_allclose(np.diff(x), np.ptp(touched) / 5, rtol=0.0, atol=3e-3)
+    assert_allclose(np.diff(x), np.ptp(touched) / 5, rtol=0.0, atol=3e-3)
     # Without contact those that moved most are shown.
     case["total_force"] = np.zeros(201)
     case["height"] = np.full_like(case["height"], 0.04)
@@ -105,7 +106,7 @@ def test_a_set_point_is_drawn_of_each_cell_and_without_one_neither_it_nor_a_devi
     case["mode"][100:, :3] = Mode.FORCE_FOLLOW
     force = axes(plots.session_figure(case, SetPoint(0.04, per_cell=True)), "force")
     expected = np.repeat([np.nan, 0.2, 0.12], [50, 50, 101])
-    np.testing.assert_allclose(force.get_lines()[1].get_ydata(), expected, rtol=1e-12)  # rounding
+    assert_allclose(force.get_lines()[1].get_ydata(), expected, rtol=1e-12)  # rounding
     assert "set point 0.04 N a cell" in [text.get_text() for text in force.get_legend().get_texts()]
     figure = plots.session_figure(drag(), None)
     force, told = axes(figure, "force"), axes(figure, "figures")
@@ -120,13 +121,13 @@ def test_the_surface_is_to_scale_and_shows_the_final_heights_and_the_path(surfac
     case, relief, plan = drag(), axes(surface, "relief"), axes(surface, "map")
     extent = [np.ptp(limits) for limits in (relief.get_xlim(), relief.get_ylim(), relief.get_zlim())]
     ratio = relief._box_aspect / np.array(extent)
-    np.testing.assert_allclose(ratio, ratio[0], rtol=1e-9)  # the same mm on all three axes
+    assert_allclose(ratio, ratio[0], rtol=1e-9)  # the same mm on all three axes
     assert plan.get_aspect() == 1.0
     final = case["height"][-1] * 1e3
     assert axes(surface, "scale").get_ylim() == pytest.approx((final.min(), final.max()), rel=1e-12)
     lifted, pressed = plan.get_lines()
     assert (lifted.get_label(), pressed.get_label()) == ("lifted", "in contact")
-    np.testing.assert_array_equal(~np.isnan(pressed.get_xdata()), case["total_force"] > 0.0)
+    assert_array_equal(~np.isnan(pressed.get_xdata()), case["total_force"] > 0.0)
 
 
 @pytest.mark.parametrize("rows, columns, share", [(3, 25, 1.0), (12, 14, -1.5), (25, 3, 1.0)])
@@ -138,7 +139,7 @@ def test_the_relief_is_in_the_middle_of_its_room_and_as_large(rows, columns, sha
     flat = np.column_stack(proj_transform(*np.reshape(corners, (3, 8)), relief.get_proj())[:2])
     seen = relief.figure.transFigure.inverted().transform(relief.transData.transform(flat))
     below, above = np.reshape(ROOM, (2, 2)) - [seen.min(axis=0), seen.max(axis=0)]
-    np.testing.assert_allclose(below, -above, rtol=0, atol=1e-9)
+    assert_allclose(below, -above, rtol=0, atol=1e-9)
     assert above.min() == pytest.approx(0.0, abs=1e-3)  # a size is that of another zoom, but for rounding
 
 
@@ -188,7 +189,7 @@ def test_numbers_of_one_axis_are_a_line_from_left_to_right_with_units_and_words_
     (line,) = axes.get_lines()
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("control.force_gain (1/N)", "lag_mean (mm)")
     assert (line.get_marker(), axes.get_xscale()) == ("o", "log")
-    np.testing.assert_allclose(line.get_xydata(), [[1.0, 1.0], [2.0, 2.0], [4.0, 3.0]], rtol=1e-12)
+    assert_allclose(line.get_xydata(), [[1.0, 1.0], [2.0, 2.0], [4.0, 3.0]], rtol=1e-12)
     lines = []
     for column in (Column("a.b", "", (3, 1, 2), False), WORDS):
         (axes,) = sweep_figure([column], "rfd", np.array([0.3, 0.1, 0.2])).axes
@@ -204,7 +205,7 @@ def test_two_axes_are_a_heat_map_labeled_with_units():
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("control.force_gain (1/N)", "layout.pitch (mm)")
     assert scale.get_ylabel() == "rfd (N)"
     drawn = axes.collections[0].get_array().reshape(2, 3)
-    np.testing.assert_array_equal(drawn.filled(np.nan), values.T)
+    assert_array_equal(drawn.filled(np.nan), values.T)
     assert [text.get_text() for text in axes.texts] == ["0.1", "0.3", "0.5", "0.2", "0.4", "×"]
 
 
@@ -229,7 +230,7 @@ def test_a_sweep_over_two_axes_leaves_pictures_and_over_three_a_table_only(here,
     assert list((here / "three").glob("*.png")) == []
 
 
-def two_fingers(fingers: int = 2) -> dict[str, np.ndarray]:
+def two_fingers(fingers=2):
     case, share = drag(), 1.0 / fingers
     last = 3.0 + np.arange(fingers)
     touching = (case["time"][:, None] > 1.0) & (case["time"][:, None] < last)
@@ -245,7 +246,7 @@ def test_a_figure_of_several_fingertips_has_force_cell_and_path_of_each():
     force, heights, plan = axes(session, "force"), axes(session, "heights"), axes(surface, "map")
     lines = force.get_lines()
     for line, own in zip(lines, case["finger_force"].T, strict=False):
-        np.testing.assert_array_equal(line.get_ydata(), own)
+        assert_array_equal(line.get_ydata(), own)
     assert len({(line.get_color(), line.get_linestyle()) for line in lines}) == 3
     assert (force.get_xlabel(), force.get_ylabel()) == ("time (s)", "force (N)")
     legends = [[text.get_text() for text in part.get_legend().get_texts()] for part in (heights, force)]
@@ -254,7 +255,7 @@ def test_a_figure_of_several_fingertips_has_force_cell_and_path_of_each():
     assert [line.get_color() for line in heights.get_lines()] == [line.get_color() for line in lines[:2]]
     reached = case["position"][plots.session_cells(case)]
     halfway = [case["fingertip"][row, finger, :2] for finger, row in enumerate((40, 50))]
-    np.testing.assert_allclose(reached, halfway, rtol=0, atol=2.2e-3)  # half a diagonal of a cell
+    assert_allclose(reached, halfway, rtol=0, atol=2.2e-3)  # half a diagonal of a cell
     assert [line.get_label() for line in plan.get_lines()][:4] == [
         "lifted",
         "in contact",

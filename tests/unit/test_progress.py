@@ -1,15 +1,14 @@
 """Progress on a terminal: one line that tells how much is done, and is gone afterwards."""
 
 import io
-from collections.abc import Callable
 
 import pytest
-from digiclay.commands.progress import PAUSE, Bar, Counted, Line, format_duration
+from digiclay.commands.progress import PAUSE, Bar, Counted, format_duration
 
 from benchmarks.report import Steps
 
 #: Each kind of progress, and one step of it of three.
-KINDS: dict[str, Callable[[io.StringIO], Line]] = {
+KINDS = {
     "session": lambda stream: Bar(stream, "tap", 5e-3),
     "counted": lambda stream: Counted(stream, "film", "frames"),
     "steps": lambda stream: Steps(stream, "stiff", 3),
@@ -17,19 +16,19 @@ KINDS: dict[str, Callable[[io.StringIO], Line]] = {
 
 
 class Terminal(io.StringIO):
-    def isatty(self) -> bool:
+    def isatty(self):
         return True
 
 
 @pytest.fixture
-def clock(monkeypatch: pytest.MonkeyPatch) -> list[float]:
+def clock(monkeypatch):
     """Give a clock that stands still until its only number is changed, s."""
     now = [100.0]
     monkeypatch.setattr("digiclay.commands.progress.time.monotonic", lambda: now[0])
     return now
 
 
-def told(bar: Line) -> None:
+def told(bar):
     bar() if isinstance(bar, Steps) else bar(1, 3)  # type: ignore[operator]
 
 

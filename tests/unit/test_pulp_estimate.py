@@ -23,7 +23,7 @@ CONTACT, RELAXATION = Contact(), Relaxation()
 PULP = PulpEstimate(Touch(Fingertip(), CONTACT, RELAXATION), PERIOD, 2.0 * PERIOD, 0.0)
 
 
-def history(depth: object, count: int) -> tuple[Floats, Floats]:
+def history(depth, count):
     """Return forces and tensions of a cell period by period, N, by SciPy, for its indentation over time."""
     rates, shares = RELAXATION.rates[:, 0], RELAXATION.shares
     times = np.arange(count + 1) * PERIOD
@@ -34,7 +34,7 @@ def history(depth: object, count: int) -> tuple[Floats, Floats]:
     return CONTACT.share * np.maximum(own - shares @ found.y, 0.0), own
 
 
-def observe(forces: Floats, expected: Floats) -> Floats:
+def observe(forces, expected):
     pulp, found = np.zeros((4, 1)), []
     for force, guess in zip(forces[1:], expected[1:], strict=True):
         PULP.observe(pulp, np.array([force]), np.array([guess]))

@@ -3,7 +3,6 @@
 import math
 import re
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import pytest
@@ -119,7 +118,7 @@ def test_the_nearest_name_is_suggested_unless_all_are_unlike():
     assert [find_nearest_name(name, names) for name in ("viscosty", "qqq")] == ["viscosity", ""]
 
 
-def path(times: Any, positions: Any = None) -> Trajectory:
+def path(times, positions=None):
     """Return a level path, at the origin unless positions are given."""
     count = len(times)
     places = np.zeros((count, 3)) if positions is None else np.array(positions, float)

@@ -11,7 +11,6 @@ from digiclay.core.base.arrays import Floats
 from digiclay.core.model.fingertip import LEVEL
 from digiclay.core.model.layout import Layout
 from digiclay.sessions import sculpting
-from digiclay.sessions.running import Running
 from digiclay.sessions.sculpting import change_stroke, find_device, queue_stroke
 from digiclay.settings.devices import BEDS, make_scene
 from digiclay.strokes.nominal import find_ghosts
@@ -29,7 +28,7 @@ PARTS = {
 }
 
 
-def begin(name: str) -> Running:
+def begin(name):
     count, bed, arrangement, method = PARTS[name]
     layout = Layout(count, count, BEDS[bed].pitch, arrangement=arrangement)
     above = np.array([0.0, 0.0, 46e-3, *LEVEL])
@@ -50,14 +49,14 @@ DRAWN = {
 }
 
 
-def finish(session: Running, periods: int) -> Running:
+def finish(session, periods):
     """Return the session when no stroke is left, so many periods simulated at a time."""
     while session.strokes:
         session = sculpting.follow_finger(session, session.pose, periods)
     return session
 
 
-def draw(name: str) -> Running:
+def draw(name):
     """Return the session of the strokes of a row of `DRAWN`, none of which has begun."""
     scene = make_scene("design", Layout(41, 41, 1.5e-3), "hybrid", 0.5)
     session, _ = sculpting.begin_session(7, "Bed", scene, np.array([0.0, 0.0, 46e-3, *LEVEL]))
@@ -117,7 +116,7 @@ class Formed(NamedTuple):
 
 
 @functools.cache
-def form(part: str, queue: str) -> Formed:
+def form(part, queue):
     """Return what a queue forms on a bed."""
     session = begin(part)
     lean = (0.3, 0.2) if queue == LEANING else (0.0, 0.0)

@@ -8,7 +8,6 @@ from digiclay.core.base.errors import SceneError, StateError
 from digiclay.core.model.fingertip import LEVEL
 from digiclay.core.scene.toml_table import resolve
 from digiclay.recorded.pointer_strokes import PointerStroke, play_strokes, read_strokes
-from digiclay.sessions.running import Running
 from digiclay.sessions.sculpting import begin_session
 from digiclay.strokes.stroke import Brush
 
@@ -18,12 +17,12 @@ ALONG = ((0.0, -9e-3, 0.0), (0.1, 0.0, 0.0), (0.2, 9e-3, 0.0))
 STROKE = "[[stroke]]\nmoves = [[0, 0, 0], [0.1, 0.01, 0]]\n"
 
 
-def begin(**control: object) -> Running:
+def begin(**control):
     scene = resolve({"layout": {"rows": 11, "columns": 15}, "control": control})
     return begin_session(1, "Bed", scene, np.array([0.0, 0.0, 46e-3, *LEVEL]))[0]
 
 
-def play(*strokes: PointerStroke) -> Running:
+def play(*strokes):
     *_, session = play_strokes(begin(), strokes)
     return session
 

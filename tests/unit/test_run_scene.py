@@ -3,19 +3,16 @@
 import os
 import tempfile
 import tracemalloc
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 from digiclay.core.base.errors import OutputError, ParameterError
-from digiclay.core.engine.state import Rows, State, make_initial_state
+from digiclay.core.engine.state import Rows, make_initial_state
 from digiclay.core.files.run_folder import MARK, check_folder, write_folder
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.recorder import Recorder, RunRecording, write
-from digiclay.core.scene.schema import Scene
 from digiclay.core.scene.toml_table import resolve
 from digiclay.core.session.accuracy import Errors
 from digiclay.core.session.memory_limit import (
@@ -30,17 +27,17 @@ from tests.assemble import table
 
 WAY = [{"time": t, "position": [0, 0, z]} for t, z in ((0, 0.041), (0.1, 0.038), (0.2, 0.041))]
 SMALL = {"radius": 6e-3, "edge_radius": 9e-3, "flat_radius": 3e-3}
-TABLE: dict[str, Any] = {
+TABLE = {
     "layout": {"rows": 3, "columns": 4}, "blister": SMALL, "trajectory": {"waypoints": WAY},
 }  # fmt: skip
 
 
-def scene(**sections: Any) -> Scene:
+def scene(**sections):
     return resolve({**TABLE, **sections}, "press")
 
 
 @pytest.fixture(scope="module")
-def result() -> Result:
+def result():
     return run(scene())
 
 
@@ -58,7 +55,7 @@ def test_a_history_has_the_arrays_and_shapes_it_is_known_by(result):
 
 
 def test_the_same_scene_gives_the_same_history_bit_for_bit_or_less_of_it(result):
-    told: list[tuple[int, int]] = []
+    told = []
     again = run(scene(), progress=lambda done, total: told.append((done, total))).history
     assert [name for name in again if not np.array_equal(again[name], result.history[name])] == []
     assert told == [(done, 40) for done in range(1, 41)]
@@ -131,7 +128,7 @@ def test_an_estimate_is_the_error_itself_where_the_reference_converges_with_an_o
     assert Errors.estimate(error - error / parts**order) == pytest.approx(tuple(error), rel=1e-12)
 
 
-def stopped_after(count: int) -> Result:
+def stopped_after(count):
     asked = iter(range(1, 1000))
     return run(scene(), stopped=lambda: next(asked) == count)
 
@@ -143,7 +140,7 @@ def test_a_stopped_session_keeps_what_was_computed_and_is_marked_incomplete(resu
     assert not stopped_after(40).incomplete  # with its last period
 
 
-def fill(folder: Path, word: str) -> None:
+def fill(folder, word):
     folder.mkdir(parents=True, exist_ok=True)
     (folder / MARK).write_text(word, encoding="utf-8")
 
@@ -163,7 +160,7 @@ def test_a_folder_appears_with_all_that_was_written_and_not_before_nor_after_a_f
 
 
 def test_an_older_run_is_replaced_when_asked_and_stays_when_the_new_one_fails(tmp_path):
-    def words() -> list[tuple[str, str]]:
+    def words():
         return [(path.name, path.read_text(encoding="utf-8")) for path in tmp_path.glob("*/*")]
 
     fill(tmp_path / "run", "old")
@@ -192,7 +189,7 @@ def test_a_folder_that_could_not_be_used_is_refused_before_any_work(tmp_path, th
 
 
 @pytest.fixture
-def locked() -> Iterator[Path]:
+def locked():
     """Give a folder this process may not write to; root, who may write anywhere, is nobody meanwhile."""
     with tempfile.TemporaryDirectory() as name:
         folder, root = Path(name), os.geteuid() == 0
@@ -216,7 +213,7 @@ ROWS = Rows(physics=2, queue=2)
 CELLS = 3
 
 
-def after(start: State, period: int) -> State:
+def after(start, period):
     """Return a state in which every number of the gathered cells tells the period it was made in."""
     block = np.zeros_like(start.rows)
     block[0], block[ROWS.force], block[ROWS.command] = 100 + period, 200 + period, 300 + period
@@ -225,7 +222,7 @@ def after(start: State, period: int) -> State:
     return start._replace(period=period, active=held)
 
 
-def recorded(every: int, periods: int, stop: int | None = None) -> dict[str, list[float]]:
+def recorded(every, periods, stop=None):
     start = make_initial_state(ROWS, CELLS, 0.04, None)
     recording = RunRecording(Recorder(every), ROWS, start, periods)
     last = start
@@ -274,7 +271,7 @@ def test_a_written_history_is_read_back_bit_for_bit_and_smaller_than_its_arrays(
     assert path.stat().st_size < 0.05 * heights.nbytes
 
 
-def fits(recorder: Recorder, cells: int, periods: int, free: int) -> bool:
+def fits(recorder, cells, periods, free):
     try:
         refuse_what_cannot_fit(recorder, ROWS, cells, periods, free)
     except ParameterError:
@@ -302,7 +299,7 @@ def test_a_history_fits_to_the_byte_or_is_refused_with_the_least_thinning_that_f
 SIDES, MORE = (100, 150), 150**2 - 100**2
 
 
-def measured_and_estimated(**changes: Any) -> tuple[float, float]:
+def measured_and_estimated(**changes):
     """Return bytes a cell at a session's peak: those numpy asks for, and those the estimate says."""
     taken, told = [], []
     for side in SIDES:

@@ -2,7 +2,6 @@
 
 import re
 import struct
-from typing import Any
 
 import pytest
 from digiclay.core.base.errors import ParameterError
@@ -19,7 +18,7 @@ ASCII = "ply\nformat ascii 1.0\ncomment by hand\nelement vertex 5\n" + "".join(
 FACES = "element face 2\nproperty list uchar int vertex_indices\nend_header\n"
 
 
-def binary_ply(order: str, end: str, extra: bool) -> bytes:
+def binary_ply(order, end, extra):
     """Return a PLY of doubles and lists of unlike lengths, with a number before each list or not."""
     head = ASCII.replace("ascii", f"binary_{'big' if order == '>' else 'little'}_endian").replace(
         "float", "double"
@@ -32,13 +31,13 @@ def binary_ply(order: str, end: str, extra: bool) -> bytes:
     return data
 
 
-def text_stl(faces: list[Any], name: str = "a") -> str:
+def text_stl(faces, name="a"):
     corners = ("".join(" vertex {} {} {}\n".format(*PLACE[corner]) for corner in face) for face in faces)
     loops = "".join(f"facet normal 0 0 1\nouter loop\n{each}endloop\nendfacet\n" for each in corners)
     return f"solid {name}\n{loops}endsolid {name}\n"
 
 
-def binary_stl(count: int, behind: bytes = b"", head: bytes = b"by hand") -> bytes:
+def binary_stl(count, behind=b"", head=b"by hand"):
     numbers = ((0.0, 0.0, 1.0, *sum((PLACE[corner] for corner in face), ())) for face in CUT)
     return (
         head.ljust(80)

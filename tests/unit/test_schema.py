@@ -2,8 +2,6 @@
 
 import tomllib
 from dataclasses import replace
-from pathlib import Path
-from typing import Any
 
 import pytest
 from digiclay.core.base.errors import ParameterError, SceneError
@@ -14,7 +12,6 @@ from digiclay.core.scene.schema import (
     PARTS,
     SECTIONS,
     UNASKED,
-    Scene,
     Simulation,
 )  # fmt: skip
 from digiclay.core.scene.toml_table import PRESETS, format_scene, resolve
@@ -48,7 +45,7 @@ def test_quantities_may_have_a_unit_and_a_hexagonal_bed_shares_the_force_among_m
 
 @pytest.mark.parametrize("preset", ["fast", "viscous"])
 def test_a_preset_changes_what_it_says_unless_the_file_does_and_nothing_else(preset):
-    asked: dict[str, Any] = {name: {} for name in UNASKED}
+    asked = {name: {} for name in UNASKED}
     changed, plain = resolve({"preset": preset, **asked}), resolve(asked)
     for name in PARTS:
         wanted = replace(plain.section(name), **PRESETS[preset].get(name, {}))
@@ -77,7 +74,7 @@ def test_periods_cover_the_duration_and_steps_the_period_without_one_more_by_rou
     assert steps == [1, 1, 5, 3, 2, 1000]
 
 
-def refused(table: dict[str, Any]) -> str:
+def refused(table):
     with pytest.raises(ParameterError) as caught:
         resolve(table)
     return str(caught.value)
@@ -85,7 +82,7 @@ def refused(table: dict[str, Any]) -> str:
 
 POINT = {"time": 0, "position": [0, 0, 0]}
 #: Sections, and how the only line about them begins.
-WRONG: list[tuple[dict[str, Any], str]] = [
+WRONG = [
     ({"valve": {"orifice_diameter": -3e-4}}, "valve.orifice_diameter must be above 0 m (got -0.0003 m)."),
     ({"valve": {"orifice_diameter": "-0.3 mm"}}, "valve.orifice_diameter must be above 0 m (got '-0.3 mm')."),
     ({"valve": {"orifice_diamater": 1}}, "valve.orifice_diamater must be a known key (got 1). Did you mean"),
@@ -133,7 +130,7 @@ def test_what_is_wrong_is_said_in_one_line_of_a_sane_length(table, said):
     assert (line[: len(said)], "\n" in line, len(line) < 400) == (said, False, True)
 
 
-SCENES: dict[str, dict[str, Any]] = {
+SCENES = {
     "default": {},
     "with nothing that can be left out": dict.fromkeys(OPTIONAL, "absent"),
     "of awkward numbers": {"valve": {"stroke": 0.1 + 0.2e-16}, "fluid": {"viscosity": 1 / 3 * 1e-5}},
@@ -159,14 +156,14 @@ def test_a_scene_written_as_a_file_reads_back_as_an_equal_one(table):
     assert resolve(tomllib.loads(format_scene(scene))) == scene
 
 
-def scene(folder: Path, text: str, **settings: str) -> Scene:
+def scene(folder, text, **settings):
     """Write a scene file and read it; settings have a double underscore for the dot."""
     path = folder / "my.toml"
     path.write_text(text, encoding="utf-8")
     return load(path, [Setting(key.replace("__", "."), value) for key, value in settings.items()])
 
 
-def refused_file(folder: Path, text: str, **settings: str) -> str:
+def refused_file(folder, text, **settings):
     with pytest.raises(SceneError) as caught:
         scene(folder, text, **settings)
     return str(caught.value).replace(f"{folder}/", "")

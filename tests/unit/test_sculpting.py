@@ -10,7 +10,6 @@ from digiclay.core.scene.toml_table import resolve
 from digiclay.core.session import snapshot
 from digiclay.core.session.live_session import simulate_path
 from digiclay.sessions import sculpting
-from digiclay.sessions.running import Running
 
 from tests.hand import SCENE, SIZES, Hand, heights, pose, started
 
@@ -113,11 +112,11 @@ def test_a_step_too_long_to_halve_has_no_estimate_and_parts_that_do_not_go_toget
 class Bed:
     """What is known of an object of Blender's."""
 
-    def __init__(self, uid: int) -> None:
+    def __init__(self, uid):
         self.session_uid = uid
 
 
-def plays(session: Running) -> bool:
+def plays(session):
     """Return whether the recording of a session gives its state again bit for bit."""
     keep = session.recording
     assert keep is not None

@@ -1,26 +1,19 @@
 """Sensor models: noise, quantization and delay, what a session makes of them; the observer of the force."""
 
 import math
-from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cache
-from typing import Any
 
 import numpy as np
 import pytest
-from digiclay.core.base.arrays import Floats
 from digiclay.core.engine.simulation import begin, periods
-from digiclay.core.engine.state import State
-from digiclay.core.engine.system import System
 from digiclay.core.model.control_interface import Measurement
-from digiclay.core.model.interfaces import Sensors
 from digiclay.core.model.null_parts import PerfectSensors
 from digiclay.core.model.sensors import Delayed, NoiseAhead, Noisy, Quantized, Sensing, draw_polar
 from digiclay.core.scene.assembly import assemble
-from digiclay.core.scene.schema import Scene
 from digiclay.core.scene.toml_table import resolve
 from digiclay.core.session.run_scene import run
-from numpy.typing import NDArray
+from numpy.testing import assert_array_equal
 
 from tests.assemble import record, sample, scripted
 
@@ -31,11 +24,11 @@ COUNT = CELLS * PERIODS
 SURE = 5.0
 
 
-def heights(*settings: str) -> Floats:
+def heights(*settings):
     return np.asarray(run(sample("slow_press", *settings)).history["height"])
 
 
-def show(force: Sequence[float], height: Sequence[float] | Floats) -> Measurement:
+def show(force, height):
     cells, nothing = np.arange(len(force)), np.zeros(len(force))
     return Measurement(
         quadratic_basis=np.empty(0),
@@ -50,13 +43,13 @@ def show(force: Sequence[float], height: Sequence[float] | Floats) -> Measuremen
     )
 
 
-def draw_normals(seed: Any, period: int, cells: NDArray[np.intp]) -> tuple[Floats, Floats]:
+def draw_normals(seed, period, cells):
     radius, angle = draw_polar(seed, period, cells)
     return radius * np.cos(angle), radius * np.sin(angle)
 
 
 @cache
-def field(seed: int = 3) -> tuple[Floats, Floats]:
+def field(seed=3):
     both = np.array([draw_normals(seed, period, np.arange(CELLS)) for period in range(PERIODS)])
     return both[:, 0], both[:, 1]
 
@@ -71,7 +64,7 @@ def test_noise_has_the_moments_of_a_normal_distribution(moment, normal, variance
 def test_noise_of_other_cells_periods_quantities_and_seeds_is_independent():
     force, height = field()
     some, (every, _) = np.array([7, 400, 3]), field()
-    np.testing.assert_array_equal(draw_normals(3, 9, some)[0], every[9, some])
+    assert_array_equal(draw_normals(3, 9, some)[0], every[9, some])
     others = [np.roll(force, apart, (0, 1)) for apart in ((0, 1), (0, 25), (1, 0), (1, 1), (2, 0))]
     for other in (*others, height, field(4)[0]):
         # The mean of n products of independent normal numbers has standard error 1 / sqrt(n).
@@ -89,15 +82,15 @@ def test_noise_drawn_ahead_is_that_of_its_period_and_cells_in_any_order(seed):
     for period, cells in asked:
         numbers = np.arange(cells) if isinstance(cells, int) else np.array(cells)
         numbers = np.broadcast_to(numbers.reshape(-1, *[1] * len(shape)), (len(numbers), *shape))
-        np.testing.assert_array_equal(drawn.draw(period, numbers), draw_normals(seed, period, numbers))
+        assert_array_equal(drawn.draw(period, numbers), draw_normals(seed, period, numbers))
 
 
 def test_noise_is_added_in_proportion_to_its_standard_deviation():
     sensors, seen = Noisy(PerfectSensors(), 2e-3, 5e-6, 8), show([0.1, 0.2], [0.04, 0.05])
     first, second = draw_normals(8, 4, seen.cells)
     force, height = sensors.measure(seen, 4)
-    np.testing.assert_array_equal(force, seen.force + 2e-3 * first)
-    np.testing.assert_array_equal(height, seen.height + 5e-6 * second)
+    assert_array_equal(force, seen.force + 2e-3 * first)
+    assert_array_equal(height, seen.height + 5e-6 * second)
     assert Noisy(PerfectSensors(), 2e-3, 0.0, 8).measure(seen, 4)[1] is seen.height
 
 
@@ -110,7 +103,7 @@ def test_readings_noise_and_all_are_the_nearest_whole_steps_and_a_step_of_zero_r
     assert Quantized(PerfectSensors(), 0.0, 0.125).measure(seen, 0)[0] is seen.force
     sensors = assemble(sample("slow_press", "sensors.force_noise=5 mN", "sensors.force_step=1 mN")).sensors
     force, _ = sensors.measure(show([0.02] * 9, [0.04] * 9), 1)
-    np.testing.assert_array_equal(force, np.rint(force / 1e-3) * 1e-3)
+    assert_array_equal(force, np.rint(force / 1e-3) * 1e-3)
     assert np.unique(force).size > 3
 
 
@@ -125,7 +118,7 @@ def test_no_force_reads_above_the_floor_of_five_standard_deviations_and_half_a_s
     assert read < floor
 
 
-def readings(sensors: Sensors, truths: Sequence[tuple[float, float]], skipped: Sequence[int] = ()) -> Floats:
+def readings(sensors, truths, skipped=()):
     """Return what is read of cell 0, (t, 2), with forces and heights, where some periods leave it out."""
     own, read = np.zeros((sensors.rows, 1)), []
     for period, (force, height) in enumerate(truths):
@@ -134,7 +127,7 @@ def readings(sensors: Sensors, truths: Sequence[tuple[float, float]], skipped: S
             sensors.note(seen, period)
         before = own.copy()
         read.append([float(one[0]) for one in sensors.measure(seen, period)])
-        np.testing.assert_array_equal(own, before)
+        assert_array_equal(own, before)
     return np.array(read)
 
 
@@ -155,7 +148,7 @@ def test_a_cell_that_took_no_part_while_nothing_changed_is_read_as_if_it_had(lat
         level += 0.0 if i in gap or i == 0 else 1e-3 * i
         truths.append((0.0, level))
     sensors = Delayed(Noisy(PerfectSensors(), 1e-3, 1e-5, 2), late, 40e-3)
-    np.testing.assert_array_equal(readings(sensors, truths, gap), readings(sensors, truths))
+    assert_array_equal(readings(sensors, truths, gap), readings(sensors, truths))
 
 
 ALL = ("sensors.force_noise=0.5 mN", "sensors.height_noise=5 um", "sensors.delay=1")
@@ -167,10 +160,10 @@ def test_seed_and_coarse_sensors_make_the_session_also_one_taken_up_again_in_the
     first, second = (record(assemble(one), path, 200) for one in (noisy, other))
     assert np.abs(first.height - second.height).max() > 1e-6
     rest = record(assemble(noisy), path, 93, record(assemble(noisy), path, 107).last)
-    np.testing.assert_array_equal(rest.height, first.height[107:])
+    assert_array_equal(rest.height, first.height[107:])
     plain = heights()
     assert np.abs(heights("sensors.height_step=0.5 mm") - plain).max() > 1e-4
-    np.testing.assert_array_equal(heights("sensors.delay=0"), plain)
+    assert_array_equal(heights("sensors.delay=0"), plain)
 
 
 # The force observer: what it makes of a pin's motion, beside the force that is there
@@ -180,8 +173,8 @@ PRESS = [{"time": 0.0, "position": [0, 0, 0.0395]}, {"time": 0.6, "position": [0
 AWAY = [{"time": 0.0, "position": [0, 0, 0.09]}, {"time": 0.6, "position": [0, 0, 0.09]}]
 
 
-def scene(waypoints: Sequence[Any] = PRESS, **sections: Any) -> Scene:
-    table: dict[str, Any] = {
+def scene(waypoints=PRESS, **sections):
+    table = {
         "layout": {"rows": 1, "columns": 1},
         "control": "absent",
         "sensors": {"observer": "valve"},
@@ -192,7 +185,7 @@ def scene(waypoints: Sequence[Any] = PRESS, **sections: Any) -> Scene:
     return resolve({**table, "trajectory": {"waypoints": list(waypoints)}, **sections})
 
 
-def watched(known: Scene, command_in: Callable[[int], float], count: int = 120) -> tuple[Floats, Floats]:
+def watched(known, command_in, count=120):
     """Simulate; return the true forces of the pin and what the sensors read, N, shape (count + 1,)."""
     played = scripted(lambda time, x, y: command_in(round(time / PERIOD)))
     system = replace(assemble(known), controller=played(PERIOD))
@@ -203,33 +196,33 @@ def watched(known: Scene, command_in: Callable[[int], float], count: int = 120) 
     return np.array(true), np.array(read)
 
 
-def sensed(system: System, state: State) -> float:
+def sensed(system, state):
     """Return the force the sensors read of the pin, N; they get no true force to look at."""
     own = np.array([state.row(row) for row in range(system.rows.count)[system.rows.sensed]])
     hidden = show([np.nan], state.row(0))._replace(sensed=own)
     return float(system.sensors.measure(hidden, state.period)[0][0])
 
 
-def pulled_down(period: int) -> float:
+def pulled_down(period):
     return -0.8
 
 
-def down_and_up(period: int) -> float:
+def down_and_up(period):
     return 0.6 * math.cos(2.0 * math.pi * period / 80.0 + math.pi / 2) + (0.25 if period > 60 else 0.15)
 
 
-def half_way(force: Floats) -> Floats:
+def half_way(force):
     return np.concatenate([[0.0], 0.5 * (force[1:] + force[:-1])])
 
 
-def well_open(command_in: Callable[[int], float], count: int = 120, least: float = 0.2) -> NDArray[np.bool_]:
+def well_open(command_in, count=120, least=0.2):
     command = np.array([0.0, *(command_in(period) for period in range(count))])
     open_now = (np.abs(command) > least) & (np.abs(np.roll(command, 1)) > least)
     return open_now & (command * np.roll(command, 1) > 0.0)
 
 
 #: The lines to the valve, by the sections of a scene file that differ.
-LINES: list[dict[str, Any]] = [
+LINES = [
     {},
     {"conduit": "absent"},
     {"valve_lag": "absent"},
@@ -296,7 +289,7 @@ def test_the_last_estimate_is_held_while_the_valve_is_shut_at_a_stop_or_of_a_bed
     assert np.ptp(history["height"]) == 0.0
 
 
-def loading(flow: float, opening: float) -> float:
+def loading(flow, opening):
     """Return the force that a rise more or less by a height in a period makes at an opening, N."""
     cell = assemble(scene()).cell
     conductance = float(cell.flow.laminar_conductance(np.array([opening]))[0])
@@ -304,14 +297,14 @@ def loading(flow: float, opening: float) -> float:
 
 
 def test_coarse_late_or_noisy_heights_cost_the_observer_what_the_flow_says():
-    def read(**inexact: float) -> Floats:
+    def read(**inexact):
         return watched(scene(sensors={"observer": "valve", **inexact}), down_and_up)[1]
 
     exact, known = read(), well_open(down_and_up, least=0.4)
     # Two heights, each half a step off, in one period.
     error = np.abs(read(height_step=1e-6) - exact)[known]
     assert 0.05 * loading(1e-6, 0.4) < error.max() <= loading(1e-6, 0.4)
-    np.testing.assert_array_equal(read(delay=3)[3:], exact[:-3])
+    assert_array_equal(read(delay=3)[3:], exact[:-3])
     exact, noisy = (
         watched(scene(sensors={"observer": "valve", "height_noise": noise}), lambda period: 0.4)[1]
         for noise in (0.0, 1e-7)
@@ -335,4 +328,4 @@ def test_a_cell_that_took_no_part_while_its_valve_was_shut_is_observed_as_if_it_
             if period > max(gap):
                 after.append(own.copy())
         results.append(np.array(after))
-    np.testing.assert_array_equal(results[1], results[0])
+    assert_array_equal(results[1], results[0])

@@ -4,7 +4,6 @@ import json
 import os
 import re
 import shutil
-from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -27,7 +26,7 @@ QUICK = 'errors = false\nexport = ["stl"]\n'
 
 
 @pytest.fixture(autouse=True)
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def here(tmp_path, monkeypatch):
     work = tmp_path / "work"
     work.mkdir()
     (tmp_path / "scene.toml").write_text(SCENE, encoding="utf-8")
@@ -106,7 +105,7 @@ def test_scenes_by_odd_paths_are_done_and_nothing_is_written_outside(here, capsy
     assert {path.parts[0] for path in new} == {"o"}
 
 
-def jobs_file(said: str) -> Path:
+def jobs_file(said):
     path = Path("jobs.toml")
     path.write_text(said.replace("'", '"'), encoding="utf-8")
     return path
@@ -174,7 +173,7 @@ KIND = Kind("series", "series.json", ("parts",))
 
 
 @contextmanager
-def room_for(size: int) -> Iterator[None]:
+def room_for(size):
     """Let files be written up to so many bytes only: the system refuses more, as it does on a full disk."""
     resource = pytest.importorskip("resource", reason="Windows cannot limit how much is written")
     former = resource.getrlimit(resource.RLIMIT_FSIZE)
@@ -258,7 +257,7 @@ def test_what_a_killed_process_left_in_a_series_is_taken_away(here):
 
 
 def test_another_series_and_what_is_no_folder_are_refused(here):
-    def refuse(there: object) -> None:
+    def refuse(there):
         raise OutputError(f"found {there}")
 
     with open_series(here / "o", KIND, {"a": 1}, refuse):  # nothing is there to be refused

@@ -2,11 +2,11 @@
 
 import json
 import math
-from typing import Any
 
 import numpy as np
 import pytest
 from digiclay.core.base.errors import OutputError, ParameterError
+from numpy.testing import assert_allclose
 from pythonosc.osc_bundle_builder import IMMEDIATELY, OscBundleBuilder
 from pythonosc.osc_message_builder import OscMessageBuilder
 
@@ -25,7 +25,7 @@ PLACE = (0.01, -0.02, 0.05)
 # Requests
 
 
-def osc(address: str, *values: Any) -> bytes:
+def osc(address, *values):
     """Return a message of OSC as other programs send it."""
     builder = OscMessageBuilder(address)
     for value in values:
@@ -48,7 +48,7 @@ def test_poses_are_the_same_in_all_formats():
     assert read_request(*read_osc(osc("/digiclay/poses", "token", 9, 3))[1:]) == Poses((), (3,), 9)
 
 
-BAD: list[tuple[str, list[tuple[Any, list[Any]]], str]] = [
+BAD = [
     ("NaN in one", [(2, [0.0, 0.0, math.nan])], "Finger 2: pose must be finite numbers"),
     ("two numbers", [(2, [0.0, 0.0])], "Finger 2: pose must be 3 numbers"),
     ("text", [(2, ["a", 0.0, 0.0])], "Finger 2: pose must be numbers"),
@@ -87,7 +87,7 @@ def test_a_message_that_is_none_is_refused_in_one_line(said, message):
     assert "\n" not in str(caught.value)
 
 
-def poses(*identities: int, alive: tuple[int, ...] = (), **given: Any) -> Poses:
+def poses(*identities, alive=(), **given):
     """Return a request with fingers 10 mm apart."""
     fingers = tuple((one, (0.01 * one, 0.0, 0.05, *LEVEL)) for one in identities)
     return Poses(fingers, alive or identities, **given)
@@ -102,7 +102,7 @@ def test_the_first_that_appear_have_the_fingertips_and_33_are_told(monkeypatch):
         bed = Bed("", 1, 1, 1.0, 1.0, 1.0, (), fingers=fingers)
         link = DoorLink(bed, orders, orders, "")
 
-        async def order(link: DoorLink = link, identities: tuple[int, ...] = identities) -> None:
+        async def order(link=link, identities=identities):
             link.order(poses(*identities), "me")
 
         with pytest.raises(FrequentError, match=f"at most {fingers}.*got 1 more"):
@@ -127,13 +127,13 @@ JOINTS = np.linspace(-0.05, 0.13, 63).round(4).reshape(21, 3)
 JOINTS[[4, 8, 12, 16, 20], 0] = [-0.033, -0.012, 0.010, 0.028, 0.048]
 
 
-def lines(side: str = "Right", wrist: str = WRIST, joints: Any = JOINTS, meta: str = "") -> bytes:
+def lines(side="Right", wrist=WRIST, joints=JOINTS, meta=""):
     """Return a packet as Hand Tracking Streamer writes it."""
     numbers = ", ".join(f"{value:.4f}" for value in np.ravel(joints))
     return f"{side} wrist{meta}:, {wrist}\n{side} landmarks{meta}:, {numbers}".encode()
 
 
-def tips(*packets: bytes) -> np.ndarray:
+def tips(*packets):
     """Return the fingertips that packets show."""
     hands = Hands(0.04)
     for packet in packets:
@@ -143,24 +143,22 @@ def tips(*packets: bytes) -> np.ndarray:
 
 def test_fingertips_of_a_quest_are_in_axes_of_the_bed_whatever_the_place_in_the_room():
     found = tips(lines())
-    np.testing.assert_allclose(found[:, :2].mean(0), 0.0, atol=1e-12)
+    assert_allclose(found[:, :2].mean(0), 0.0, atol=1e-12)
     assert found[:, 2].min() == pytest.approx(0.06)
-    np.testing.assert_allclose(tips(lines(wrist="1.2502, 0.0635, -0.746" + WRIST[22:])), found, atol=1e-12)
+    assert_allclose(tips(lines(wrist="1.2502, 0.0635, -0.746" + WRIST[22:])), found, atol=1e-12)
     # A hand that is not turned: Unity's x, z, y are the bed's x, y, z.
     plain = tips(lines(wrist="0, 0, 0, 0, 0, 0, 1"))
-    np.testing.assert_allclose(
-        np.diff(plain, axis=0), np.diff(JOINTS[[4, 8, 12, 16, 20]], axis=0)[:, [0, 2, 1]]
-    )
+    assert_allclose(np.diff(plain, axis=0), np.diff(JOINTS[[4, 8, 12, 16, 20]], axis=0)[:, [0, 2, 1]])
     # Turned by 90 degrees about Unity's y, clockwise from above, its fingers point to the right.
     turned = tips(lines(wrist="0, 0, 0, 0, 0.7071, 0, 0.7071"))
-    np.testing.assert_allclose(turned[:, :2], plain[:, [1, 0]] * [1.0, -1.0], atol=1e-4)
+    assert_allclose(turned[:, :2], plain[:, [1, 0]] * [1.0, -1.0], atol=1e-4)
     assert list(Hands(0.04).take(lines(meta=" | f = 12 | t = 123456"), 1.0).fingers(1.0)) == [5, 6, 7, 8, 9]
 
 
 def test_the_left_hand_is_the_mirrored_right_one():
     x, y, z, a, b, c, w = (float(word) for word in WRIST.split(","))
     mirrored = lines("Left", ", ".join(map(str, (-x, y, z, a, -b, -c, w))), JOINTS * [-1.0, 1.0, 1.0])
-    np.testing.assert_allclose(tips(mirrored), tips(lines()) * [-1.0, 1.0, 1.0], atol=1e-12)
+    assert_allclose(tips(mirrored), tips(lines()) * [-1.0, 1.0, 1.0], atol=1e-12)
     assert list(Hands(0.04).take(mirrored, 1.0).take(lines(), 1.0).fingers(1.0)) == list(range(10))
 
 
@@ -222,7 +220,7 @@ def test_other_lines_are_passed_over_and_a_hand_that_is_not_turned_at_all_does_n
 # Touch pads
 
 
-def bundle(*messages: bytes) -> bytes:
+def bundle(*messages):
     """Return messages as one datagram."""
     from pythonosc.osc_message import OscMessage
 
@@ -232,14 +230,14 @@ def bundle(*messages: bytes) -> bytes:
     return bytes(builder.build().dgram)
 
 
-def touch(*fingers: tuple[int, float, float]) -> bytes:
+def touch(*fingers):
     """Return a frame of TUIO 1.1."""
     alive = osc("/tuio/2Dcur", "alive", *(one for one, *_ in fingers))
     sets = [osc("/tuio/2Dcur", "set", one, x, y, 0.0, 0.0, 0.0) for one, x, y in fingers]
     return bundle(alive, *sets, osc("/tuio/2Dcur", "fseq", 7))
 
 
-def point(*fingers: tuple[int, float, float, float]) -> bytes:
+def point(*fingers):
     """Return a frame of TUIO 2.0 with pressure."""
     pointers = [
         osc("/tuio2/ptr", one, 1, 0, x, y, 0.0, 0.0, 0.01, pressure) for one, x, y, pressure in fingers

@@ -12,7 +12,7 @@ from digiclay.core.model.fingertip import LEVEL
 from digiclay.core.scene.scene_source import Setting, find, load
 from digiclay.core.scene.toml_table import resolve
 from digiclay.core.session import snapshot
-from digiclay.core.session.take import Take, from_bytes, make_take, replay
+from digiclay.core.session.take import from_bytes, make_take, replay
 
 from digiclay_serve import real_time_loop, serve_command
 from digiclay_serve.doors import Doors, Order, make_slot, open_slot, pack_order, unpack_order
@@ -29,7 +29,6 @@ from digiclay_serve.protocol import (
 from digiclay_serve.real_time_loop import Schedule, TimeCounts, run_session
 from digiclay_serve.served_session import (
     PartWriter,
-    Session,
     aim,
     begin_session,
     follow,
@@ -72,14 +71,14 @@ class Clock:
     now = 10.0
     thread_time = staticmethod(thread_time)
 
-    def perf_counter(self) -> float:
+    def perf_counter(self):
         """Return the time, s."""
         self.now += 1e-3
         return self.now
 
 
 @pytest.fixture
-def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
+def clock(monkeypatch):
     """The clock by which sessions run."""
     clock = Clock()
     monkeypatch.setattr(real_time_loop, "time", clock)
@@ -89,26 +88,26 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
 class Asked:
     """Doors whose clients ask for another pose at each look, or for none, over some periods."""
 
-    def __init__(self, clock: Clock, *, restless: bool) -> None:
+    def __init__(self, clock, *, restless):
         self.clock, self.restless, self.order = clock, restless, Order()
         #: Periods simulated, and when their frame was shown, s.
         self.shown: list[tuple[int, float]] = []
 
-    def read_order(self) -> Order:
+    def read_order(self):
         """Return the newest order."""
         if self.restless:
             self.order = self.order._replace(number=self.order.number + 1)
         return self.order
 
-    def wait(self, time: float) -> None:
+    def wait(self, time):
         """Wait for an order: the restless have one at once."""
         self.clock.now += 0.0 if self.restless else time
 
-    def show(self, frame: bytes) -> None:
+    def show(self, frame):
         """Note a frame."""
         self.shown.append((unpack_frame(frame).period, self.clock.now))
 
-    def stopped(self) -> bool:
+    def stopped(self):
         """Return whether it is over."""
         return self.shown[-1][0] >= 7
 
@@ -172,7 +171,7 @@ def test_shares_of_times_are_those_of_the_sorted_times():
     assert (counts.find_share(0.9), counts.count_above(PERIOD)) == (7.0, late + 5000)
 
 
-def pressed(session: Session, count: int = 20) -> Session:
+def pressed(session, count=20):
     """Press the fingertip down, a period at a time."""
     for _ in range(count):
         session = follow(session, DOWN, 3, 1)
@@ -264,7 +263,7 @@ def test_a_session_that_diverges_goes_back_and_does_not_go_there_again():
     assert follow(after, high + DOWN / 1e3, 3, 1).poses.tolist() != high.tolist()
 
 
-def taken(session: Session) -> Take:
+def taken(session):
     """Return what a session has recorded."""
     assert session.recording is not None
     take = make_take(session.scene, session.recording, snapshot.dump(session.system, session.state))

@@ -1,15 +1,13 @@
 """What was formed, written as a mesh and read back as a shape: the same heights, cell by cell."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from digiclay.core.base.errors import ParameterError
 from digiclay.core.mesh_io.export_model import Model, make_bodies
 from digiclay.core.mesh_io.mesh_writer import FORMATS, find_suffix, write
 from digiclay.core.model.actuator import Actuator
-from digiclay.core.model.layout import Grid, Layout, make_grid
-from digiclay.core.shapes.fitting import Fitted, fit_relief, read
+from digiclay.core.model.layout import Layout, make_grid
+from digiclay.core.shapes.fitting import fit_relief, read
 from digiclay.core.shapes.mesh_relief import make_shape_mesh
 from digiclay.core.shapes.request import Placement, Shape
 from digiclay.core.surface.formed import Formed
@@ -22,14 +20,14 @@ PITCHES = (3.0, 2.3, 2.54)
 EXACT = 1e-7
 
 
-def bed(pitch: float, arrangement: str) -> tuple[Grid, Formed]:
+def bed(pitch, arrangement):
     """A bed with pins anywhere between 30 and 50 mm."""
     cells = make_grid(Layout(9, 8, pitch * 1e-3, arrangement))
     height = np.random.default_rng(3).uniform(0.03, 0.05, cells.count)
     return cells, Formed.of(cells.positions, height, 0.04, 0.0, 0)
 
 
-def read_back(cells: Grid, formed: Formed, model: Model, path: Path, format: str, unit: str = "mm") -> Fitted:
+def read_back(cells, formed, model, path, format, unit="mm"):
     write(make_bodies(formed, model), path, unit, format)
     shape = Shape(file=str(path), fit="placed", unit="auto" if format in ("glb", "3mf") else unit)
     return fit_relief(shape, read(shape), cells, Actuator())

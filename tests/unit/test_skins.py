@@ -9,11 +9,12 @@ from digiclay.core.model.layout import Layout, find_grid_shape, make_grid
 from digiclay.core.surface import skins
 from digiclay.core.surface.formed import Formed, find_base_level, make_skin, make_solid
 from digiclay.core.surface.pins_solid import BRIDGE, make_parts, make_pins_solid
-from digiclay.core.surface.skins import SKINS, SurfaceGrid, fit_skin
+from digiclay.core.surface.skins import SKINS, fit_skin
 from digiclay.device.instant import Instant
 from digiclay.device.skin_lattice import KINDS, MOST_POINTS, choose_parts, make_lattice
 from hypothesis import given
 from hypothesis import strategies as st
+from numpy.testing import assert_allclose, assert_array_equal
 from scipy.interpolate import LinearNDInterpolator, PchipInterpolator, RegularGridInterpolator
 from scipy.spatial import Delaunay
 
@@ -22,7 +23,7 @@ from tests.live_skin import interpolate
 ARRANGEMENTS = ("aligned", "staggered", "hexagonal")
 
 
-def pins(rows: int, columns: int, arrangement: str = "aligned") -> np.ndarray:
+def pins(rows, columns, arrangement="aligned"):
     return make_grid(Layout(rows=rows, columns=columns, arrangement=arrangement)).positions
 
 
@@ -45,7 +46,7 @@ def test_shifted_rows_are_joined_by_the_shorter_diagonal_whatever_the_heights():
     place = pins(6, 6, "staggered")
     random = np.random.default_rng(2)
     first, second = (make_skin(place, random.uniform(0.0, 0.1, 36), 6, 6) for _ in range(2))
-    np.testing.assert_array_equal(first, second)
+    assert_array_equal(first, second)
     sides = np.hypot(*np.moveaxis(place[first] - place[np.roll(first, 1, axis=1)], -1, 0))
     # Half a pitch across and one along: 1.118 pitches; the longer one has 1.803.
     assert sides.max() < 1.2 * 3e-3
@@ -83,7 +84,7 @@ def test_a_base_that_is_not_below_every_pin_is_refused(thickness):
         find_base_level(np.array([0.05, 0.04]), thickness)
 
 
-def formed(heights_mm, rows: int, columns: int, arrangement: str = "aligned") -> Formed:
+def formed(heights_mm, rows, columns, arrangement="aligned"):
     place = make_grid(Layout(rows=rows, columns=columns, arrangement=arrangement)).positions
     return Formed.of(place, np.asarray(heights_mm, float) * 1e-3, 0.04, 0.0, 0)
 
@@ -116,7 +117,7 @@ def test_every_edge_has_two_faces_and_all_face_outward(bed):
     assert mesh.area_faces.min() > 0.0
     assert len(np.unique(faces)) == len(vertices)
     tops = np.column_stack([bed.position, bed.height])
-    np.testing.assert_allclose(vertices[: len(tops)], tops, rtol=0.0, atol=0.51e-7)  # in steps of 0.1 µm
+    assert_allclose(vertices[: len(tops)], tops, rtol=0.0, atol=0.51e-7)  # in steps of 0.1 µm
 
 
 @pytest.mark.parametrize("arrangement", ARRANGEMENTS)
@@ -136,7 +137,7 @@ def test_squares_that_meet_at_a_corner_are_joined_and_differences_no_file_can_ho
     made = make_parts(bed)
     assert len(made.corner) == 10  # nine and one more: the middle is two
     between = made.corner[np.abs(made.corner).max(axis=1) < 0.5e-3]
-    np.testing.assert_allclose(np.abs(between), BRIDGE * 3e-3, rtol=1e-9)
+    assert_allclose(np.abs(between), BRIDGE * 3e-3, rtol=1e-9)
     high = {0, 3}
     met = made.twin >= 0
     assert any({int(p), int(o)} == high for p, o in zip(made.pin[met], made.pin[made.twin[met]], strict=True))
@@ -153,12 +154,12 @@ CAP = 1e-3
 ROUNDING = 1e-15
 
 
-def bed(arrangement: str = "aligned", rows: int = 7, columns: int = 9, seed: int = 1) -> Formed:
+def bed(arrangement="aligned", rows=7, columns=9, seed=1):
     place = make_grid(Layout(rows=rows, columns=columns, arrangement=arrangement)).positions
     return Formed.of(place, np.random.default_rng(seed).uniform(0.02, 0.08, len(place)), 0.04, 0.0, 0)
 
 
-def covered(formed: Formed, skin: str, parts: int) -> SurfaceGrid:
+def covered(formed, skin, parts):
     return fit_skin(formed, skin, parts, CAP)
 
 
@@ -169,7 +170,7 @@ def test_the_bilinear_skin_of_an_aligned_bed_is_scipys():
     known = RegularGridInterpolator((y, x), formed.height.reshape(7, 9))
     # Points of the edge may be a rounding error outside.
     inside = np.clip(sheet.position, formed.position.min(axis=0), formed.position.max(axis=0))
-    np.testing.assert_allclose(sheet.height, known(inside[:, ::-1]), rtol=0.0, atol=1e-14)
+    assert_allclose(sheet.height, known(inside[:, ::-1]), rtol=0.0, atol=1e-14)
 
 
 @pytest.mark.parametrize("mirrored", [False, True])
@@ -183,7 +184,7 @@ def test_the_bilinear_skin_of_a_shifted_bed_is_flat_on_the_triangles_of_delaunay
     compared = np.isfinite(known)
     # At the zig-zag ends the hull has triangles that the bed has not, but no point of ours lies in them.
     assert compared.mean() > 0.95
-    np.testing.assert_allclose(sheet.height[compared], known[compared], rtol=0.0, atol=1e-12)
+    assert_allclose(sheet.height[compared], known[compared], rtol=0.0, atol=1e-12)
 
 
 @pytest.mark.parametrize("arrangement", ARRANGEMENTS)
@@ -211,7 +212,7 @@ def test_a_spline_may_have_its_knots_anywhere(falling, count):
     value, at = random.integers(-2, 3, size=(count, 30)) * 1.0, np.linspace(knot.min(), knot.max(), 101)
     order = np.argsort(knot)
     known = PchipInterpolator(knot[order], value[order])(at)
-    np.testing.assert_allclose(interpolate_monotone(knot, value, at), known, rtol=0.0, atol=1e-12)
+    assert_allclose(interpolate_monotone(knot, value, at), known, rtol=0.0, atol=1e-12)
 
 
 @pytest.mark.parametrize("skin", SKINS)
@@ -248,17 +249,15 @@ def test_force_is_straight_between_pins_and_a_mode_that_of_the_nearest():
     formed = bed(rows=2, columns=2)
     known = Formed.of(formed.position, formed.height, 0.04, [0.0, 1.0, 0.0, 1.0], [1, 2, 3, 4])
     values = covered(known, "smooth", 4).values()
-    np.testing.assert_allclose(values["force"].reshape(5, 5), np.tile([0, 0.25, 0.5, 0.75, 1], (5, 1)))
-    np.testing.assert_array_equal(
-        values["mode"].reshape(5, 5)[[0, 1, 3, 4]][:, [0, 1, 3, 4]][0], [1, 1, 2, 2]
-    )
+    assert_allclose(values["force"].reshape(5, 5), np.tile([0, 0.25, 0.5, 0.75, 1], (5, 1)))
+    assert_array_equal(values["mode"].reshape(5, 5)[[0, 1, 3, 4]][:, [0, 1, 3, 4]][0], [1, 1, 2, 2])
 
 
-def at_rest(rows: int, columns: int, arrangement: str = "aligned") -> Instant:
+def at_rest(rows, columns, arrangement="aligned"):
     return Instant.at_rest(Layout(rows=rows, columns=columns, arrangement=arrangement))
 
 
-def rough(instant: Instant) -> np.ndarray:
+def rough(instant):
     return 0.04 + 0.005 * np.random.default_rng(3).standard_normal(len(instant.position))
 
 
@@ -274,7 +273,7 @@ def test_the_skin_goes_through_the_top_of_every_pin(arrangement, kind, parts):
         apart = np.hypot(*(lattice.place[top] - place).T)
         assert apart.min() < 1e-9
         # A point of the surface may have a second one for the sides, of the same height.
-        np.testing.assert_allclose(skin[top][apart < 1e-9], height[pin], rtol=0, atol=ROUNDING)
+        assert_allclose(skin[top][apart < 1e-9], height[pin], rtol=0, atol=ROUNDING)
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -289,14 +288,14 @@ def test_inside_the_bed_it_is_the_skin_of_the_exports(kind):
     # The two end the slopes at the outermost pins differently, which the next pin inside feels no more.
     cut = slice(parts, -parts)
     known = exported.reshape(inside.shape)[cut, cut]
-    np.testing.assert_allclose(inside[cut, cut], known, rtol=0, atol=1e-12)
+    assert_allclose(inside[cut, cut], known, rtol=0, atol=1e-12)
 
 
 @pytest.mark.parametrize("rows, columns", [(1, 1), (1, 5), (5, 1), (2, 2)])
 def test_the_smallest_beds_have_a_skin_too(rows, columns):
     lattice = make_lattice(at_rest(rows, columns), 4)
     skin = interpolate(lattice, np.full(rows * columns, 0.04), "smooth")
-    np.testing.assert_allclose(skin, np.where(lattice.sunk, 0.0, 0.04), rtol=0, atol=ROUNDING)
+    assert_allclose(skin, np.where(lattice.sunk, 0.0, 0.04), rtol=0, atol=ROUNDING)
 
 
 @pytest.mark.parametrize("arrangement", ARRANGEMENTS)

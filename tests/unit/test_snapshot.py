@@ -3,7 +3,7 @@
 import math
 from enum import IntEnum
 from functools import cache
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -12,7 +12,6 @@ from digiclay.core.base.modes import Mode
 from digiclay.core.control.methods import METHODS
 from digiclay.core.engine.simulation import begin, periods
 from digiclay.core.engine.state import State
-from digiclay.core.engine.system import System
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.toml_table import resolve
 from digiclay.core.session import snapshot
@@ -25,24 +24,24 @@ SIZES = {"rows": 9, "columns": 11}
 PRESS = path((0.0, -6, 0, 42), (0.2, -6, 0, 36), (0.6, 6, 2, 36), (0.8, 6, 2, 46))
 
 
-def system_of(method: str = "virtual_master", **tables: Any) -> System:
+def system_of(method="virtual_master", **tables):
     return assemble(resolve({"layout": SIZES, "control": {"method": method}, **tables}))
 
 
-def run(system: System, state: State, count: int) -> State:
+def run(system, state, count):
     *_, last = periods(system, [PRESS], state, count)
     return last
 
 
-def same(first: State, second: State) -> bool:
+def same(first, second):
     return packed_parts(first) == packed_parts(second)
 
 
-def packed_parts(state: State) -> list[Any]:
+def packed_parts(state):
     held = state.active
     arrays = (state.rows, state.modes, state.aged, held.cells, held.block, held.mode, held.quadratic_basis)
     rest = (state.period, state.peak, held.near, held.reach, held.control, held.peak, held.until)
-    kept: list[Any] = []
+    kept = []
     memory = flatten(state.memory, kept)
     return [*(array.tobytes() for array in (*arrays, *kept)), *rest, memory]
 
@@ -70,7 +69,7 @@ def test_a_session_goes_on_from_a_kept_state_bit_for_bit(method, tables):
 
 
 @cache
-def kept() -> tuple[System, bytes]:
+def kept():
     system = system_of()
     return system, snapshot.dump(system, run(system, begin(system), 70))
 
@@ -91,7 +90,7 @@ def test_a_state_of_another_bed_is_refused(tables, said):
         snapshot.load(assemble(resolve({"layout": SIZES, **tables})), data)
 
 
-def header_replaced(data: bytes, old: bytes, new: bytes) -> bytes:
+def header_replaced(data, old, new):
     first = len(START) + 4
     length = int.from_bytes(data[len(START) : first], "little")
     text = data[first : first + length]
@@ -126,7 +125,7 @@ def test_a_damaged_header_is_refused(old, new):
 
 
 @cache
-def kept_of_twelve() -> tuple[System, State, bytes]:
+def kept_of_twelve():
     """Return a bed that one of twelve fingertips has pressed."""
     system = assemble(resolve({"layout": SIZES, "control": {"method": "hybrid"}}).with_fingers(12))
     paths = [PRESS, *[path((0.0, 0, 0, 90), (0.8, 0, 0, 90))] * 11]
@@ -229,7 +228,7 @@ class Outer(NamedTuple):
 
 def test_a_memory_comes_back_in_its_types_with_its_arrays():
     memory = Outer(Color.BLUE, Inner(-math.inf, np.bool_(True)), np.array([[0.1, 2.0]]), np.int64(7))
-    arrays: list[NDArray[Any]] = []
+    arrays = []
     text = flatten(memory, arrays)
     back = rebuild(Outer(Color.RED, Inner(-math.inf), np.zeros((0, 2))), text, arrays)
     assert back.table.tolist() == [[0.1, 2.0]]

@@ -20,7 +20,7 @@ from digiclay.core.surface.formed import Body
 BED = make_grid(Layout(13, 13, 3e-3))
 
 
-def heights(file: Path | str, **known: object) -> np.ndarray:
+def heights(file, **known):
     return fit_shape(Shape(file=str(file), **known), BED, Actuator()).heights
 
 

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 from digiclay.core.base.errors import ParameterError
 from digiclay.core.metrics.summary import find_contact_ends
-from digiclay.core.scene.schema import Scene
 from digiclay.core.scene.toml_table import resolve
-from digiclay.core.session.run_scene import RUN_METRICS, Result, run, select_rows
+from digiclay.core.session.run_scene import RUN_METRICS, run, select_rows
 from digiclay.core.studies.speed_limits import (
     Criterion,
     Drag,
@@ -19,9 +18,10 @@ from digiclay.core.studies.speed_limits import (
     judge,
     track,
 )
+from numpy.testing import assert_allclose
 
 
-def device(method: str = "virtual_master", **layout: object) -> Scene:
+def device(method="virtual_master", **layout):
     return resolve({"control": {"method": method}, "layout": layout})
 
 
@@ -34,7 +34,7 @@ def device(method: str = "virtual_master", **layout: object) -> Scene:
     ],
 )
 def test_the_bisection_returns_a_value_that_held(limit, low, resolution, least, most, calls):
-    tried: list[float] = []
+    tried = []
     found = bisect(lambda value: bool(tried.append(value)) or value <= limit, low, 40.0, resolution)
     assert found in tried
     assert least <= found <= most
@@ -60,9 +60,9 @@ def test_a_drag_goes_straight_and_level_at_its_speed(drag, height):
     path, start, end = drag.path(12e-3, 40e-3)
     times = np.linspace(start, end, 11)
     x, y, z = path.trajectory().poses(times)[:, :3].T
-    np.testing.assert_allclose(np.diff(x) / np.diff(times), 12e-3, rtol=1e-9)
-    np.testing.assert_allclose(y, 0.0, atol=1e-12)
-    np.testing.assert_allclose(z, height or z[0], rtol=1e-12)
+    assert_allclose(np.diff(x) / np.diff(times), 12e-3, rtol=1e-9)
+    assert_allclose(y, 0.0, atol=1e-12)
+    assert_allclose(z, height or z[0], rtol=1e-12)
 
 
 def test_a_lift_is_as_fast_as_it_says_at_its_fastest_and_a_bed_narrower_than_the_drag_is_refused():
@@ -86,7 +86,7 @@ def test_a_drag_has_a_limit_and_a_finger_that_is_lost_is_counted_with_its_time()
 
 
 @pytest.fixture(scope="module")
-def press() -> Result:
+def press():
     return run(device(rows=11, columns=11))
 
 

@@ -6,18 +6,18 @@ from decimal import MAX_EMAX, MIN_EMIN, Decimal, localcontext
 
 import numpy as np
 import pytest
-from digiclay.core.base.arrays import Floats
 from digiclay.core.model.physics import find_speeds
 from digiclay.core.steppers import closed_form
-from digiclay.core.steppers.explicit import Explicit, Rates
+from digiclay.core.steppers.explicit import Explicit
 from digiclay.core.steppers.richardson import extrapolate
+from numpy.testing import assert_allclose
 
 from tests.assemble import make_system, one_cell
 
 COUNT = 4000
 
 
-def integrated(e: float, bow: float, slip: float, decay: float, pulp: float) -> tuple[float, float]:
+def integrated(e, bow, slip, decay, pulp):
     """Return the load's part of the way, and the mean of max(exp(e) - 1, 0), by the midpoint rule.
 
     Without load the way is the parabola e + slip s + 6 bow s (1 - s), whose mean lies `bow` above the
@@ -26,7 +26,7 @@ def integrated(e: float, bow: float, slip: float, decay: float, pulp: float) -> 
     push = mean = 0.0
     ds = 1.0 / COUNT
 
-    def rate(s: float, push: float) -> float:
+    def rate(s, push):
         grown = math.exp(min(e + slip * s + 6.0 * bow * s * (1.0 - s) + push, closed_form.LARGE))
         return decay * min(pulp - grown, 0.0)
 
@@ -41,7 +41,7 @@ def integrated(e: float, bow: float, slip: float, decay: float, pulp: float) -> 
     return push, mean
 
 
-def solved(e: float, bow: float, slip: float, decay: float, pulp: float) -> tuple[float, float]:
+def solved(e, bow, slip, decay, pulp):
     push, mean = closed_form.solve_crossing(*(np.array([value]) for value in (e, bow, slip, decay, pulp)))
     return float(push[0]), float(mean[0])
 
@@ -98,8 +98,8 @@ def test_a_vast_growth_keeps_its_digits(exponent, slip, decay, pulp):
     numbers = [np.array([value]) for value in (exponent, float(growth), slip, decay, pulp)]
     push, mean = closed_form.solve_carefully(*numbers)
     # Rounding of slip and exponent; 3e-7 of the mean where relief and growth are subtracted.
-    np.testing.assert_allclose(push, float(rate * unit - relief), rtol=1e-12, atol=1e-12 * abs(slip))
-    np.testing.assert_allclose(mean, float(relief / rate), rtol=1e-12)
+    assert_allclose(push, float(rate * unit - relief), rtol=1e-12, atol=1e-12 * abs(slip))
+    assert_allclose(mean, float(relief / rate), rtol=1e-12)
 
 
 @dataclass(frozen=True)
@@ -110,7 +110,7 @@ class Setter(Explicit):
     order = 1
     nodes = (0.0, 1.0)
 
-    def increment(self, rates: Rates, y: Floats, step: float) -> Floats:
+    def increment(self, rates, y, step):
         way = np.zeros_like(y)
         way[0] = self.ways if self.height is None else self.height - y[0]
         if self.height is None and y[0, 0] != 0.04:
@@ -118,9 +118,7 @@ class Setter(Explicit):
         return way
 
 
-def put(
-    stepper: Setter, under: list[list[float]], start: list[float], **parts: object
-) -> tuple[Floats, Floats]:
+def put(stepper, under, start, **parts):
     """Return heights, m, and forces that a stepper leaves of pins under the undersides of a fingertip, m."""
     system = make_system(stepper="euler", dead_time=0.0, relaxation=None, **parts)
     driven = np.zeros((system.rows.physics + system.rows.queue, len(start)))
@@ -133,7 +131,7 @@ def put(
 def test_a_cell_thrown_off_is_given_up_and_a_finger_pushes_a_pin_no_deeper_than_it_comes():
     alone = {"step": 1e-3, "fingertip": None, "contact": None}
     height, _ = put(Setter(None, (10.0, 1e-3)), [], [0.04, 0.04], **alone)
-    np.testing.assert_allclose(height, [np.inf, 0.045], rtol=1e-12)
+    assert_allclose(height, [np.inf, 0.045], rtol=1e-12)
     # 1 mm deep at the end of the period: f_d b/m (e^(m x) - 1), and no contact at the start.
     _, force = put(Setter(39e-3), [[41e-3], [38e-3]], [40e-3], step=5e-3)
     assert force[0] == pytest.approx(0.34 * 250.0 / 2000.0 * np.expm1(2.0), rel=1e-9)
@@ -147,7 +145,7 @@ def test_a_cell_thrown_off_is_given_up_and_a_finger_pushes_a_pin_no_deeper_than_
     paths = exponent, 9.0 * one, bow, lift
     start = closed_form.StepStart(cell, openings, pressure, weights, *paths, relaxed=one, idle=loaded)
     rise, _, _ = closed_form.find_loaded_path(2000.0, 1e6, 1.0, start)
-    np.testing.assert_allclose(rise, -deepest / 2000.0, rtol=1e-12)
+    assert_allclose(rise, -deepest / 2000.0, rtol=1e-12)
 
 
 @pytest.mark.parametrize(

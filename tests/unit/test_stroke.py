@@ -9,15 +9,13 @@ from digiclay.core.model.fingertip import LEVEL, Fingertip, make_matrices
 from digiclay.core.model.layout import Layout, make_grid
 from digiclay.press.pointer import CURVE_ITEMS, FULL_TILT, begin_button, find_lean, find_share, read_event
 from digiclay.sessions import sculpting
-from digiclay.sessions.running import Running
 from digiclay.sessions.sculpting import drop_strokes, find_stroke, queue_stroke
 from digiclay.strokes import motion
 from digiclay.strokes.nominal import Device
 from digiclay.strokes.pose import lean_finger, turn_image, turn_toward
 from digiclay.strokes.stroke import (
+    ALONE,
     DEEPEST,
-    Image,
-    Stroke,
     deepen,
     draw,
     lay_line,
@@ -27,7 +25,7 @@ from digiclay.strokes.stroke import (
     pull,
     start,
 )
-from numpy.typing import NDArray
+from numpy.testing import assert_allclose, assert_array_equal
 
 from tests.assemble import table
 from tests.hand import TICK, finish, let_go, risen, started
@@ -45,7 +43,7 @@ AT = np.array([0.0, 0.0, 0.046, *LEVEL])
 DEVICE = Device(CELLS, Fingertip(), None, 0.08)
 
 
-def line(end: float = 0.02, moves: int = 20, images: tuple[Image, ...] = make_images("NONE")) -> Stroke:
+def line(end=0.02, moves=20, images=ALONE):
     """Return a stroke drawn evenly along x from (0, 5) mm on, 4 mm deep, that the hand still holds."""
     stroke = start(1, 0.0, 0.005, 4e-3, images)
     for part in np.arange(1, moves + 1) / moves:
@@ -53,18 +51,16 @@ def line(end: float = 0.02, moves: int = 20, images: tuple[Image, ...] = make_im
     return stroke
 
 
-def path(
-    stroke: Stroke, at: NDArray[np.float64] = AT, chunk: int = 4000, bed: NDArray[np.float64] = HEIGHT
-) -> tuple[Stroke, NDArray[np.float64]]:
+def path(stroke, at=AT, chunk=4000, bed=HEIGHT):
     """Let the finger go on as far as it is drawn, a chunk of periods at a time, without a blister."""
     stroke, poses = lead(motion.begin(stroke, bed, at[3:], None), at[None], chunk, bed)
     return stroke, poses[:, 0]
 
 
 def lead(
-    stroke: Stroke, at: NDArray[np.float64], chunk: int = 4000, bed: NDArray[np.float64] = HEIGHT,
-    creep: float = 0.0
-) -> tuple[Stroke, NDArray[np.float64]]:  # fmt: skip
+    stroke, at, chunk=4000, bed=HEIGHT,
+    creep=0.0
+):  # fmt: skip
     """Let fingers at poses (m, 7) go on along a stroke that has begun; return their poses (t, m, 7)."""
     poses, part, forces = [at], at[None], np.zeros(len(at))
     while not stroke.done and (len(part) > 1 or len(poses) == 1) and len(poses) < 4000:
@@ -78,12 +74,12 @@ def lead(
     return stroke, np.array(poses)
 
 
-def release(stroke: Stroke) -> Stroke:
+def release(stroke):
     """Return a stroke that the hand has let go."""
     return replace(stroke, held=False)
 
 
-def pressed(poses: NDArray[np.float64]) -> NDArray[np.float64]:
+def pressed(poses):
     """Return the poses at full depth."""
     return poses[np.abs(poses[:, 2] - 0.036) < 1e-9]
 
@@ -119,9 +115,7 @@ def test_the_way_follows_from_the_path_alone_and_is_never_ahead_of_the_hand(away
     poses, stroke = [*first], replace(part, samples=whole.samples, held=False)
     done, more = lead(stroke, poses[-1], chunk)
     assert done.done
-    np.testing.assert_array_equal(
-        np.array([*poses, *more[1:]]), lead(motion.begin(whole, HEIGHT, AT[3:], None), at)[1]
-    )
+    assert_array_equal(np.array([*poses, *more[1:]]), lead(motion.begin(whole, HEIGHT, AT[3:], None), at)[1])
 
 
 @table(
@@ -180,7 +174,7 @@ def test_the_depth_stays_within_what_can_be_pressed(by, depth):
 
 #: Symmetries: how they are made, and where a place (x, y) comes to, by complex numbers.
 IMAGES = {
-    "none": (make_images("NONE"), lambda z: [z]),
+    "none": (ALONE, lambda z: [z]),
     "x": (make_images("X"), lambda z: [z, -z.conjugate()]),
     "y": (make_images("Y"), lambda z: [z, z.conjugate()]),
     "both": (make_images("XY"), lambda z: [z, -z.conjugate(), -z, z.conjugate()]),
@@ -233,12 +227,12 @@ def test_the_mouse_pulls_a_place_behind_it(place, mouse, string, pulled):
 
 def test_a_ring_keeps_its_radius_and_is_closed_and_a_laid_path_is_let_go():
     points = lay_ring((2e-3, -1e-3), (2e-3, 9e-3))
-    np.testing.assert_allclose(np.linalg.norm(points - [2e-3, -1e-3], axis=1), 10e-3, rtol=1e-12)
-    np.testing.assert_allclose(points[0], points[-1], atol=1e-15)
-    np.testing.assert_allclose(points[0], [2e-3, 9e-3], atol=1e-15)
+    assert_allclose(np.linalg.norm(points - [2e-3, -1e-3], axis=1), 10e-3, rtol=1e-12)
+    assert_allclose(points[0], points[-1], atol=1e-15)
+    assert_allclose(points[0], [2e-3, 9e-3], atol=1e-15)
     assert np.linalg.norm(np.diff(points, axis=0), axis=1).max() <= 1e-3 + 1e-12
     # Without a radius it is a place.
-    np.testing.assert_array_equal(lay_ring((1e-3, 2e-3), (1e-3, 2e-3)), [[1e-3, 2e-3]])
+    assert_array_equal(lay_ring((1e-3, 2e-3), (1e-3, 2e-3)), [[1e-3, 2e-3]])
     stroke = lay_path(start(3, 0.0, 0.0, 4e-3), lay_line((0.0, 0.0), (30e-3, 40e-3)))
     assert not stroke.held
     assert [one.depth for one in stroke.samples] == [4e-3, 4e-3]
@@ -250,7 +244,7 @@ UPRIGHT = np.array(LEVEL)
 TWISTED = np.array([np.cos(np.pi / 16), 0.0, 0.0, np.sin(np.pi / 16)])
 
 
-def matrix(turn: np.ndarray) -> np.ndarray:
+def matrix(turn):
     """Return the rotation matrix of a quaternion."""
     return make_matrices(turn[None])[0]
 
@@ -259,8 +253,8 @@ def matrix(turn: np.ndarray) -> np.ndarray:
 def test_the_top_of_the_finger_goes_where_it_leans_by_the_angle(lean):
     top = matrix(lean_finger(UPRIGHT, lean))[:, 2]
     angle = np.hypot(*lean)
-    np.testing.assert_allclose(top[:2], np.array(lean) / angle * np.sin(angle), atol=1e-12)
-    np.testing.assert_array_equal(lean_finger(TWISTED, (0.0, 0.0)), TWISTED)
+    assert_allclose(top[:2], np.array(lean) / angle * np.sin(angle), atol=1e-12)
+    assert_array_equal(lean_finger(TWISTED, (0.0, 0.0)), TWISTED)
 
 
 @pytest.mark.parametrize("name", IMAGES)
@@ -270,7 +264,7 @@ def test_the_orientation_of_an_image_is_that_of_the_ellipsoids_image_and_near_to
         flat = np.array([[image.xx, image.xy, 0.0], [image.yx, image.yy, 0.0], [0.0, 0.0, 1.0]])
         there, own = matrix(turn_image(turn, image)), matrix(turn)
         wanted = flat @ own @ form @ own.T @ flat.T
-        np.testing.assert_allclose(there @ form @ there.T, wanted, atol=1e-12)
+        assert_allclose(there @ form @ there.T, wanted, atol=1e-12)
         assert np.trace(there @ own.T) >= 0.8, "it turns by no more than some 90 degrees"
 
 
@@ -279,8 +273,8 @@ def test_a_pen_that_is_jerked_turns_the_finger_no_faster_than_a_hand_to_its_aim(
     for _ in range(6):
         before, turn = turn, turn_toward(turn, aim, 0.1)
         angles.append(2.0 * np.arccos(min(1.0, abs(before @ turn))))
-    np.testing.assert_allclose(angles, [0.1] * 5 + [0.0], atol=1e-7)
-    np.testing.assert_allclose(matrix(turn), matrix(aim), atol=1e-12)
+    assert_allclose(angles, [0.1] * 5 + [0.0], atol=1e-7)
+    assert_allclose(matrix(turn), matrix(aim), atol=1e-12)
     stroke = draw(start(1, 0.0, 0.0, 4e-3), 0.02, 0.0, 4e-3, lean=(0.8, 0.0))
     down = pressed(path(release(stroke))[1])
     turned = 2.0 * np.arccos(np.clip(np.abs((down[1:, 3:] * down[:-1, 3:]).sum(1)), 0.0, 1.0))
@@ -295,14 +289,14 @@ def test_the_finger_leans_with_the_pen_on_each_image_and_ends_as_it_began(name):
         stroke = draw(stroke, part * 0.02, 0.005, 4e-3, lean=(0.4, 0.2))
     stroke, poses = path(release(stroke), np.array([*AT[:3], *TWISTED]))
     assert stroke.done
-    np.testing.assert_array_equal(poses[-1, 3:], TWISTED)
+    assert_array_equal(poses[-1, 3:], TWISTED)
     down = pressed(poses)
     for image in images:
         wanted = turn_image(lean_finger(TWISTED, (0.4, 0.2)), image)
         x, y = image.place(0.01, 0.005)
         side = down[np.hypot(down[:, 0] - x, down[:, 1] - y) < 5e-3]
         assert len(side) > 10
-        np.testing.assert_allclose(side[:, 3:], np.broadcast_to(wanted, (len(side), 4)), atol=1e-9)
+        assert_allclose(side[:, 3:], np.broadcast_to(wanted, (len(side), 4)), atol=1e-9)
 
 
 def test_a_stroke_that_is_dropped_leaves_a_finger_that_does_not_lean():
@@ -312,7 +306,7 @@ def test_a_stroke_that_is_dropped_leaves_a_finger_that_does_not_lean():
         session = sculpting.advance(session, session.pose, step * TICK, 100)
     assert find_stroke(session, number) is not None
     assert abs(session.pose[3:] @ before) < 0.99
-    np.testing.assert_array_equal(drop_strokes(session).pose[3:], before)
+    assert_array_equal(drop_strokes(session).pose[3:], before)
 
 
 DEPTH = 4e-3
@@ -320,7 +314,7 @@ DEPTH = 4e-3
 FORMED = -2e-3
 
 
-def tap(session: Running, x: float, y: float) -> Running:
+def tap(session, x, y):
     """Queue a click, mm."""
     session, number = queue_stroke(session, 1e-3 * x, 1e-3 * y, DEPTH)
     return let_go(session, number)
@@ -389,7 +383,7 @@ DOWN, UP = ("LEFTMOUSE", "PRESS"), ("LEFTMOUSE", "RELEASE")
 KEY, KEY_UP = ("Z", "PRESS"), ("Z", "RELEASE")
 
 
-def is_up(begins: tuple[str, tuple[str, str]], *events: tuple[str, tuple[str, str]]) -> list[bool]:
+def is_up(begins, *events):
     """Return whether the button is taken to be up after each event of a stroke."""
     button, found = begin_button(*begins), []
     for kind, named in events:

@@ -3,7 +3,6 @@
 import shutil
 import sys
 from pathlib import Path
-from typing import Any
 
 import pytest
 from digiclay.cli import main
@@ -25,7 +24,7 @@ pytestmark = pytest.mark.usefixtures("here")
 
 
 @pytest.fixture(scope="module")
-def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def whole(tmp_path_factory):
     folder = tmp_path_factory.mktemp("study")
     (folder / "my.toml").write_text(SCENE, encoding="utf-8")
     study = [str(folder / "my.toml") if word == "my.toml" else word for word in STUDY]
@@ -33,7 +32,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "out"
 
 
-def files(folder: Path) -> dict[str, Any]:
+def files(folder):
     texts = ("indices.csv", "study.json")
     return {name: (folder / name).read_bytes() for name in texts} | {
         "points": timeless(folder / "points.csv")
@@ -174,7 +173,7 @@ def test_a_range_is_read_from_a_line_and_shares_of_it_are_values(said, range_, w
     assert [range_.find_word(share) for share in (0.0, 0.5, 1.0)] == words
 
 
-def fit(*said: str, settings: tuple[Setting, ...] = ()) -> list[Range]:
+def fit(*said, settings=()):
     return fit_ranges([read_range(one) for one in said], find("slow_press"), settings)
 
 

@@ -5,8 +5,6 @@ import json
 import math
 import statistics
 from dataclasses import replace
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -14,7 +12,6 @@ from digiclay import __version__
 from digiclay.cli import main
 from digiclay.core.base.modes import Mode
 from digiclay.core.scene.assembly import assemble
-from digiclay.core.scene.schema import Scene
 from digiclay.core.scene.toml_table import resolve
 from digiclay.core.studies.nominal_relief import find_nominal, measure_relief
 from scipy.stats import t as student
@@ -39,14 +36,14 @@ SHORT = ["compare", "my.toml", "--suite", "--trajectories", "session", "--repeat
 BOTH_METHODS = [*SHORT, "--methods", ",".join(BOTH), "--out", "league", "--quiet"]
 
 
-def read_table(path: Path) -> tuple[list[str], list[dict[str, str]]]:
+def read_table(path):
     lines = path.read_text(encoding="utf-8").splitlines()
     comments = [line for line in lines if line.startswith("#")]
     return comments, list(csv.DictReader(line for line in lines if not line.startswith("#")))
 
 
 @pytest.fixture(scope="module")
-def league(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def league(tmp_path_factory):
     folder = tmp_path_factory.mktemp("suite")
     with pytest.MonkeyPatch.context() as monkeypatch:
         folder_with(SCENE, folder, monkeypatch)
@@ -150,7 +147,7 @@ def test_a_cost_above_a_millisecond_has_no_exponent(value, shown):
 
 
 def test_the_league_counts_worse_trajectories_and_random_drags_as_one():
-    def figures(rfd: float, cost: float = 1e-4) -> dict[str, float | None]:
+    def figures(rfd, cost=1e-4):
         return {"rfd": rfd, "period_cost": cost, "max_total_force": 10.0 * rfd, "losses": 1.0}
 
     table = {
@@ -212,7 +209,7 @@ def test_a_trial_of_several_fingers_is_judged_by_the_worst():
     assert both["relief_largest"] is None or both["relief_largest"] < 4e-3
 
 
-def placed_lift(method: str) -> tuple[Scene, Any]:
+def placed_lift(method):
     scene = resolve({"layout": {"rows": 9, "columns": 15}, "control": {"method": method}})
     return place_trial(scene, "lift")
 
@@ -240,7 +237,7 @@ def test_a_relief_of_two_fingers_is_that_of_both_and_an_error_under_either_is_fo
         find_nominal(scene, {"position": place, "fingertip": own[::4]}, np.full(16, 5), 1e-3)
         for own in np.moveaxis(tips, 1, 0)
     )
-    history: dict[str, Any] = {
+    history = {
         "fingertip": tips, "position": place, "finger_force": np.full((61, 2), 0.4),
         "force": np.zeros((61, len(place))), "mode": np.full((61, len(place)), Mode.FORCE_FOLLOW),
     }  # fmt: skip

@@ -2,7 +2,6 @@
 
 import json
 import math
-from typing import Any
 
 import numpy as np
 import pytest
@@ -12,6 +11,7 @@ from digiclay.core.metrics import summary
 from digiclay.core.metrics.metric_table import METRICS, describe_losses
 from digiclay.core.model.control_interface import SetPoint
 from digiclay.core.model.layout import Layout, make_grid
+from numpy.testing import assert_allclose, assert_array_equal
 
 from tests.assemble import table
 
@@ -22,7 +22,7 @@ ROUNDING = 1e-12
 WHOLE, EACH = SetPoint(0.4), SetPoint(0.04, per_cell=True)
 
 
-def history(total: np.ndarray, time: np.ndarray = TIME) -> dict[str, np.ndarray]:
+def history(total, time=TIME):
     """A bed of 3 x 3 pins, all force on the middle one, the finger 2 mm beside it."""
     force = np.zeros((len(time), 9))
     force[:, 4] = total
@@ -108,7 +108,7 @@ def test_shaping_wants_contact_and_a_follower_and_a_loss_is_a_gap_between_two_co
     case = history(np.array([0.4, 0.4, 0.0]), np.arange(3.0))
     case["mode"][:] = Mode.REST
     case["mode"][:, 4] = Mode.FORCE_FOLLOW, Mode.SPRING, Mode.FORCE_FOLLOW
-    np.testing.assert_array_equal(summary.sum_cells(case).shaping, [True, False, False])
+    assert_array_equal(summary.sum_cells(case).shaping, [True, False, False])
     touching = ((TIME >= 2.0) & (TIME <= 4.0)) | ((TIME >= 5.0) & (TIME <= 7.0))
     # 1 s of 5; the gap is 199 rows of 5 ms, and the ends of the window 2 half rows more.
     assert summary.compute_contact_loss_share(TIME, 0.4 * touching) == pytest.approx(0.2, abs=2e-3)
@@ -333,20 +333,20 @@ TIP[:, :2], TIP[:, 2], TIP[:, 3] = np.outer(np.linspace(-30e-3, 30e-3, 201), ALO
 ALL = np.ones(201, dtype=bool)
 
 
-def errors(final: np.ndarray, rows: np.ndarray = ALL, tip: np.ndarray = TIP) -> np.ndarray:
+def errors(final, rows=ALL, tip=TIP):
     return summary.measure_ridge_errors(PLACE, final, tip, rows, 11e-3) * 1e3
 
 
 def test_a_ridge_has_its_height_over_the_path_at_each_pin():
-    np.testing.assert_array_equal(errors(np.full(21, 50e-3)), 0.0)
-    np.testing.assert_allclose(errors(np.full(21, 51.5e-3)), 1.5, rtol=1e-12)
+    assert_array_equal(errors(np.full(21, 50e-3)), 0.0)
+    assert_allclose(errors(np.full(21, 51.5e-3)), 1.5, rtol=1e-12)
     climbing = TIP.copy()
     climbing[:, 2] += 0.1 * np.linspace(-30e-3, 30e-3, 201)
     # The finger is nearest for 3 mm of its way and 1.5 mm past the pin when it was so last: 0.15 mm higher.
-    np.testing.assert_allclose(errors(50e-3 + 0.1 * LINE, tip=climbing), -0.15, atol=0.031)
+    assert_allclose(errors(50e-3 + 0.1 * LINE, tip=climbing), -0.15, atol=0.031)
     # 2001 rows are looked at in eight parts alike.
     fine = np.repeat(TIP, 10, axis=0)
-    np.testing.assert_array_equal(errors(np.full(21, 51e-3), np.ones(2010, dtype=bool), fine).size, 17)
+    assert_array_equal(errors(np.full(21, 51e-3), np.ones(2010, dtype=bool), fine).size, 17)
 
 
 def test_pins_the_finger_did_not_go_on_from_no_travel_no_rows_and_what_follows_a_loss_do_not_count():
@@ -390,12 +390,10 @@ def test_the_surface_counts_cells_by_force_and_the_lag_is_that_of_their_centroid
     # Centroids (3, 0) and (0, 0) mm from (1, 4) mm: √(4+16) and √(1+16); the row without force is left out.
     case = {"position": place, "force": force, "total_force": force.sum(axis=1)}
     sums = summary.sum_cells({**case, "height": np.zeros_like(force), "mode": np.zeros_like(force)})
-    np.testing.assert_allclose(
-        summary.measure_lag(sums, fingertip), np.sqrt([20.0, 17.0]) * 1e-3, rtol=ROUNDING
-    )
+    assert_allclose(summary.measure_lag(sums, fingertip), np.sqrt([20.0, 17.0]) * 1e-3, rtol=ROUNDING)
 
 
-def of_two(places: tuple[float, float], force: dict[int, float], own: tuple[float, float]) -> dict[str, Any]:
+def of_two(places, force, own):
     """Return a bed of 1 x 5 pins under two fingers on its row; forces by pin and of each finger, N."""
     position = make_grid(Layout(rows=1, columns=5)).positions
     one = history(TIME * 0.0) | {"position": position}
@@ -437,8 +435,8 @@ def test_of_two_fingers_the_lower_one_presses_a_pin_between_them_that_stands_low
     given["fingertip"][:, 1, 2] = 35e-3
     given["height"] += [0.0, 41e-3, 40e-3, 0.0, 36e-3]
     mine, lower = summary.split_fingers(given)
-    np.testing.assert_allclose(mine["force"][0], [0.0, 0.1, 0.0, 0.0, 0.0])
-    np.testing.assert_allclose(lower["force"][0], [0.0, 0.0, 0.2, 0.0, 0.3])
+    assert_allclose(mine["force"][0], [0.0, 0.1, 0.0, 0.0, 0.0])
+    assert_allclose(lower["force"][0], [0.0, 0.0, 0.2, 0.0, 0.3])
 
 
 @pytest.mark.parametrize(

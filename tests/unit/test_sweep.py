@@ -7,9 +7,8 @@ import re
 import signal
 import subprocess
 import time
-from concurrent.futures import BrokenExecutor, Executor, ThreadPoolExecutor
+from concurrent.futures import BrokenExecutor, ThreadPoolExecutor
 from pathlib import Path
-from typing import Any
 
 import pytest
 from digiclay.cli import main
@@ -21,7 +20,7 @@ from digiclay.core.scene.assembly import assemble, count_rows, make_motion
 from digiclay.core.scene.scene_source import Setting, find, load
 from digiclay.core.session.accuracy import estimate_errors
 from digiclay.core.session.run_scene import run
-from digiclay.core.studies.axes import Axis, Point, Record, find_ends, make_points, place_points, read_axis
+from digiclay.core.studies.axes import Axis, Point, find_ends, make_points, place_points, read_axis
 from digiclay.core.studies.evaluation import evaluate
 from digiclay.core.studies.series import finish
 
@@ -39,11 +38,11 @@ SCENE = scene_text(11, 11, (0.0, 0.041), (0.05, 0.037), (0.1, 0.05))
 pytestmark = pytest.mark.usefixtures("here")
 
 
-def rows(folder: str) -> list[dict[str, str]]:
+def rows(folder):
     return read_table(Path(folder) / "sweep.csv")
 
 
-def kept(folder: str) -> dict[str, Any]:
+def kept(folder):
     found = sorted(Path(folder).glob("points/*"))
     return {path.name: json.loads(path.read_text(encoding="utf-8")) for path in found}
 
@@ -208,7 +207,7 @@ def test_a_sweep_estimates_errors_at_the_ends_of_what_varies_and_says_where(caps
     )
 
 
-ENDS: dict[str, tuple[list[tuple[str, ...]], list[int]]] = {
+ENDS = {
     "the ends of a number": ([("3",), ("1",), ("2",), ("9",)], [1, 3]),
     "every word": ([("cone",), ("gaussian",)], [0, 1]),
     "corners of a grid": ([(a, b) for a in "135" for b in "246"], [0, 2, 6, 8]),
@@ -260,12 +259,12 @@ MANY = ["sweep", "slow_press", "--vary", "layout.rows=20:25:6", "--workers", "2"
 QUICK = [*MANY, "--set", "simulation.duration=0.3"]
 
 
-def some(count: int = 3) -> list[Point]:
+def some(count=3):
     return make_points(find("slow_press"), SHORT, [read_axis(f"valve_lag.time_constant=1 ms:2 ms:{count}")])
 
 
-def finished(executor: Executor, task: Any, todo: list[Point], **known: Any) -> dict[int, Record]:
-    done: dict[int, Record] = {}
+def finished(executor, task, todo, **known):
+    done = {}
     finish(
         submit(executor, task, [(point,) for point in todo], **{"stopped": lambda: False, **known}),
         lambda bundle, records: done.update({bundle[0].index: records[0]}),
@@ -279,7 +278,7 @@ def test_a_point_that_fails_is_recorded_and_a_stopped_one_is_not(monkeypatch):
     assert scene is not None
     assert evaluate(scene, stopped=lambda: True) is None
 
-    def faulty(*given: Any, **known: Any) -> None:
+    def faulty(*given, **known):
         raise ZeroDivisionError("one line\nand another")
 
     monkeypatch.setattr("digiclay.core.studies.evaluation.run", faulty)
@@ -289,7 +288,7 @@ def test_a_point_that_fails_is_recorded_and_a_stopped_one_is_not(monkeypatch):
 def test_a_piece_whose_task_fails_is_told_of_and_the_others_go_on_unless_the_workers_die():
     faults = {1: DigiclayError("killed too often"), 2: KeyError("own fault"), 4: BrokenExecutor("gone")}
 
-    def task(bundle: list[Point]) -> list[Record | None]:
+    def task(bundle):
         if fault := faults.get(bundle[0].index):
             raise fault
         return [{"figures": {}}]
@@ -304,7 +303,7 @@ def test_a_piece_whose_task_fails_is_told_of_and_the_others_go_on_unless_the_wor
 
 
 @pytest.fixture(scope="module")
-def whole(tmp_path_factory: pytest.TempPathFactory) -> list[dict[str, str]]:
+def whole(tmp_path_factory):
     out = tmp_path_factory.mktemp("sweep") / "whole"
     assert main([*QUICK, "--workers", "1", "--out", str(out)]) == 0
     return timeless(out / "sweep.csv")
@@ -338,7 +337,7 @@ def test_ctrl_c_on_a_terminal_ends_sessions_of_hours_without_a_word(here):
     assert (code, err, list((here / "out").glob("points/*"))) == (130, "", [])
 
 
-def idle() -> Processes[Evaluator]:
+def idle():
     return Processes[Evaluator](lambda: False, lambda: None)
 
 

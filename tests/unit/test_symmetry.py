@@ -6,16 +6,15 @@ from functools import cache, partial
 
 import numpy as np
 import pytest
-from digiclay.core.base.arrays import Floats
 from digiclay.core.model.fingertip import LEVEL
 from digiclay.core.model.layout import Layout
 from digiclay.core.session import snapshot
-from digiclay.core.session.take import Take, from_bytes, make_take, play, to_bytes
+from digiclay.core.session.take import from_bytes, make_take, play, to_bytes
 from digiclay.sessions import sculpting
-from digiclay.sessions.running import Running
 from digiclay.settings.devices import make_scene
 from digiclay.strokes.nominal import find_nominal
-from digiclay.strokes.stroke import ALONE, FINISHING, PRESSING, YIELDING, Brush, Image, lay_path, make_images
+from digiclay.strokes.stroke import ALONE, FINISHING, PRESSING, YIELDING, Brush, lay_path, make_images
+from numpy.testing import assert_allclose, assert_array_equal
 
 from tests.hand import finish, heights
 
@@ -23,16 +22,14 @@ from tests.hand import finish, heights
 COUNT, PITCH, ABOVE = 41, 1.5e-3, 46e-3
 
 
-def begin(method: str = "virtual_master", fingers: int = 1) -> Running:
+def begin(method="virtual_master", fingers=1):
     """Return a session that is recorded, of fingertips of which only the first one is near the bed."""
     scene = make_scene("paper", Layout(COUNT, COUNT, PITCH), method, 0.5).with_fingers(fingers)
     poses = np.array([[0.3 * number, 0.0, ABOVE, *LEVEL] for number in range(fingers)])
     return sculpting.set_recording(sculpting.begin_session(7, "Bed", scene, poses)[0], True)
 
 
-def queue(
-    session: Running, path: Floats, images: tuple[Image, ...], brush: Brush = Brush.LOWER, held: bool = False
-) -> Running:
+def queue(session, path, images, brush=Brush.LOWER, held=False):
     """Queue a stroke of 4 mm along a path, mm, for a hand that holds it or has let it go."""
     places = 1e-3 * np.asarray(path, float)
     session, number = sculpting.queue_stroke(session, *places[0], 4e-3, images, brush)
@@ -40,12 +37,12 @@ def queue(
     return sculpting.change_stroke(session, number, lambda stroke: replace(stroke, held=held))
 
 
-def line(start: tuple[float, float], end: tuple[float, float]) -> Floats:
+def line(start, end):
     """Return a path that a hand has drawn, mm."""
     return np.linspace(start, end, 30)
 
 
-def go_on(session: Running, periods: int) -> Running:
+def go_on(session, periods):
     """Simulate so many periods of the strokes."""
     end = session.state.period + periods
     while session.state.period < end:
@@ -53,7 +50,7 @@ def go_on(session: Running, periods: int) -> Running:
     return session
 
 
-def keep(session: Running) -> Take:
+def keep(session):
     """Return what a session has recorded, read from bytes."""
     assert session.recording is not None
     take = make_take(session.scene, session.recording, session.snapshot)
@@ -61,7 +58,7 @@ def keep(session: Running) -> Take:
     return from_bytes(to_bytes(take))
 
 
-def is_replayed(take: Take) -> bool:
+def is_replayed(take):
     """Tell whether a take comes to its end bit for bit."""
     *_, (system, last) = play(take)
     return snapshot.dump(system, last) == take.end
@@ -82,7 +79,7 @@ TURNED = {
 
 
 @cache
-def alone(method: str, brush: Brush) -> int:
+def alone(method, brush):
     """Return the control periods of the path without images."""
     return finish(queue(begin(method), APART, ALONE, brush)).state.period
 
@@ -107,7 +104,7 @@ def test_images_form_alike_in_the_time_of_one_and_are_replayed_bit_for_bit(metho
     table = 1e3 * heights(session).reshape(COUNT, COUNT) - 40.0
     part = np.roll(table, (-row, -column), (0, 1))[5:-5, 5:-5]
     # Valves place pins to 1 µm; pins that only give way differ by the order in which fingertips press them.
-    np.testing.assert_allclose(part, turn(part), rtol=0, atol=0.03 if method == "plastic" else 2e-3)
+    assert_allclose(part, turn(part), rtol=0, atol=0.03 if method == "plastic" else 2e-3)
     assert np.abs(part).max() > 2.5
     assert (session.poses.shape, session.system.fingers, len(session.gestures)) == ((1, 7), 1, 1)
     take = keep(session)
@@ -123,7 +120,7 @@ RAYS = make_images("RADIAL", 8, (1.1e-3, -0.7e-3))
 WAVE = np.column_stack([0.9 + 0.5 * np.sin(np.linspace(0, 9, 30)), np.linspace(-9, 9, 30)])
 
 
-def follow_to_the_end(session: Running, periods: int = 8) -> tuple[Running, float, Floats]:
+def follow_to_the_end(session, periods=8):
     """Return a session whose strokes are finished, its greatest force, N, and last heights.
 
     The heights are those when the fingertips have left, before the valves finish.
@@ -175,7 +172,7 @@ MEETING = {
 
 
 @cache
-def meet(name: str) -> tuple[Running, float, Floats]:
+def meet(name):
     """Return what the images of a row form, as `follow_to_the_end` does."""
     method, brush, path, images, _ = MEETING[name]
     return follow_to_the_end(queue(begin(method), path, images, brush))
@@ -233,7 +230,7 @@ def test_no_fingertip_lifts_again_for_another_one_that_is_down():
 def test_what_near_images_leave_does_not_depend_on_the_periods_of_a_tick(name):
     method, brush, path, images, _ = MEETING[name]
     *_, left = follow_to_the_end(queue(begin(method), path, images, brush), 1)
-    np.testing.assert_array_equal(left, meet(name)[2])
+    assert_array_equal(left, meet(name)[2])
 
 
 @pytest.mark.parametrize("drawn", [0, 12, 29])
@@ -247,7 +244,7 @@ def test_rays_leave_their_nominal_surface_whenever_the_hand_lets_go(drawn):
     session, force, _ = follow_to_the_end(session)
     assert force < 0.6
     nominal = find_nominal(laid, sculpting.find_device(session), np.full(COUNT**2, 40e-3))
-    np.testing.assert_allclose(heights(session), nominal.height, rtol=0, atol=2e-6)
+    assert_allclose(heights(session), nominal.height, rtol=0, atol=2e-6)
 
 
 def test_there_are_no_more_fingertips_than_a_bed_can_have_and_the_others_stay():
@@ -258,7 +255,7 @@ def test_there_are_no_more_fingertips_than_a_bed_can_have_and_the_others_stay():
         session = sculpting.follow_finger(session, session.poses, 8)
         most = max(most, session.system.fingers)
     assert (max(keep(meet("many")[0]).fingers), most) == (24, 32)
-    np.testing.assert_array_equal(session.poses[1:], stood[1:])
+    assert_array_equal(session.poses[1:], stood[1:])
     angle = np.arange(24) * math.pi / 12
     assert (
         heights(session)[session.system.grid.at(24e-3 * np.cos(angle), 24e-3 * np.sin(angle))].max() < 37e-3
@@ -273,7 +270,7 @@ def test_what_the_valves_do_alone_takes_no_further_fingertips(brush):
         assert session.system.fingers == 1
 
 
-def middle() -> Running:
+def middle():
     """Return a session in the middle of a radial stroke, with four fingertips in the pins."""
     session = go_on(queue(begin(), APART, make_images("RADIAL", 4)), 70)
     assert session.system.fingers == 4
@@ -284,7 +281,7 @@ def middle() -> Running:
 def test_a_stroke_that_is_taken_back_in_its_middle_leaves_nothing_and_another_symmetry_goes_on():
     session = sculpting.rewind(middle())
     assert (session.poses.shape, session.system.fingers, session.strokes) == ((1, 7), 1, ())
-    np.testing.assert_array_equal(heights(session), 40e-3)
+    assert_array_equal(heights(session), 40e-3)
     session = finish(queue(session, APART, make_images("X")))
     session = go_on(finish(queue(session, APART[::-1], make_images("RADIAL", 3), Brush.RAISE)), 3)
     take = keep(session)
@@ -318,16 +315,16 @@ def test_settings_and_fingertips_change_in_the_middle_of_a_stroke(change):
     session = go_on(session, 1)
     # The pulps of the images' fingertips relax on: ones that begin anew would press 2.6 times as hard.
     pressing = session.state.finger_forces()[sculpting.list_pressing(session)]
-    np.testing.assert_allclose(pressing, force, rtol=0.1)
+    assert_allclose(pressing, force, rtol=0.1)
     done = finish(session)
     table = 1e3 * heights(done).reshape(COUNT, COUNT)
-    np.testing.assert_allclose(table, np.rot90(table), rtol=0, atol=2e-3)
+    assert_allclose(table, np.rot90(table), rtol=0, atol=2e-3)
     assert done.system.fingers == len(numbers)
     back = done
     while back.gestures:  # a change is where another one begins
         back = sculpting.rewind(back)
         assert back.system.fingers == len(numbers)
-    np.testing.assert_allclose(heights(back), 40e-3, rtol=0, atol=1e-9)
+    assert_allclose(heights(back), 40e-3, rtol=0, atol=1e-9)
 
 
 def test_a_session_begins_from_the_state_that_was_kept_in_the_middle_of_a_stroke():
@@ -336,7 +333,7 @@ def test_a_session_begins_from_the_state_that_was_kept_in_the_middle_of_a_stroke
         7, "Bed", session.scene, session.poses[:1], session.snapshot, 0, session.numbers, session.names
     )
     assert (lost, again.system.fingers) == ("", 1)
-    np.testing.assert_array_equal(heights(again), heights(session))
+    assert_array_equal(heights(again), heights(session))
     # Undo comes back to it as well.
     back = sculpting.restore(again, session.snapshot, session.poses, 1, session.names)
-    np.testing.assert_array_equal(heights(back), heights(session))
+    assert_array_equal(heights(back), heights(session))

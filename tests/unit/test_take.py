@@ -9,18 +9,16 @@ import pytest
 from digiclay.core.base.errors import OutputError, ParameterError
 from digiclay.core.control.orders import Orders, Verb, repeat_order
 from digiclay.core.engine.simulation import begin
-from digiclay.core.engine.state import State
-from digiclay.core.engine.system import System
 from digiclay.core.model.fingertip import LEVEL
 from digiclay.core.model.layout import Layout
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.scene_source import load
-from digiclay.core.scene.schema import Scene
 from digiclay.core.scene.toml_table import format_scene, resolve
 from digiclay.core.session import snapshot
 from digiclay.core.session.live_session import simulate_path
 from digiclay.core.session.take import Take, from_bytes, refine, replay, to_bytes, to_scene
 from digiclay.recorded.bake import simulate_frames
+from numpy.testing import assert_array_equal
 from numpy.typing import NDArray
 
 from tests.assemble import record, replayed, sample
@@ -30,11 +28,11 @@ Floats = NDArray[np.float64]
 COUNT = 160
 
 
-def scene() -> Scene:
+def scene():
     return replace(sample("slow_press"), layout=Layout(rows=12, columns=12))
 
 
-def gesture(count: int = COUNT) -> Floats:
+def gesture(count=COUNT):
     """Return the poses of a finger that presses 4 mm, drags 6 mm and turns, read every 6th period."""
     read = np.arange(0, count + 6, 6)
     part = read / count
@@ -49,7 +47,7 @@ def gesture(count: int = COUNT) -> Floats:
 
 
 @cache
-def taken(again: bool = False) -> tuple[System, Take, State]:
+def taken(again=False):
     """Live through the gesture, or through it again on what it formed; return system, take and last state."""
     system = assemble(scene())
     state = taken()[2] if again else begin(system)
@@ -58,7 +56,7 @@ def taken(again: bool = False) -> tuple[System, Take, State]:
     return system, Take(scene(), first, poses, snapshot.dump(system, last)), last
 
 
-def difference(take: Take, parts: int) -> float:
+def difference(take, parts):
     """Return how far a take's heights are from those at a finer physics step, at most, m."""
     both = zip(replay(take), replay(take, refine(take.scene, parts)), strict=True)
     return max(float(np.abs(one.row(0) - other.row(0)).max()) for one, other in both)
@@ -88,8 +86,8 @@ def test_bytes_bring_a_take_and_its_orders_back_and_damaged_ones_are_refused_in_
     assert "orders" not in np.load(io.BytesIO(plain))  # older versions read it
     back = from_bytes(data)
     assert back.orders is not None
-    np.testing.assert_array_equal(back.orders.rows, ORDERS.rows)
-    np.testing.assert_array_equal(back.orders.surfaces, (SURFACE,))
+    assert_array_equal(back.orders.rows, ORDERS.rows)
+    assert_array_equal(back.orders.surfaces, (SURFACE,))
     assert (replayed(back), replayed(from_bytes(plain))) == (True, False)
 
 
@@ -140,7 +138,7 @@ SCENE = resolve({"layout": {"rows": 11, "columns": 11}})
 SURFACE = np.where(np.arange(121) % 3 == 0, np.nan, 42e-3)
 
 
-def every_order() -> Orders:
+def every_order():
     smooth, average = (make_orders(12, -6e-3, 6e-3, 0.0, 10e-3, 0, verb).rows for verb in Verb if verb < 2)
     others = [repeat_order(4, verb, 3e-3, 0.0, 5e-3, 2.0) for verb in (Verb.LOCK, Verb.ERASE, Verb.INVERT)]
     free = repeat_order(1, Verb.UNLOCK, radius=1.0)
@@ -151,7 +149,7 @@ ORDERS = every_order()
 
 
 @cache
-def ordered_take() -> Take:
+def ordered_take():
     system = assemble(SCENE)
     state = heighten(system, make_spike_and_ridge(system.grid))
     start, poses = snapshot.dump(system, state), stay_away(len(ORDERS))
@@ -159,7 +157,7 @@ def ordered_take() -> Take:
     return Take(SCENE, start, poses, snapshot.dump(system, last), ORDERS)
 
 
-def change_file(take: Take, **parts: object) -> bytes:
+def change_file(take, **parts):
     """Return the bytes of a take with other arrays; None: left out."""
     written, arrays = io.BytesIO(), {**np.load(io.BytesIO(to_bytes(take))), **parts}
     np.savez(written, **{name: array for name, array in arrays.items() if array is not None})
@@ -176,7 +174,7 @@ def test_a_take_of_version_3_whose_orders_have_no_verb_is_replayed_bit_for_bit()
     assert not replayed(take)
 
 
-def rows_with(at: int, **columns: float) -> Floats:
+def rows_with(at, **columns):
     rows = ORDERS.rows.copy()
     for name, value in columns.items():
         rows[at, ("x", "y", "radius", "strength", "verb").index(name)] = value
@@ -219,4 +217,4 @@ def test_a_take_with_smooth_strokes_is_no_scene_file_and_a_bake_shows_what_was_s
     *_, last = replay(take)
     *_, frames = simulate_frames(take, 1.0 / take.duration)
     assert not isinstance(frames, float)
-    np.testing.assert_array_equal(frames.height[-1], last.row(0).astype(np.float32))
+    assert_array_equal(frames.height[-1], last.row(0).astype(np.float32))

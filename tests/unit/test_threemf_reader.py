@@ -4,7 +4,6 @@ import math
 import re
 import zipfile
 from itertools import pairwise
-from pathlib import Path
 
 import lib3mf
 import numpy as np
@@ -28,7 +27,7 @@ MESH = (
 )
 
 
-def packed(path: Path, resources: str, build: str, head: str = "", **parts: str) -> Path:
+def packed(path, resources, build, head="", **parts):
     """Write a 3MF of a model's resources and build, and of further parts."""
     model = f'{HEAD}{head}<model unit="millimeter" xmlns="{CORE}" xmlns:p="{PRODUCTION}">'
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
@@ -42,7 +41,7 @@ def packed(path: Path, resources: str, build: str, head: str = "", **parts: str)
     return path
 
 
-def placement(*rows: tuple[float, float, float]) -> lib3mf.Transform:
+def placement(*rows):
     made = lib3mf.Transform()
     for index, row in enumerate(rows):
         made.Fields[index][:] = row
@@ -104,7 +103,7 @@ def test_a_part_that_another_one_names_is_read_and_supports_and_what_is_not_buil
     assert len(read(packed(tmp_path / "some.3mf", resources, build)).faces) == 4
 
 
-def nested(levels: int, copies: int = 1) -> str:
+def nested(levels, copies=1):
     """Return objects each of which is some of the one before."""
     text = f'<object id="0">{MESH}</object>'
     for level in range(levels):

@@ -25,7 +25,7 @@ def test_a_finger_that_does_not_turn_is_that_of_the_same_poses_among_turned_ones
 def test_a_finger_presses_the_pins_below_it_and_over_the_rim_what_there_is():
     system = make_system(Layout(9, 9))
 
-    def pressed(x: float, y: float, depth: float) -> np.ndarray:
+    def pressed(x, y, depth):
         # Locked pins at 40 mm, the finger's lowest point `depth` mm below their tops.
         run = record(system, path((0, x, y, 45), (0.05, x, y, 45), (0.1, x, y, 40 - depth)), 20)
         return run.force[-1].reshape(9, 9)

@@ -1,9 +1,7 @@
 """From tracked fingers to fingertips: whose is which, clutch, filter, coupling."""
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -23,14 +21,14 @@ LEVEL = (1.0, 0.0, 0.0, 0.0)
 PLACE = (0.01, -0.02, 0.05)
 
 
-def felt(poses: Any, force: float = 0.0, stiffness: float = 0.0, top: float = 0.04) -> Felt:
+def felt(poses, force=0.0, stiffness=0.0, top=0.04):
     """Return what fingertips feel, all the same."""
     each = np.ones(len(poses))
     around = Around(stiffness * each, top * each, lambda there: np.full(len(there), top))
     return Felt(np.array(poses, float), force * each, force * each, 5e-4, top, lambda: around, 1.25e-3)
 
 
-def at(*places: tuple[float, float, float]) -> list[tuple[int, tuple[float, ...]]]:
+def at(*places):
     """Return fingers 1, 2, ... at places."""
     return [(1 + row, (*place, *LEVEL)) for row, place in enumerate(places)]
 
@@ -90,7 +88,7 @@ RENAMED = [
 @pytest.mark.parametrize("before, time, after, held", [r[1:] for r in RENAMED], ids=[r[0] for r in RENAMED])
 @pytest.mark.parametrize("turn", [0.0, 2.0])
 def test_a_finger_that_goes_on_under_another_identity_keeps_its_fingertip(before, time, after, held, turn):
-    def tell(fingers: Any) -> list[tuple[int, tuple[float, ...]]]:
+    def tell(fingers):
         way = 1e-3 * np.array([math.cos(turn), math.sin(turn)])
         place = ((one, x * way, 1e-3 * z) for one, (x, z) in ((one, (*at, 40)[:2]) for one, at in fingers))
         return [(one, (*xy.tolist(), z, *LEVEL)) for one, xy, z in place]
@@ -127,7 +125,7 @@ def test_a_clutch_takes_away_any_bias_of_height_and_slips_where_the_hand_is_rais
     assert heights == pytest.approx([0.05, 0.045, 0.035, 0.05, 0.04], abs=1e-12)
 
 
-def filtered(signal: Callable[[float], float], cutoff: float, seconds: float, step: float) -> np.ndarray:
+def filtered(signal, cutoff, seconds, step):
     """Return what the 1-euro filter makes of a height over time."""
     tracks, found = begin_tracks(np.zeros((1, 7))), []
     for time in np.arange(0.0, seconds, step):
@@ -165,7 +163,7 @@ def test_a_turn_and_its_negative_are_one_to_the_filter():
 def test_the_coupling_comes_to_its_balance_from_any_force(deep, far):
     exponent, unit, spring = 2000.0, 0.5, 100.0  # of the whole fingertip's force, N; N/m
 
-    def press(height: float) -> float:
+    def press(height):
         return unit * math.expm1(exponent * max(0.04 - height, 0.0))
 
     height, forces = 0.04 - deep, []

@@ -2,8 +2,6 @@
 
 import os
 import shutil
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -41,7 +39,7 @@ pytestmark = pytest.mark.usefixtures("here")
 
 
 @pytest.fixture(scope="module")
-def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def whole(tmp_path_factory):
     folder = tmp_path_factory.mktemp("tune")
     (folder / "my.toml").write_text(SCENE, encoding="utf-8")
     command = ["tune", str(folder / "my.toml"), *VARIED, *SMALL, "--generations", "4"]
@@ -49,11 +47,11 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "out"
 
 
-def values(path: Path) -> Any:
+def values(path):
     return np.array([[float(row["rfd (N)"]), float(row["lag_mean (m)"])] for row in rows(path)])
 
 
-def files(folder: Path) -> dict[str, Any]:
+def files(folder):
     texts = {name: (folder / name).read_bytes() for name in ("chosen.toml", "tuning.json")}
     return texts | {name: timeless(folder / name) for name in ("points.csv", "front.csv")}
 

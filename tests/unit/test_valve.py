@@ -1,7 +1,6 @@
 """Flow (equations 3 to 8): the valve's two branches, a conduit in series, and the reservoirs."""
 
 import math
-from typing import Any
 
 import numpy as np
 import pytest
@@ -23,7 +22,7 @@ MESH, DROPS = (grid.ravel() for grid in np.meshgrid([0.03, 0.2, 0.6, 1.0], np.ge
 ROUNDING = 1e-12
 
 
-def critical(valve: Valve, fluid: Fluid, opening: Any) -> Any:
+def critical(valve, fluid, opening):
     """Return ΔP_crit of equation 6, as corrected, from its exact constant 32e12/81."""
     top = 32e12 / 81.0 * fluid.density * fluid.viscosity**2 * valve.stroke**2
     return top / (math.pi**2 * opening**2 * valve.orifice_diameter**4)
@@ -60,7 +59,7 @@ def test_with_the_opening_as_gap_all_openings_turn_turbulent_at_one_drop():
     assert np.array_equal(law.flow(np.ones(3), drop), make_orifice(WIDE, THIN).flow(np.ones(3), drop))
 
 
-def series(gap: str = "stroke") -> OrificeAndConduit:
+def series(gap="stroke"):
     conduit = Conduit(length=10e-3, diameter=0.3e-3)
     return OrificeAndConduit(
         make_orifice(Valve(orifice_diameter=0.8e-3, gap=gap), THIN), conduit.resistance(THIN)
@@ -99,7 +98,7 @@ def test_the_resistance_is_that_of_a_parabolic_profile_and_behind_a_wide_valve_i
     fluid, conduit = Fluid(), Conduit()
     edge, gradient = conduit.diameter / 2.0, 1e5 / conduit.length
 
-    def ring(r: float) -> float:
+    def ring(r):
         return gradient * (edge**2 - r**2) / (4.0 * fluid.dynamic_viscosity) * 2.0 * math.pi * r
 
     # The integrand is a cubic: quadrature is exact but for rounding.
@@ -119,7 +118,7 @@ def test_the_drop_between_reservoir_and_load_moves_the_pin():
     cell = one_cell(valve_lag=None, relaxation=None).cell
     contact, lift = cell.touch.contact, 0.5e5 * np.pi * 1e-6  # P_s A_a = 0.157 N
 
-    def speed_under(force: float, opening: float) -> float:
+    def speed_under(force, opening):
         depth = np.log1p(force / contact.share * contact.exponent / contact.stiffness) / contact.exponent
         y, under = np.array([[50e-3]]), np.array([50e-3 - depth])
         return float(compute_rates(cell, y, under, np.array([opening]))[0, 0])

@@ -3,11 +3,9 @@
 import math
 from dataclasses import replace
 from functools import cache
-from typing import Any
 
 import numpy as np
 import pytest
-from digiclay.core.base.arrays import Floats
 from digiclay.core.base.errors import DigiclayError
 from digiclay.core.base.modes import Mode
 from digiclay.core.model.fingertip import LEVEL
@@ -16,9 +14,9 @@ from digiclay.core.session.take import replay
 from digiclay.recorded.pointer_strokes import PointerStroke, play_strokes
 from digiclay.recorded.takes import read_recording
 from digiclay.sessions import sculpting
-from digiclay.sessions.running import Running
 from digiclay.strokes.nominal import find_radius
 from digiclay.strokes.stamps import load_stamp
+from numpy.testing import assert_allclose, assert_array_equal
 
 from tests.assemble import replayed
 from tests.hand import heights
@@ -28,27 +26,27 @@ REST = 40e-3
 CLICK, LINE, DRAG = ((0.0, 0.0),), ((-18e-3, 0.0), (18e-3, 0.0)), ((0.0, 0.0), (15e-3, 0.0))
 
 
-def begin(**tables: Any) -> Running:
+def begin(**tables):
     scene = resolve({"layout": {"rows": 21, "columns": 21}, "control": {"method": "hybrid"}, **tables})
     return sculpting.begin_session(1, "Bed", scene, np.array([0.0, 0.0, 46e-3, *LEVEL]))[0]
 
 
-def stroke(brush: str, places: tuple[tuple[float, float], ...] = LINE, **keys: Any) -> PointerStroke:
+def stroke(brush, places=LINE, **keys):
     moves = tuple((0.1 * number, x, y) for number, (x, y) in enumerate(places))
     return PointerStroke(brush=brush, moves=moves, **keys)
 
 
-def play(session: Running, *strokes: PointerStroke) -> Running:
+def play(session, *strokes):
     *_, done = play_strokes(session, strokes)
     return done
 
 
-def relief(session: Running) -> Floats:
+def relief(session):
     """Return how high the pins stand above rest, (21, 21), mm."""
     return 1e3 * (heights(session) - REST).reshape(21, 21)
 
 
-def locked(session: Running) -> Floats:
+def locked(session):
     return (session.state.mode() == Mode.LOCKED).reshape(21, 21)
 
 
@@ -56,12 +54,12 @@ HOLE = stroke("lower", depth=6e-3)
 
 
 @cache
-def hollow(method: str = "hybrid", *drawn: PointerStroke) -> Running:
+def hollow(method="hybrid", *drawn):
     """Return a session with a hole, after other strokes."""
     return play(begin(control={"method": method}), HOLE, *drawn)
 
 
-def begin_hollow(*given: Any) -> Running:
+def begin_hollow(*given):
     """Return that session, to go on with."""
     session = hollow(*given)
     return replace(session, state=session.state.copy())
@@ -88,8 +86,8 @@ def test_each_is_one_gesture_that_is_taken_back_whole_and_replayed_bit_for_bit(d
     assert take is not None
     assert replayed(take)
     back = sculpting.rewind(done)
-    np.testing.assert_array_equal(heights(back), before)
-    np.testing.assert_array_equal(locked(back), kept)
+    assert_array_equal(heights(back), before)
+    assert_array_equal(locked(back), kept)
 
 
 @pytest.mark.parametrize("strength, left", [(1.0, 0.02), (0.05, 5.5)])
@@ -101,7 +99,7 @@ def test_one_stroke_erases_what_is_in_its_ring_and_a_weak_one_part_of_it(strengt
     assert np.abs(row).max() < left
     assert strength == 1.0 or np.abs(row).min() > 1.5
     far = np.abs(np.arange(21) - 10) * 3e-3 > find_radius(done.scene.fingers[0].fingertip, done.scene.layout)
-    np.testing.assert_allclose(relief(done)[far], before[far], rtol=0, atol=1e-9)
+    assert_allclose(relief(done)[far], before[far], rtol=0, atol=1e-9)
 
 
 OTHERS = [
@@ -118,8 +116,8 @@ def test_a_locked_pin_keeps_its_height_under_every_brush_and_no_finger_presses_i
     held = begin_hollow(method, stroke("lock", ((6e-3, 0.0), (9e-3, 0.0))))
     before, kept = heights(held), locked(held)
     done = play(sculpting.set_recording(held, True), stroke(brush, ((-3e-3, -1.8e-3), (15e-3, 9e-3)), **keys))
-    np.testing.assert_array_equal(heights(done)[kept.ravel()], before[kept.ravel()])
-    np.testing.assert_array_equal(locked(done), kept)
+    assert_array_equal(heights(done)[kept.ravel()], before[kept.ravel()])
+    assert_array_equal(locked(done), kept)
     assert np.abs(heights(done) - before).max() > 1e-3
     take = read_recording(done)
     assert take is not None
@@ -140,7 +138,7 @@ def test_locks_are_taken_off_by_ctrl_turned_over_and_cleared():
     assert (turned, again, none) == (441 - rest, rest, 0)
 
 
-def ramp(session: Running) -> Floats:
+def ramp(session):
     return 1e3 * session.system.grid.x.reshape(21, 21)
 
 
@@ -165,7 +163,7 @@ def test_a_stamp_has_the_drawn_size_turn_and_strength_up_or_down(tmp_path, keys,
     sign = -6.0 if keys.get("ctrl") else 9.0 * keys.get("strength", 1.0)
     wanted = sign * (ramp(done) + 15.0) / 30.0
     within = inside & inside.T
-    np.testing.assert_allclose(formed[within], wanted[within], rtol=0, atol=0.03 * abs(sign))
+    assert_allclose(formed[within], wanted[within], rtol=0, atol=0.03 * abs(sign))
     beside = (np.abs(ramp(done)) > 16.0) | (np.abs(ramp(done)).T > 16.0)
     assert np.abs(formed[beside]).max() < 1e-3
 
@@ -182,7 +180,7 @@ def test_images_of_a_stamp_are_mirrored_and_turned_about_the_placed_center(tmp_p
     images = {"x": [np.fliplr], "y": [np.flipud], "xy": [np.fliplr, np.flipud], "radial": [np.rot90]}
     images["x"] = [np.flipud] if axis else images["x"]
     for image in images[symmetry]:
-        np.testing.assert_allclose(formed, image(formed), rtol=0, atol=2e-3)
+        assert_allclose(formed, image(formed), rtol=0, atol=2e-3)
 
 
 def test_a_click_stamps_at_the_size_of_the_ring():

@@ -2,7 +2,6 @@
 
 from dataclasses import fields, replace
 from functools import cache
-from typing import Any
 
 import numpy as np
 import pytest
@@ -12,28 +11,21 @@ from digiclay.core.control.blister import Blister
 from digiclay.core.control.masters import VirtualMasterBatch, VirtualMasterColumns, gather
 from digiclay.core.control.side_by_side import join_controllers
 from digiclay.core.control.travel import Heading
-from digiclay.core.control.virtual_master import (
-    MANY,
-    Master,
-    Phase,
-    VirtualMaster,
-    VirtualMasterControl,
-    make_master_cell,
-)
+from digiclay.core.control.virtual_master import MANY, Master, Phase, VirtualMaster, make_master_cell
 from digiclay.core.model.conduit import Conduit
-from digiclay.core.model.control_interface import Commands, Measurement
+from digiclay.core.model.control_interface import Measurement
 from digiclay.core.model.layout import Layout, make_grid
 from digiclay.core.model.valve import Fluid, Valve
 
 from tests.assemble import make_basis, make_system, master, path, record, table
 
 
-def control() -> VirtualMasterControl:
+def control():
     """Return Method I."""
     return make_system(Layout(15, 15), control=VirtualMaster()).controller
 
 
-def touched(*presses: tuple[float, float, float], height: float = 40.0) -> Measurement:
+def touched(*presses, height=40.0):
     """Return a measurement of pressed cells: x, y in mm and force in N."""
     x, y, force = np.array(presses).reshape(-1, 3).T
     level, rest = np.full(x.size, height * 1e-3), np.full(x.size, Mode.REST, np.int8)
@@ -74,7 +66,7 @@ def test_the_reference_is_the_surface_at_first_touch_and_the_cells_reach_to_the_
 
 IDLE, SPRINGY, SHAPING = Master(), master(phase=Phase.SPRING), master()
 #: Memory before, noise floor, N, presses; phase and losses after.
-PHASES: dict[str, tuple[Master, float, list[tuple[float, float, float]], Phase, int]] = {
+PHASES = {
     "too small to be a fingertip": (IDLE, 0.0, [(0, 0, 0.9e-3)], Phase.IDLE, 0),
     "first touch: a spring": (IDLE, 0.0, [(0, 0, 0.1)], Phase.SPRING, 0),
     "a spring below the set point": (SPRINGY, 0.0, [(0, 0, 0.399)], Phase.SPRING, 0),
@@ -146,7 +138,7 @@ def test_a_fingertip_gets_its_direction_once_it_has_gone_far_enough(before, path
     assert memory.heading[2:] == toward
 
 
-def alone(memory: Master, count: int) -> Master:
+def alone(memory, count):
     """Return the master after some periods without a fingertip."""
     for _ in range(count):
         memory, _ = control().locate(memory, touched())
@@ -181,7 +173,7 @@ def test_a_fingertip_felt_in_time_also_without_a_loss_time_is_not_lost_and_later
 # Cell of the master
 
 #: Parts whose unloaded valves are laminar, and others that may be turbulent.
-CELLS: dict[str, dict[str, Any]] = {
+CELLS = {
     "valve and conduit": {},
     "no conduit": {"conduit": None},
     "a thin conduit": {"conduit": Conduit(diameter=0.3e-3)},
@@ -219,19 +211,19 @@ BED = make_grid(Layout(15, 15))
 BESIDE = {"x": 0.4e-3, "y": 0.2e-3}
 
 
-def bed(height: float = 40.0, mode: Mode = Mode.REST) -> Measurement:
+def bed(height=40.0, mode=Mode.REST):
     """Return a measurement of a whole bed that nobody touches."""
     level, modes = np.full(BED.count, height * 1e-3), np.full(BED.count, mode, np.int8)
     cells, free, own = np.arange(BED.count), np.zeros(BED.count), np.empty((0, BED.count))
     return Measurement(BED.compute_basis(cells), level, free, level.copy(), modes, own, cells)
 
 
-def at(x: float, y: float) -> int:
+def at(x, y):
     """Return the cell at a place in mm."""
     return int(np.hypot(BED.x - x * 1e-3, BED.y - y * 1e-3).argmin())
 
 
-def created(memory: Master, seen: Measurement, blister: Blister | None = None) -> tuple[Master, Commands]:
+def created(memory, seen, blister=None):
     """Return what Method I commands."""
     system = make_system(Layout(15, 15), control=VirtualMaster(), blister=blister)
     return system.controller.command(memory, seen)
@@ -323,7 +315,7 @@ def test_the_edge_height_is_the_mean_of_the_whole_ring_at_rest_and_of_that_ahead
 # Freezing
 
 
-def ridge(mode: Mode = Mode.BLISTER) -> Measurement:
+def ridge(mode=Mode.BLISTER):
     """Return a bed whose cells behind a finger that moves along x stand higher than the profile."""
     return bed()._replace(target=np.full(BED.count, 44e-3), mode=bed(mode=mode).mode)
 
@@ -400,7 +392,7 @@ PRESS_AND_LIFT = [(0, 46.0), (0.4, 35.5), (0.6, 35.5), (1.4, 43.0)]
 
 
 @cache
-def formed(x: float, y: float, profile: str = "cone") -> np.ndarray:
+def formed(x, y, profile="cone"):
     """Return the final heights (15, 15) after a press at (x, y), mm, and a slow lift."""
     system = make_system(Layout(15, 15), control=VirtualMaster(), blister=Blister(profile=profile))
     run = record(system, path(*((t, x, y, z) for t, z in PRESS_AND_LIFT)), 280)
@@ -444,7 +436,7 @@ def test_many_masters_decide_side_by_side_as_each_alone_bit_for_bit(laminar):
         )
         for _ in runs
     ]  # fmt: skip
-    both: list = [masters, masters]
+    both = [masters, masters]
     for _ in range(12):
         # Some are not felt, some not near; most go on where they are, or a little farther.
         total = draw.choice([0.0, 0.2, 0.5], count)

@@ -27,13 +27,13 @@ REQUEST = (
 UNANSWERED = (1011).to_bytes(2, "big")
 
 
-def make_link() -> DoorLink:
+def make_link():
     slot, file = make_slot(LAYOUT.size)
     file.unlink()
     return DoorLink(Bed("bed", 1, 1, 3e-3, 0.1, 5e-3, ()), slot, slot, TOKEN)
 
 
-async def connect(link: DoorLink, sent: bytes = b"") -> bytes:
+async def connect(link, sent=b""):
     """Send bytes, answer nothing; return what comes until the door closes and another client has pressed."""
     async with asyncio.timeout(TIMEOUT), open_websocket(link, "127.0.0.1", 0) as port:
         reader, writer = await asyncio.open_connection("127.0.0.1", port)
@@ -44,7 +44,7 @@ async def connect(link: DoorLink, sent: bytes = b"") -> bytes:
     return said
 
 
-async def press_elsewhere(link: DoorLink) -> None:
+async def press_elsewhere(link):
     while True:
         try:
             link.order(POSE, "another client")
@@ -78,7 +78,7 @@ def test_a_client_that_floods_or_answers_no_ping_is_closed_and_leaves_the_finger
 
 
 def test_the_fingertip_is_anothers_when_its_client_is_silent(monkeypatch):
-    async def take_turns() -> list[str]:
+    async def take_turns():
         link, moved = make_link(), []
         for client in ("one", "two", "one"):
             with suppress(FrequentError):
