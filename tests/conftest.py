@@ -2,6 +2,7 @@
 
 import gc
 import os
+import shlex
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
@@ -77,11 +78,12 @@ def here(request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.Mon
 
 
 @pytest.fixture
-def refused(capsys: pytest.CaptureFixture[str]) -> Callable[[list[str], str], None]:
+def refused(capsys: pytest.CaptureFixture[str]) -> Callable[[list[str] | str, str], None]:
     """Give a check that a command ends with exit code 2 and one line that has some words."""
     from digiclay.cli import main
 
-    def check(arguments: list[str], said: str) -> None:
+    def check(line: list[str] | str, said: str) -> None:
+        arguments = shlex.split(line) if isinstance(line, str) else line
         code, (out, err) = main(arguments), capsys.readouterr()
         assert (code, out, err.count("\n"), said in err) == (2, "", 1, True), err
 

@@ -1,12 +1,15 @@
 """Scene files for tests of the command line: a few pins, a tenth of a second or so."""
 
 import csv
+import json
 import os
+import shlex
 import signal
 from pathlib import Path
 from typing import Any
 
 import pytest
+from digiclay.cli import main
 
 #: A blister that fits a bed of a few pins; on larger ones the default does.
 SMALL_BLISTER = """
@@ -35,6 +38,16 @@ def folder_with(scene: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> Pa
     (folder / "my.toml").write_text(scene, encoding="utf-8")
     monkeypatch.chdir(folder)
     return folder
+
+
+def call(line: str) -> int:
+    """Give the program a command line, and return its exit code."""
+    return main(shlex.split(line))
+
+
+def read_json(path: Path) -> Any:
+    """Return what a JSON file holds."""
+    return json.loads(path.read_text(encoding="utf-8"))
 
 
 def timeless(path: Path) -> list[dict[str, str]]:

@@ -2,7 +2,6 @@
 
 import base64
 import itertools
-import json
 import os
 import re
 import shutil
@@ -41,6 +40,7 @@ from digiclay.core.shapes.fitting import fit_shape
 from digiclay.core.studies.job_table import Outputs, make_outputs, read_jobs, read_outputs
 
 from tests.other_process import PROGRAM, dead, finish, start
+from tests.scene_files import call, read_json
 from tests.timeouts import TIMEOUT, wait_until
 
 #: More settings than a batch may have.
@@ -198,7 +198,7 @@ def test_every_job_leaves_a_whole_folder_and_the_page_links_to_it(capsys, monkey
 
     monkeypatch.setattr(Folder, "write_index", keep)
     started = time.time()
-    assert main(["batch", "two.toml", "--jobs", "2"]) == 0
+    assert call("batch two.toml --jobs 2") == 0
     took = time.time() - started
     assert runs() == ["tap-quick", "tap-slow"]
     files = {path.name for path in Path("two/runs/tap-slow").iterdir()}
@@ -208,7 +208,7 @@ def test_every_job_leaves_a_whole_folder_and_the_page_links_to_it(capsys, monkey
     assert err == ""
     assert "2 of 2 jobs done; 2 of them now, in" in out
     # A process that imports numpy needs a tenth of a second at the very least, on any machine.
-    timing = json.loads(Path("two/runs/tap-slow/timing.json").read_text(encoding="utf-8"))
+    timing = read_json(Path("two/runs/tap-slow/timing.json"))
     assert 0.1 < timing["start_up"] < took
     assert "s to start" in out
     # It is written when the first job has ended, and in the end.
@@ -232,11 +232,11 @@ def test_finished_jobs_are_kept_also_from_elsewhere_and_changed_or_half_written_
     before = {name: Path("two/runs", name, "history.npz").stat().st_mtime_ns for name in runs()}
     write(TWO.replace("0.2", "0.3"))
     shutil.copytree("two/runs/tap-quick", f"two/runs/.tap-quick.{dead()}.part")
-    assert main(["batch", "two.toml", "--quiet"]) == 0
+    assert call("batch two.toml --quiet") == 0
     after = {name: Path("two/runs", name, "history.npz").stat().st_mtime_ns for name in runs()}
     assert (after["tap-quick"] == before["tap-quick"], after["tap-slow"] > before["tap-slow"]) == (True, True)
     assert list(after) == ["tap-quick", "tap-slow"]
-    metrics = json.loads(Path("two/runs/tap-slow/metrics.json").read_text(encoding="utf-8"))
+    metrics = read_json(Path("two/runs/tap-slow/metrics.json"))
     assert metrics["simulated"] == pytest.approx(0.3, abs=1e-9)
 
 
@@ -244,7 +244,7 @@ def test_a_failing_job_is_told_of_and_the_rest_goes_on(capsys):
     # One fails when its scene is read, one when it is run: its history fits into no memory.
     one, _, _ = TWO.partition("slow")
     write(one + 'narrow.layout.pitch = "1 mm"\nendless.simulation.duration = 1e6\n')
-    assert main(["batch", "two.toml"]) == 1
+    assert call("batch two.toml") == 1
     assert runs() == ["tap-quick"]
     out, err = capsys.readouterr()
     assert "failed: tap-narrow: settings.narrow: layout.pitch must be at least" in out
@@ -351,7 +351,7 @@ def prepare(said: str = ENDLESS) -> None:
     """Write the files of the jobs, none of which is done."""
     write(said)
     with redirect_stderr(StringIO()):
-        assert main(["batch", "two.toml", "--prepare", "--quiet"]) == int("narrow" in said)
+        assert call("batch two.toml --prepare --quiet") == int("narrow" in said)
 
 
 def written(run: Path = RUN) -> int:
@@ -448,22 +448,22 @@ def test_a_frame_that_is_cut_off_is_missing(tmp_path):
 
 def test_jobs_that_are_started_alone_write_the_page_of_their_series(capsys):
     write(ENDLESS)
-    assert main(["batch", "two.toml", "--prepare"]) == 1
+    assert call("batch two.toml --prepare") == 1
     said = "".join(capsys.readouterr())
     assert re.match("2 jobs written to .*\n1 of 3 jobs failed; the first one: tap-narrow: ", said)
-    assert main(["job", "two/jobs/tap-endless", "--quiet"]) == 2
+    assert call("job two/jobs/tap-endless --quiet") == 2
     said = capsys.readouterr().err.strip()
     assert "0 of 3 jobs done, 2 failed." in index()
     assert AGAIN in index()
     # Another job has just written the page; the last task of a farm writes it in any case.
-    assert main(["job", "two/jobs/tap-quick", "--quiet"]) == 0
+    assert call("job two/jobs/tap-quick --quiet") == 0
     assert "0 of 3 jobs done" in index()
     os.utime("two/index.html", (0, 0))
-    assert main(["job", "two/jobs/tap-quick", "--quiet"]) == 0
+    assert call("job two/jobs/tap-quick --quiet") == 0
     assert "1 of 3 jobs done, 2 failed." in index()
     Path("two.toml").unlink()
     Path("two/index.html").unlink()
-    assert main(["page", "two"]) == 0
+    assert call("page two") == 0
     assert capsys.readouterr().out == "1 of 3 jobs done, 2 failed; written to two/index.html\n"
     assert index().count('class="failed"') == 2
     assert said in index()
@@ -475,12 +475,12 @@ def test_jobs_that_are_started_alone_write_the_page_of_their_series(capsys):
 def test_a_job_that_another_process_does_has_not_failed_and_one_described_anew_forgets_it():
     prepare()
     with lock_name(Path("two/runs/tap-quick")):
-        assert main(["job", "two/jobs/tap-quick", "--quiet"]) == 2
-    assert main(["page", "two", "--quiet"]) == 0
+        assert call("job two/jobs/tap-quick --quiet") == 2
+    assert call("page two --quiet") == 0
     assert "0 of 3 jobs done, 1 failed." in index()
-    assert main(["job", "two/jobs/tap-endless", "--quiet"]) == 2
+    assert call("job two/jobs/tap-endless --quiet") == 2
     prepare(ENDLESS.replace("1e6", "0.1"))
-    assert main(["page", "two", "--quiet"]) == 0
+    assert call("page two --quiet") == 0
     assert "0 of 3 jobs done, 1 failed." in index()
     assert index().count("not done yet") == 2
 
@@ -488,11 +488,11 @@ def test_a_job_that_another_process_does_has_not_failed_and_one_described_anew_f
 def test_what_is_no_series_has_no_page_and_one_of_an_older_version_the_jobs_in_it(capsys):
     prepare()
     shutil.copytree("two/jobs/tap-quick", "alone/jobs/tap-quick")
-    assert main(["job", "alone/jobs/tap-quick", "--quiet"]) == 0
+    assert call("job alone/jobs/tap-quick --quiet") == 0
     assert sorted(path.name for path in Path("alone").iterdir()) == ["jobs", "runs"]
-    assert main(["page", "alone"]) == 2
+    assert call("page alone") == 2
     rule = "alone is no folder of a job series: it has no batch.json of 'digiclay batch'.\n"
     assert capsys.readouterr().err == rule
     Path("two/batch.json").write_text('{"batch": "two", "digiclay": "0.1.0"}', encoding="utf-8")
-    assert main(["page", "two"]) == 0
+    assert call("page two") == 0
     assert capsys.readouterr().out.startswith("0 of 2 jobs done; ")

@@ -1,6 +1,5 @@
 """The command line: what options reach; exit codes, one line a mistake, no folder left behind; signals."""
 
-import json
 import os
 import re
 import signal
@@ -21,111 +20,105 @@ from digiclay.core.model.layout import Layout
 
 from tests.assemble import AWAY, one_cell, record, scripted
 from tests.other_process import PROGRAM, finish, start
-from tests.scene_files import left
+from tests.scene_files import call, left, read_json
 
 pytestmark = pytest.mark.usefixtures("here")
 
 
 def test_a_run_is_written_to_a_folder_called_like_the_scene_and_says_so(here, capfd):
-    assert main(["run", "my.toml"]) == 0
+    assert call("run my.toml") == 0
     out, err = capfd.readouterr()
     summary, where = out.splitlines()
     assert summary.startswith("0.1 s simulated in ")
     # No progress is shown where there is no terminal.
     assert (where, err) == ("written to my", "")
     assert {path.name for path in (here / "my").iterdir()} == {"history.npz", "metrics.json", "scene.toml"}
-    versions = json.loads((here / "my" / "metrics.json").read_text())["versions"]
+    versions = read_json(here / "my" / "metrics.json")["versions"]
     assert versions["digiclay"] == __version__
-    assert main(["run", "my.toml", "--quiet", "--out", "first"]) == 0
+    assert call("run my.toml --quiet --out first") == 0
     assert capfd.readouterr() == ("", "")
 
 
 def test_settings_and_stepper_reach_the_run_which_can_be_run_again_from_its_folder(here):
-    main(["run", "my.toml", "--quiet", "--set", "layout.rows=2", "--stepper", "runge_kutta_4"])
-    assert json.loads((here / "my" / "metrics.json").read_text())["stepper"] == "runge_kutta_4"
-    main(["run", "my", "--quiet", "--out", "second"])
+    call("run my.toml --quiet --set layout.rows=2 --stepper runge_kutta_4")
+    assert read_json(here / "my" / "metrics.json")["stepper"] == "runge_kutta_4"
+    call("run my --quiet --out second")
     with np.load(here / "my" / "history.npz") as one, np.load(here / "second" / "history.npz") as other:
         assert one["height"].shape == (21, 8)
         assert [name for name in one.files if not np.array_equal(one[name], other[name])] == []
 
 
-MISTAKES: dict[str, tuple[list[str], str]] = {
-    "value": (["run", "my.toml", "--set", "fluid.density=0"], "--set: fluid.density must be above 0 kg/m3"),
-    "key": (["run", "my.toml", "--set", "fluid.densty=1"], "Did you mean fluid.density?"),
-    "setting": (["run", "my.toml", "--set", "nothing"], "must be KEY=VALUE (got 'nothing')"),
-    "stepper": (["run", "my.toml", "--stepper", "leapfrog"], "--stepper: simulation.stepper must be one of"),
-    "method": (["run", "my.toml", "--method", "hand"], "--method: control.method must be one of"),
-    "memory": (["run", "my.toml", "--set", "simulation.duration=1e6"], "free memory"),
-    "file": (["run", "other.toml"], "other.toml: there is no such file."),
-    "shape of a folder": (["form", "d.png"], "d.png is a folder, not a file."),
-    "series of a folder": (["batch", "d.png"], "d.png is a folder, not a file."),
-    "name": (["run", "ridge_mound_vally"], "Did you mean ridge_mound_valley?"),
-    "format": (["run", "my.toml", "--export", "stp"], "known are stl, stl_ascii, obj, ply, glb, 3mf"),
-    "surface": (["run", "my.toml", "--set", "layout.rows=1", "--export", "stl"], "at least 2 x 2 cells"),
-    "no record": (["run", "my.toml", "--set", "recorder=absent", "--plots"], "--plots needs a recorder"),
-    "folder": (["run", "my.toml", "--out", "my.toml"], "my.toml is a file"),
-    "full folder": (["run", "my.toml", "--out", "d.png"], "d.png is not empty"),
-    "older form": (["form", "dome", "--out", "d.png", "--quiet"], "replace the run in it with --overwrite."),
-    "no command": ([], "the following arguments are required: COMMAND"),
-    "command": (["walk"], "invalid choice: 'walk'"),
-    "no scene": (["run"], "the following arguments are required: SCENE"),
-    "description": (["describe", "my.toml", "--set", "layout.rows=0"], "layout.rows must be at least 1"),
-    "export of nothing": (["export", "nowhere"], "nowhere is no run's folder"),
-    "plot of nothing": (["plot", "nowhere"], "nowhere is no run's folder"),
-    "render of nothing": (["render", "my.toml", "--size", "3"], "must be WIDTHxHEIGHT"),
-    "picture": (["render", "my", "--out", "my.jpg"], "--out must end with .png (got my.jpg)."),
-    "film": (["render", "my", "--film", "--out", "my.avi"], "--out must end with .mp4 (got my.avi)."),
-    "picture folder": (["render", "my", "--out", "d.png"], "--out must be a file (d.png is a folder)."),
-    "no folder": (["render", "my", "--out", "my.toml/a.png"], "my.toml cannot be a folder: my.toml is"),
-    "width": (["render", "my", "--size", "1x1"], "--size must be at least 16 (got 1)."),
-    "budget": (["run", "my.toml", "--budget", "0"], "--budget must be above 0 m (got 0 m)."),
-    "option": (["run", "my.toml", "--fast"], "digiclay run: unrecognized arguments: --fast. See '"),
-    "form of a misspelt shape": (["form", "craters"], "Did you mean crater?"),
-    "form of nothing": (["form", "nowhere.stl"], "nowhere.stl: there is no such file."),
-    "form beside the bed": (
-        ["form", "dome", "--set", "shape.fit=actual", "--set", "shape.x=1"], "leave the shape over the bed",
-    ),
-    "form without recorder": (["form", "dome", "--set", "recorder=absent"], "form needs a recorder"),
-    "form without shape": (["form", "dome", "--set", "shape=absent"], "form needs a shape"),
-    "form without finger": (
-        ["form", "dome", "--set", "fingertip=absent", "--quiet"], "fingertip must be given to form a shape",
-    ),
-    "form of a row": (["form", "dome", "--set", "layout.rows=1"], "form needs at least 2 x 2 cells"),
-    "methods": (["compare", "my.toml", "--methods", "cell_stats"], "did you mean cell_states"),
-    "no methods": (["compare", "my.toml", "--methods", ","], "must name at least one method"),
-    "method compared": (["compare", "my.toml", "--method", "cell_stats"], "Did you mean cell_states"),
-    "comparison": (["compare", "my.toml", "--out", "my.toml"], "my.toml is a file"),
-    "key of one method": (
-        ["compare", "my.toml", "--set", "control.spring_trigger=1"], "spring_trigger must be a known key",
-    ),
-    "job": (["job", "."], ". is no job's folder: it has no job.toml."),
-    "benchmark": (["benchmark", "session", "--help"], "run from a checkout: 'python -m benchmarks --help'"),
-}  # fmt: skip
+MISTAKES = {
+    "run my.toml --set fluid.density=0": "--set: fluid.density must be above 0 kg/m3",
+    "run my.toml --set fluid.densty=1": "Did you mean fluid.density?",
+    "run my.toml --set nothing": "must be KEY=VALUE (got 'nothing')",
+    "run my.toml --stepper leapfrog": "--stepper: simulation.stepper must be one of",
+    "run my.toml --method hand": "--method: control.method must be one of",
+    "run my.toml --set simulation.duration=1e6": "free memory",
+    "run other.toml": "other.toml: there is no such file.",
+    "form d.png": "d.png is a folder, not a file.",
+    "batch d.png": "d.png is a folder, not a file.",
+    "run ridge_mound_vally": "Did you mean ridge_mound_valley?",
+    "run my.toml --export stp": "known are stl, stl_ascii, obj, ply, glb, 3mf",
+    "run my.toml --set layout.rows=1 --export stl": "at least 2 x 2 cells",
+    "run my.toml --set recorder=absent --plots": "--plots needs a recorder",
+    "run my.toml --out my.toml": "my.toml is a file",
+    "run my.toml --out d.png": "d.png is not empty",
+    "form dome --out d.png --quiet": "replace the run in it with --overwrite.",
+    "": "the following arguments are required: COMMAND",
+    "walk": "invalid choice: 'walk'",
+    "run": "the following arguments are required: SCENE",
+    "describe my.toml --set layout.rows=0": "layout.rows must be at least 1",
+    "export nowhere": "nowhere is no run's folder",
+    "plot nowhere": "nowhere is no run's folder",
+    "render my.toml --size 3": "must be WIDTHxHEIGHT",
+    "render my --out my.jpg": "--out must end with .png (got my.jpg).",
+    "render my --film --out my.avi": "--out must end with .mp4 (got my.avi).",
+    "render my --out d.png": "--out must be a file (d.png is a folder).",
+    "render my --out my.toml/a.png": "my.toml cannot be a folder: my.toml is",
+    "render my --size 1x1": "--size must be at least 16 (got 1).",
+    "run my.toml --budget 0": "--budget must be above 0 m (got 0 m).",
+    "run my.toml --fast": "digiclay run: unrecognized arguments: --fast. See '",
+    "form craters": "Did you mean crater?",
+    "form nowhere.stl": "nowhere.stl: there is no such file.",
+    "form dome --set shape.fit=actual --set shape.x=1": "leave the shape over the bed",
+    "form dome --set recorder=absent": "form needs a recorder",
+    "form dome --set shape=absent": "form needs a shape",
+    "form dome --set fingertip=absent --quiet": "fingertip must be given to form a shape",
+    "form dome --set layout.rows=1": "form needs at least 2 x 2 cells",
+    "compare my.toml --methods cell_stats": "did you mean cell_states",
+    "compare my.toml --methods ,": "must name at least one method",
+    "compare my.toml --method cell_stats": "Did you mean cell_states",
+    "compare my.toml --out my.toml": "my.toml is a file",
+    "compare my.toml --set control.spring_trigger=1": "spring_trigger must be a known key",
+    "job .": ". is no job's folder: it has no job.toml.",
+    "benchmark session --help": "run from a checkout: 'python -m benchmarks --help'",
+}
 
 
-@pytest.mark.parametrize(("arguments", "said"), MISTAKES.values(), ids=MISTAKES.keys())
-def test_a_mistake_is_one_line_exit_code_2_and_no_folder(arguments, said, here, refused):
+@pytest.mark.parametrize(("line", "said"), MISTAKES.items())
+def test_a_mistake_is_one_line_exit_code_2_and_no_folder(line, said, here, refused):
     (here / "d.png").mkdir()
     (here / "d.png" / "metrics.json").touch()
-    refused(arguments, said)
+    refused(line, said)
     assert left(here) == ["d.png"]
 
 
 def test_a_run_can_have_meshes_and_plots_and_is_replaced_only_when_asked(here):
-    main(["run", "my.toml", "--quiet", "--export", "stl,obj", "--plots"])
+    call("run my.toml --quiet --export stl,obj --plots")
     added = {path.name for path in (here / "my").iterdir()}
     assert {"surface.stl", "surface.obj", "session.png", "surface.png"} <= added
     before = (here / "my" / "metrics.json").read_bytes()
-    assert (main(["run", "my.toml", "--quiet"]), (here / "my" / "metrics.json").read_bytes()) == (2, before)
-    main(["run", "my.toml", "--quiet", "--overwrite"])
+    assert (call("run my.toml --quiet"), (here / "my" / "metrics.json").read_bytes()) == (2, before)
+    call("run my.toml --quiet --overwrite")
     assert [*left(here), (here / "my" / "session.png").exists()] == ["my", False]
 
 
 def test_export_writes_the_surface_of_a_run_in_a_unit_at_an_instant_and_refuses_what_is_damaged(
     here, capsys, refused
 ):
-    main(["run", "my.toml", "--quiet"])
-    main(["export", "my", "--format", "ply,glb"])
+    call("run my.toml --quiet")
+    call("export my --format ply,glb")
     made = [os.path.join("my", f"surface.{kind}") for kind in ("ply", "glb")]
     assert capsys.readouterr().out.split() == made
     options = "--format obj --unit m --time 0 --up z --out meshes --quiet"
@@ -141,13 +134,13 @@ def test_export_writes_the_surface_of_a_run_in_a_unit_at_an_instant_and_refuses_
             refused([command, "my", f"--resolution={count}"], " 64")
     scene, history = here / "my" / "scene.toml", here / "my" / "history.npz"
     scene.write_text(scene.read_text(encoding="utf-8").replace("rows = 3", "rows = 4"), encoding="utf-8")
-    refused(["export", "my"], "height must have the shape (21, 16) of its scene (got (21, 12))")
+    refused("export my", "height must have the shape (21, 16) of its scene (got (21, 12))")
     history.write_bytes(history.read_bytes()[:1000])
-    refused(["export", "my"], "cannot be read as a run's history")
+    refused("export my", "cannot be read as a run's history")
 
 
 def test_describe_counts_cells_periods_and_bytes_and_lists_every_parameter_with_its_meaning(capsys):
-    main(["describe", "my.toml", "--set", "conduit=absent"])
+    call("describe my.toml --set conduit=absent")
     out = capsys.readouterr().out
     lines = [line.split() for line in out.splitlines()]
     assert [line[0] for line in lines if line[1:] == ["left", "out"]] == ["conduit", "sensors"]
@@ -217,7 +210,7 @@ def test_a_file_that_fails_half_way_is_one_line(monkeypatch, capfd):
         raise OSError(28, "No space left on device", "a file")
 
     monkeypatch.setattr(describe, "description", full)
-    assert main(["describe", "my.toml"]) == 2
+    assert call("describe my.toml") == 2
     assert capfd.readouterr().err == "a file cannot be used: No space left on device.\n"
 
 
@@ -227,7 +220,7 @@ def test_the_list_of_commands_has_a_line_for_each_but_for_plumbing(monkeypatch, 
     listed = capsys.readouterr().out.partition("COMMAND\n")[2].partition("\n\n")[0].splitlines()
     assert [line for line in listed if len(line.split()) < 3 or not line.startswith("    ")] == []
     assert {line.split()[0] for line in listed} & {"job", "page", "benchmark"} == set()
-    main(["job", "--help"])
+    call("job --help")
     said = capsys.readouterr().out.split("\n\n")[1]
     assert (said[0].isupper(), said[-1]) == (True, ".")
 
@@ -260,7 +253,7 @@ def test_a_signal_while_the_program_starts_stops_it_in_one_line(here):
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no signals to send")
 def test_what_is_written_before_a_signal_is_not_denied(here, monkeypatch, capfd):
-    main(["run", "my.toml", "--quiet", "--no-errors"])
+    call("run my.toml --quiet --no-errors")
     write = export.write
 
     def interrupted(*given: Any) -> Path:
@@ -269,7 +262,7 @@ def test_what_is_written_before_a_signal_is_not_denied(here, monkeypatch, capfd)
         return write(*given)
 
     monkeypatch.setattr(export, "write", interrupted)
-    code = main(["export", "my", "--format", "obj,ply"])
+    code = call("export my --format obj,ply")
     assert (code, capfd.readouterr()) == (
         130, (f"{Path('my', 'surface.obj')} (y up)\n", "Stopped; no file is half-written.\n"),
     )  # fmt: skip
@@ -305,7 +298,7 @@ def test_a_run_is_kept_whatever_goes_wrong_with_what_is_made_of_it(here, monkeyp
 
     monkeypatch.setattr(render, "plotted", draw)
     with pytest.raises(ValueError, match="a fault of a library"):
-        main(["run", "my.toml", "--plots", "--no-errors", "--quiet"])
+        call("run my.toml --plots --no-errors --quiet")
     assert {path.name for path in (here / "my").iterdir()} == {"history.npz", "metrics.json", "scene.toml"}
 
 
@@ -340,7 +333,7 @@ def test_a_missing_library_is_told_before_any_work(line, missing, install, here,
 
 def test_a_job_of_a_batch_exports_without_any_library(here):
     (here / "jobs.toml").write_text('scenes = ["my.toml"]\nexport = ["stl", "3mf"]\nerrors = false\n')
-    assert main(["batch", "jobs.toml", "--prepare", "--quiet"]) == 0
+    assert call("batch jobs.toml --prepare --quiet") == 0
     missing = "import sys; sys.modules.update(dict.fromkeys(['trimesh', 'scipy', 'matplotlib']))\n"
     code, _, err = finish(start(missing + PROGRAM, "job", "jobs/jobs/my"))
     assert code == 0, err

@@ -35,7 +35,7 @@ from digiclay.core.shapes.request import Shape
 from digiclay.plots.sweep import PANELS, comparison
 
 from tests.other_process import finish, start
-from tests.scene_files import SMALL_BLISTER, left, scene_text
+from tests.scene_files import SMALL_BLISTER, call, left, read_json, scene_text
 
 pytestmark = pytest.mark.usefixtures("here")
 
@@ -61,7 +61,7 @@ def test_both_methods_are_printed_side_by_side_and_kept_with_a_picture_of_the_sa
     folder = here / "my_compare"
     files = ["compare.png", "comparison.json", "metrics.json", "points"]
     assert sorted(path.name for path in folder.iterdir()) == files
-    known = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))["methods"]
+    known = read_json(folder / "metrics.json")["methods"]
     assert list(known) == BOTH[::-1]
     assert known["cell_states"].keys() == expected
     assert known["cell_states"]["duration"] == known["virtual_master"]["duration"] == 0.5
@@ -74,7 +74,7 @@ def test_both_methods_are_printed_side_by_side_and_kept_with_a_picture_of_the_sa
 
 def read_times(folder: Path) -> dict[str, float]:
     """Return how long each method took, which no other run takes to the last digit."""
-    known = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))["methods"]
+    known = read_json(folder / "metrics.json")["methods"]
     return {name: metrics["run_time"] for name, metrics in known.items()}
 
 
@@ -88,7 +88,7 @@ def test_a_comparison_goes_on_after_a_stop_and_gives_way_to_another_one_only_wit
         assert main(command) == 130
     assert capsys.readouterr().out.startswith("Stopped: 1 of 2 methods are done and kept in first run. ")
     (point,) = (here / OUT / "points").iterdir()
-    first = json.loads(point.read_text(encoding="utf-8"))["figures"]["run_time"]
+    first = read_json(point)["figures"]["run_time"]
     assert main(command) == 0
     times = read_times(here / OUT)
     assert (list(times), times[BOTH[0]]) == (BOTH, first)
@@ -173,7 +173,7 @@ def test_what_is_stopped_before_its_extras_names_them_and_how_to_make_them(comma
     commands = stopped(run_command, "save", *command)
     assert list(commands) == made
     assert list_files(here / OUT) == {"scene.toml", "history.npz", "metrics.json"}
-    assert not json.loads((here / OUT / "metrics.json").read_text(encoding="utf-8"))["incomplete"]
+    assert not read_json(here / OUT / "metrics.json")["incomplete"]
     for command in commands.values():
         assert main(command) == 0
     assert list_files(here / OUT) == list_files(here / "whole")
@@ -184,22 +184,22 @@ def test_what_is_stopped_before_its_extras_names_them_and_how_to_make_them(comma
 def test_plot_writes_into_a_folder_prints_its_files_and_says_what_it_cannot(here, capsys, refused):
     run = ["run", "my.toml", "--quiet", "--no-errors", "--out"]
     assert main([*run, "o"]) == 0
-    assert main(["plot", "o", "--out", "new/pictures"]) == 0
+    assert call("plot o --out new/pictures") == 0
     assert [Path(line).name for line in capsys.readouterr().out.split()] == ["session.png", "surface.png"]
     assert list_files(here / "new") == {"pictures/session.png", "pictures/surface.png"}
-    refused(["plot", "o", "--out", "my.toml/x"], "my.toml/x cannot be a folder: my.toml is a file.")
+    refused("plot o --out my.toml/x", "my.toml/x cannot be a folder: my.toml is a file.")
     main([*run, "row", "--set", "layout.rows=1"])
-    refused(["plot", "row"], "plot needs at least 2 x 2 cells")
+    refused("plot row", "plot needs at least 2 x 2 cells")
     main([*run, "none", "--set", "recorder=absent"])
-    refused(["plot", "none"], "none has no history.npz")
+    refused("plot none", "none has no history.npz")
 
 
 def test_a_run_stopped_before_its_errors_are_estimated_says_so(here, stopped):
     commands = stopped(Result, "estimate_errors", "run", "my.toml")
     assert list(commands) == ["its errors were estimated"]
-    assert "height_error" not in json.loads((here / OUT / "metrics.json").read_text(encoding="utf-8"))
+    assert "height_error" not in read_json(here / OUT / "metrics.json")
     assert main(commands["its errors were estimated"]) == 0
-    assert "height_error" in json.loads((here / OUT / "metrics.json").read_text(encoding="utf-8"))
+    assert "height_error" in read_json(here / OUT / "metrics.json")
     assert left(here) == [OUT]
 
 
@@ -208,7 +208,7 @@ def test_a_run_stopped_within_its_session_is_kept_and_can_be_exported_as_it_says
     arguments = ("run", "my.toml", "--quiet", "--export", "ply")
     commands = stopped(RunRecording, "observe", *arguments, number=number)
     assert list(commands) == ["surface.ply"]
-    assert json.loads((here / OUT / "metrics.json").read_text(encoding="utf-8"))["incomplete"]
+    assert read_json(here / OUT / "metrics.json")["incomplete"]
     assert main(commands["surface.ply"]) == 0
     assert (here / OUT / "surface.ply").is_file()
 
@@ -255,11 +255,11 @@ def listed(capsys: pytest.CaptureFixture[str], *options: str) -> list[dict]:
 
 
 def test_features_are_listed_in_a_table_and_none_at_the_start(run, capsys):
-    assert main(["features", "run"]) == 0
+    assert call("features run") == 0
     counted, head, _, row = capsys.readouterr().out.splitlines()
     assert counted == "0 bosses and 1 crease"
     assert (head.split()[:3], row.split()[0]) == (["feature", "form", "pins"], "crease_1")
-    assert main(["features", "run", "--time", "0"]) == 0
+    assert call("features run --time 0") == 0
     assert capsys.readouterr().out == "0 bosses and 0 creases\n"
 
 
@@ -314,24 +314,24 @@ def test_a_length_is_in_millimeters_or_has_a_unit_behind_it(said, run):
 
 
 @pytest.mark.parametrize(
-    ("arguments", "said"),
+    ("line", "said"),
     [
-        (["export", "run", "--separate"], "--separate needs --kind features."),
-        (["export", "run", "--base-thickness", "0"], "--base-thickness must be above 0 m (got 0 m)."),
-        (["export", "run", "--base-thickness", "thick"], "argument --base-thickness: must be a number"),
-        (["export", "run", "--kind", "features", "--time", "0"], "There is no feature of at least 3 pins"),
-        (["features", "run", "--threshold", "-1"], "--threshold must be at least 1e-06 m (got -0.001 m)."),
-        (["features", "run", "--threshold", "1 furlong"], "--threshold: must have a unit known here"),
-        (["features", "run", "--threshold", "1 N"], "argument --threshold: must be in m or a multiple of it"),
-        (["features", "run", "--smallest", "0"], "--smallest must be at least 1 (got 0)."),
-        (["features", "run", "--former", "99"], "--former must be between 0 s and"),
-        (["features", "run", "--former", "soon"], "--former must be a time or 'rest'"),
-        (["features", "nowhere"], "nowhere is no run's folder"),
+        ("export run --separate", "--separate needs --kind features."),
+        ("export run --base-thickness 0", "--base-thickness must be above 0 m (got 0 m)."),
+        ("export run --base-thickness thick", "argument --base-thickness: must be a number"),
+        ("export run --kind features --time 0", "There is no feature of at least 3 pins"),
+        ("features run --threshold -1", "--threshold must be at least 1e-06 m (got -0.001 m)."),
+        ("features run --threshold '1 furlong'", "--threshold: must have a unit known here"),
+        ("features run --threshold '1 N'", "argument --threshold: must be in m or a multiple of it"),
+        ("features run --smallest 0", "--smallest must be at least 1 (got 0)."),
+        ("features run --former 99", "--former must be between 0 s and"),
+        ("features run --former soon", "--former must be a time or 'rest'"),
+        ("features nowhere", "nowhere is no run's folder"),
     ],
 )
-def test_a_mistake_is_one_line_and_no_file(run, refused, arguments, said):
+def test_a_mistake_is_one_line_and_no_file(run, refused, line, said):
     before = left(run)
-    refused(arguments, said)
+    refused(line, said)
     assert left(run) == before
 
 
@@ -366,7 +366,7 @@ def test_a_mesh_goes_in_is_formed_and_comes_out(tmp_path, capsys):
     assert (out / "surface.glb").is_file()
     # The finger draws a peak of some mm out of the top: 6 mm above where it touched, less its own give.
     assert after.bounds[1, 2] - before.bounds[1, 2] > 4.0
-    judged = json.loads((out / "metrics.json").read_text(encoding="utf-8"))
+    judged = read_json(out / "metrics.json")
     assert judged["display_error"] <= 10.1e-6
     assert judged["raised_volume"] > 1e-7
     assert judged["shape_covered"] == 137
@@ -435,8 +435,9 @@ def test_a_scene_is_of_tables_of_a_file_a_name_or_nothing(tmp_path):
 
 
 def test_a_run_has_heights_metrics_and_a_summary():
-    program = "import sys, digiclay; print({'numpy', 'bpy', 'trimesh', 'digiclay.core'} & {*sys.modules})"
-    assert finish(start(program))[1] == "set()\n"  # importing it imports no part of the simulation
+    # Importing it imports no part of the simulation.
+    parts = "{'numpy', 'bpy', 'trimesh', 'digiclay.core.base'}"
+    assert finish(start(f"import sys, digiclay; print({parts} & {{*sys.modules}})"))[1] == "set()\n"
     periods: list[tuple[int, int]] = []
     done = digiclay.run(digiclay.scene(TABLES), lambda *counts: periods.append(counts))
     assert periods == [(count, 10) for count in range(1, 11)]

@@ -1,6 +1,5 @@
 """Points of a sweep that run together, in this process or on a Dask cluster, and the arrays they share."""
 
-import json
 import re
 import sys
 import time
@@ -36,7 +35,7 @@ from distributed import Client, LocalCluster
 
 from tests.other_process import finish as finish
 from tests.other_process import start
-from tests.scene_files import left, timeless
+from tests.scene_files import left, read_json, timeless
 from tests.timeouts import wait_until
 
 pytestmark = pytest.mark.usefixtures("here")
@@ -245,7 +244,7 @@ def test_a_sweep_says_how_its_points_were_run_and_one_done_again_comes_to_the_sa
     assert "4 points\n4 points run in 1 batch\n" in capsys.readouterr().out
     file, figures = here / "out" / "points" / "000003.json", []
     for _ in range(2):
-        kept = json.loads(file.read_text(encoding="utf-8"))["figures"]
+        kept = read_json(file)["figures"]
         figures.append({name: value for name, value in kept.items() if name not in TIMES})
         file.unlink()
         main([*sweep, "--out", "out", "--quiet"])

@@ -23,6 +23,8 @@ from openjd.model import (
     preprocess_job_parameters,
 )
 
+from tests.scene_files import read_json
+
 JOBS = """
 scenes = ["tap"]
 errors = false
@@ -80,7 +82,7 @@ def test_the_tasks_of_a_job_are_its_run_then_frames_then_films_and_the_page_is_l
 def test_an_openjd_template_has_these_tasks_in_an_order_that_respects_the_steps(before, here):
     jobs = JOBS.replace("a =", f"{before}a =").replace("b =", f"{before}b =")
     assert submit("openjd", jobs + FILMS, "--program", WINDOWS) == 0
-    template = decode_job_template(template=json.loads(Path("out/openjd.json").read_text(encoding="utf-8")))
+    template = decode_job_template(template=read_json(Path("out/openjd.json")))
     names = [step.name for step in template.steps]
     assert len(set(names)) == len(names) == 11
     if before:
@@ -179,7 +181,7 @@ def test_the_flamenco_script_has_the_settings_its_jobs_give_and_is_plain_javascr
     context.eval(SCRIPT.read_text(encoding="utf-8"))
     known = json.loads(context.eval("JSON.stringify(JOB_TYPE.settings)"))
     kinds = {one["key"]: (one["type"], one["required"]) for one in known}
-    given = json.loads(Path("out/flamenco/job.json").read_text(encoding="utf-8"))["settings"]
+    given = read_json(Path("out/flamenco/job.json"))["settings"]
     assert kinds == dict.fromkeys(given, ("string", True))
     assert {type(value) for value in given.values()} == {str}
     # goja knows ECMAScript 5.1 and a part of the later ones.

@@ -1,6 +1,7 @@
 """Bosses and creases: found, measured, traced and called by their form, on surfaces with known figures."""
 
 import itertools
+import re
 from collections.abc import Callable
 
 import numpy as np
@@ -158,9 +159,9 @@ def round_top(away: np.ndarray, half: float) -> np.ndarray:
     return np.clip(1.0 - (away / half) ** 2, 0.0, None)
 
 
-def line(*points: tuple[float, float]) -> Heights:
-    """How far it is to a line of straight pieces."""
-    ends = np.array([*itertools.pairwise(points)], float)[..., None]
+def along(points: np.ndarray) -> Heights:
+    """How far it is to a line of straight pieces through points, (n, 2)."""
+    ends = np.array([*itertools.pairwise(points)])[..., None]
 
     def away(x: np.ndarray, y: np.ndarray) -> np.ndarray:
         (ax, ay), (dx, dy) = ends[:, 0].swapaxes(0, 1), (ends[:, 1] - ends[:, 0]).swapaxes(0, 1)
@@ -171,21 +172,15 @@ def line(*points: tuple[float, float]) -> Heights:
     return away
 
 
-def arc(x: float, y: float, radius: float, start: float, end: float) -> Heights:
-    """How far it is to an arc; angles in half turns."""
+def line(points: str) -> Heights:
+    """How far it is to a line of straight pieces; its points in mm, as in SVG: "x,y x,y"."""
+    return along(np.array([point.split(",") for point in points.split()], float))
+
+
+def arc(y: float, start: float, end: float) -> Heights:
+    """How far it is to an arc of 14 mm radius about a point of the y axis; angles in half turns."""
     turn = np.pi * np.linspace(start, end, 40)
-    points = np.column_stack([x + radius * np.cos(turn), y + radius * np.sin(turn)])
-    return line(*map(tuple, points))
-
-
-def ridges(height: float, half: float, *lines: Heights) -> Heights:
-    """Round ridges along lines."""
-    return lambda x, y: height * round_top(np.min([one(x, y) for one in lines], axis=0), half)
-
-
-def disc(x: np.ndarray, y: np.ndarray, at: float, half: float) -> np.ndarray:
-    """A round mound 1 high about a point of the x axis."""
-    return round_top(np.hypot(x - at, y), half)
+    return along(np.column_stack([14 * np.cos(turn), y + 14 * np.sin(turn)]))
 
 
 def circle(at: float, radius: float) -> Heights:
@@ -193,88 +188,69 @@ def circle(at: float, radius: float) -> Heights:
     return lambda x, y: np.abs(np.hypot(x - at, y) - radius)
 
 
+def ridges(height: float, half: float, *lines: str | Heights) -> Heights:
+    """Round ridges along lines."""
+    distances = [line(one) if isinstance(one, str) else one for one in lines]
+    return lambda x, y: height * round_top(np.min([away(x, y) for away in distances], axis=0), half)
+
+
+def mound(height: float, at: float, half: float) -> Heights:
+    """A round mound about a point of the x axis."""
+    return lambda x, y: height * round_top(np.hypot(x - at, y), half)
+
+
+def noise(seed: int, spread: float) -> Heights:
+    return lambda x, y: np.random.default_rng(seed).normal(0.0, spread, np.shape(x))
+
+
+def total(*parts: Heights) -> Heights:
+    return lambda x, y: np.sum([part(x, y) for part in parts], axis=0)
+
+
+def highest(*parts: Heights) -> Heights:
+    return lambda x, y: np.max([part(x, y) for part in parts], axis=0)
+
+
 #: An eight whose line crosses itself.
 AROUND = np.linspace(0.0, 2.0 * np.pi, 100)
 ACROSS = 34.0 * np.cos(AROUND) / (1.0 + np.sin(AROUND) ** 2)
-EIGHT = np.column_stack([ACROSS, 1.6 * ACROSS * np.sin(AROUND)])
-SLANTED = line((-25, -6), (25, 8)), line((-4, -25), (4, 25))
-ON_RIDGE = line((-30, 0), (30, 0))
-#: Shapes: heights in mm over x and y in mm, and what is to be found: kind, form, lengths of crests in plan.
-Known = list[tuple[str, str, list[float]]]
-SHAPES: dict[str, tuple[Heights, Known]] = {
-    "ridge": (ridges(12, 7, line((-18, -10), (20, 9))), [("boss", "ridge", [42.5])]),
-    "cross": (
-        ridges(12, 7, line((-25, 0), (25, 0)), line((0, -25), (0, 25))), [("boss", "2 ridges", [50, 50])],
-    ),
-    "slanted cross": (ridges(12, 7, *SLANTED), [("boss", "2 ridges", [51.9, 50.6])]),
-    "valleys that cross": (ridges(-9, 7, *SLANTED), [("crease", "2 valleys", [51.9, 50.6])]),
-    "X": (
-        ridges(12, 6, line((-25, -12), (25, 12)), line((-25, 12), (25, -12))),
-        [("boss", "2 ridges", [55.5, 55.5])],
-    ),
-    "ring": (ridges(10, 6, circle(0, 20)), [("boss", "ring", [125.7])]),
-    "eight of two circles": (ridges(10, 6, circle(-19, 19), circle(19, 19)), [("boss", "ring", [238.8])]),
-    "eight": (
-        ridges(10, 6, line(*map(tuple, EIGHT))),
-        [("boss", "ring", [float(np.hypot(*np.diff(EIGHT, axis=0).T).sum())])],
-    ),
-    "L": (ridges(12, 7, line((-20, 20), (-20, -18), (18, -18))), [("boss", "ridge", [76])]),
-    "T": (
-        ridges(12, 7, line((-25, 15), (25, 15)), line((0, 15), (0, -22))), [("boss", "2 ridges", [50, 37])],
-    ),
-    "S": (
-        ridges(10, 6, arc(0, 14, 14, 0.1, 1.5), arc(0, -14, 14, -0.9, 0.5)), [("boss", "ridge", [123.2])],
-    ),
-    "H": (
-        ridges(10, 6, line((-14, -25), (-14, 25)), line((14, -25), (14, 25)), line((-14, 0), (14, 0))),
-        [("boss", "3 ridges", [50, 50, 28])],
-    ),
-    "crater": (
-        lambda x, y: 10 * round_top(np.hypot(x, y) - 16, 7) - 6 * round_top(np.hypot(x, y), 10),
-        [("boss", "ring", [100.5]), ("crease", "hollow", [])],
-    ),
-    "crater above ground": (
-        lambda x, y: np.maximum(10 * round_top(np.hypot(x, y) - 16, 7), 4.0 * (np.hypot(x, y) < 16)),
-        [("boss", "ring", [100.5])],
-    ),
-    "plateau": (lambda x, y: 8.0 * ((np.abs(x) < 15) & (np.abs(y) < 13)), [("boss", "plateau", [])]),
-    "dome": (lambda x, y: 12 * disc(x, y, 1, 14), [("boss", "mound", [])]),
-    "two domes": (
-        lambda x, y: 12 * np.maximum(disc(x, y, -9.5, 11), disc(x, y, 9.5, 11)), [("boss", "mound", [])] * 2,
-    ),
-    "ridge to the edge": (ridges(12, 7, line((-80, -6), (10, 9))), [("boss", "ridge", [52.7])]),
+EIGHT = along(np.column_stack([ACROSS, 1.6 * ACROSS * np.sin(AROUND)]))
+CRATER = ridges(10, 7, circle(0, 16))
+SLANTED = "-25,-6 25,8", "-4,-25 4,25"
+#: Shapes: heights in mm over x and y in mm, and the forms to be found, with the lengths of crests in plan.
+SHAPES: dict[str, tuple[Heights, str]] = {
+    "ridge": (ridges(12, 7, "-18,-10 20,9"), "ridge 42.5"),
+    "cross": (ridges(12, 7, "-25,0 25,0", "0,-25 0,25"), "2 ridges 50 50"),
+    "slanted cross": (ridges(12, 7, *SLANTED), "2 ridges 51.9 50.6"),
+    "valleys that cross": (ridges(-9, 7, *SLANTED), "2 valleys 51.9 50.6"),
+    "X": (ridges(12, 6, "-25,-12 25,12", "-25,12 25,-12"), "2 ridges 55.5 55.5"),
+    "ring": (ridges(10, 6, circle(0, 20)), "ring 125.7"),
+    "eight of two circles": (ridges(10, 6, circle(-19, 19), circle(19, 19)), "ring 238.8"),
+    "eight": (ridges(10, 6, EIGHT), "ring 220.8"),
+    "L": (ridges(12, 7, "-20,20 -20,-18 18,-18"), "ridge 76"),
+    "T": (ridges(12, 7, "-25,15 25,15", "0,15 0,-22"), "2 ridges 50 37"),
+    "S": (ridges(10, 6, arc(14, 0.1, 1.5), arc(-14, -0.9, 0.5)), "ridge 123.2"),
+    "H": (ridges(10, 6, "-14,-25 -14,25", "14,-25 14,25", "-14,0 14,0"), "3 ridges 50 50 28"),
+    "crater": (total(CRATER, mound(-6, 0, 10)), "ring 100.5; hollow"),
+    "crater above ground": (highest(CRATER, lambda x, y: 4.0 * (np.hypot(x, y) < 16)), "ring 100.5"),
+    "plateau": (lambda x, y: 8.0 * ((np.abs(x) < 15) & (np.abs(y) < 13)), "plateau"),
+    "dome": (mound(12, 1, 14), "mound"),
+    "two domes": (highest(mound(12, -9.5, 11), mound(12, 9.5, 11)), "mound; mound"),
+    "ridge to the edge": (ridges(12, 7, "-80,-6 10,9"), "ridge 52.7"),
     "ridge with a mound at its end": (
-        lambda x, y: np.maximum(ridges(12, 7, line((-24, 0), (20, 0)))(x, y), 24 * disc(x, y, 20, 9)),
-        [("boss", "mound", []), ("boss", "ridge", [44])],
+        highest(ridges(12, 7, "-24,0 20,0"), mound(24, 20, 9)), "mound; ridge 44",
     ),
     "two mounds on a ridge": (
-        lambda x, y: np.maximum(
-            ridges(10, 7, ON_RIDGE)(x, y), 22 * np.maximum(disc(x, y, -14, 9), disc(x, y, 14, 9))
-        ),
-        [("boss", "mound", [])] * 2 + [("boss", "ridge", [60])],
+        highest(ridges(10, 7, "-30,0 30,0"), mound(22, -14, 9), mound(22, 14, 9)), "mound; mound; ridge 60",
     ),
-    "sloping ridge": (
-        lambda x, y: round_top(line((-20, 0), (20, 0))(x, y), 7) * (9 + 0.2 * x), [("boss", "ridge", [40])],
-    ),
-    "eight of two small circles": (
-        ridges(10, 6, circle(-16, 16), circle(16, 16)), [("boss", "ring", [201.1])],
-    ),
-    "zigzag": (
-        ridges(10, 5, line((-32, -8), (-16, 8), (0, -8), (16, 8), (32, -8))), [("boss", "ridge", [90.5])],
-    ),
-    "steep zigzag": (
-        ridges(10, 5, line((-24, -16), (-8, 16), (8, -16), (24, 16))), [("boss", "ridge", [107.3])],
-    ),
-    "Y": (
-        ridges(12, 6, line((-22.5, 13), (0, 0), (22.5, 13)), line((0, 0), (0, -26))),
-        [("boss", "2 ridges", [52, 26])],
-    ),
-    "V": (ridges(12, 6, line((-16, 20), (0, -20), (16, 20))), [("boss", "ridge", [86.2])]),
-    "noise": (lambda x, y: np.random.default_rng(1).normal(0.0, 0.14, np.shape(x)), []),
-    "noisy cross": (
-        lambda x, y: ridges(12, 7, *SLANTED)(x, y) + np.random.default_rng(2).normal(0.0, 0.2, np.shape(x)),
-        [("boss", "2 ridges", [51.9, 50.6])],
-    ),
+    "sloping ridge": (lambda x, y: ridges(1, 7, "-20,0 20,0")(x, y) * (9 + 0.2 * x), "ridge 40"),
+    "eight of two small circles": (ridges(10, 6, circle(-16, 16), circle(16, 16)), "ring 201.1"),
+    "zigzag": (ridges(10, 5, "-32,-8 -16,8 0,-8 16,8 32,-8"), "ridge 90.5"),
+    "steep zigzag": (ridges(10, 5, "-24,-16 -8,16 8,-16 24,16"), "ridge 107.3"),
+    "Y": (ridges(12, 6, "-22.5,13 0,0 22.5,13", "0,0 0,-26"), "2 ridges 52 26"),
+    "V": (ridges(12, 6, "-16,20 0,-20 16,20"), "ridge 86.2"),
+    "noise": (noise(1, 0.14), ""),
+    "noisy cross": (total(ridges(12, 7, *SLANTED), noise(2, 0.2)), "2 ridges 51.9 50.6"),
 }  # fmt: skip
 
 
@@ -291,8 +267,17 @@ def form_shape(
     return Formed.of(place, 0.04 + 1e-3 * raised, 0.04, 0.0, 0)
 
 
+def parse_forms(words: str) -> list[tuple[str, str, list[float]]]:
+    """Return kind, form and lengths of crests of each feature."""
+    forms = []
+    for form, lengths in re.findall(r"((?:\d )?[a-z]+)([\d. ]*)", words):
+        kind = "crease" if form in ("2 valleys", "hollow") else "boss"
+        forms.append((kind, form, [float(length) for length in lengths.split()]))
+    return forms
+
+
 def find_faults(name: str, found: list[Feature], slack: float = 0.0) -> list[str]:
-    wanted = SHAPES[name][1]
+    wanted = parse_forms(SHAPES[name][1])
     forms = sorted((one.kind, one.form) for one in found)
     if forms != sorted((kind, form) for kind, form, _ in wanted):
         return [f"{name}: {forms}"]
@@ -331,8 +316,9 @@ def test_the_crests_of_a_cross_keep_to_its_lines(arrangement, pitch):
     (boss,) = features(form_shape("slanted cross", arrangement, pitch))
     for crest in boss.crests:
         x, y = crest[:, :2].T * 1e3
-        assert min(one(x, y).max() for one in SLANTED) < 0.5 * pitch
-    assert np.argmin([one(*(boss.crests[0][0, :2] * 1e3)) for one in SLANTED]) == 0  # the longer one first
+        assert min(line(one)(x, y).max() for one in SLANTED) < 0.5 * pitch
+    first = boss.crests[0][0, :2] * 1e3
+    assert np.argmin([line(one)(*first) for one in SLANTED]) == 0  # the longer one first
 
 
 @pytest.mark.parametrize(

@@ -28,6 +28,7 @@ from digiclay.core.files.run_folder import (
 )
 
 from tests.other_process import PROGRAM, dead, finish, start
+from tests.scene_files import call
 from tests.timeouts import TIMEOUT, wait_until
 
 #: What the second process says.
@@ -56,8 +57,8 @@ def names(folder: Path = Path()) -> list[str]:
 
 def test_a_folder_that_is_being_written_is_refused_at_once_by_every_command(refused):
     Path("jobs.toml").write_text(JOBS, encoding="utf-8")
-    assert main(["batch", "jobs.toml", "--out", "b", "--prepare", "--quiet"]) == 0
-    assert main(["run", "my.toml", "--out", "older", "--quiet", "--no-errors"]) == 0
+    assert call("batch jobs.toml --out b --prepare --quiet") == 0
+    assert call("run my.toml --out older --quiet --no-errors") == 0
     before = names(Path("older"))
     commands = ["run my.toml", "form dome", "compare my.toml", "paper", "job b/jobs/my"]
     commands += ["sweep my.toml --vary layout.rows=3,4", "batch jobs.toml"]
@@ -68,9 +69,9 @@ def test_a_folder_that_is_being_written_is_refused_at_once_by_every_command(refu
         # A run that is being replaced takes in no mesh and no plot.
         for command in ("export older", "plot older", "run my.toml --out older --overwrite"):
             refused([*command.split(), "--quiet"], "older is being written by another digiclay")
-        assert main(["export", "older", "--out", "elsewhere", "--quiet"]) == 0
+        assert call("export older --out elsewhere --quiet") == 0
     assert names(Path("older")) == before
-    assert main(["export", "older", "--quiet"]) == 0
+    assert call("export older --quiet") == 0
 
 
 @pytest.mark.parametrize("line", ["sweep my.toml --vary layout.rows=3,4 --workers 1", "batch jobs.toml"])
@@ -81,19 +82,19 @@ def test_a_second_series_in_one_folder_is_refused_at_once(line, refused):
     assert main([*finished, "--out", "o", "--quiet"]) == 0
     with hold_lock(Path("o/.lock"), "no"):
         refused([*command, "--out", "o", "--quiet"], REFUSED.format("worked in"))
-        refused(["run", "my.toml", "--out", "o", "--quiet"], "o holds other things than a run")
+        refused("run my.toml --out o --quiet", "o holds other things than a run")
 
 
 @pytest.mark.skipif(not Path("/proc/self").exists(), reason="no folder here that takes no files")
 @pytest.mark.timeout(20)
 def test_a_folder_of_the_system_that_takes_no_files_is_refused(refused):
-    refused(["run", "my.toml", "--out", "/proc/o", "--quiet"], "/proc/o cannot be made")
+    refused("run my.toml --out /proc/o --quiet", "/proc/o cannot be made")
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no signals to send")
 def test_what_a_killed_job_leaves_is_taken_away_by_the_next_and_its_lock_with_it():
     Path("jobs.toml").write_text(JOBS, encoding="utf-8")
-    main(["batch", "jobs.toml", "--prepare", "--quiet"])
+    call("batch jobs.toml --prepare --quiet")
     scene = Path("jobs/jobs/my/scene.toml")
     short = scene.read_text(encoding="utf-8")
     hours = re.sub(r"(?m)^duration = \S+", "duration = 1e4", re.sub(r"(?m)^every = 1", "every = 1000", short))
@@ -107,14 +108,14 @@ def test_what_a_killed_job_leaves_is_taken_away_by_the_next_and_its_lock_with_it
         process.wait(TIMEOUT)
     assert names(Path("jobs/runs")) == [part.name, ".my.lock"]
     scene.write_text(short, encoding="utf-8")
-    assert main(["job", "jobs/jobs/my", "--quiet"]) == 0
+    assert call("job jobs/jobs/my --quiet") == 0
     assert names(Path("jobs/runs")) == ["my"]
 
 
 def test_an_older_run_that_was_moved_aside_when_its_process_was_killed_is_put_back(refused):
-    main(["run", "my.toml", "--out", "o", "--quiet", "--no-errors"])
+    call("run my.toml --out o --quiet --no-errors")
     shutil.move("o", f".o.{dead()}@{find_host()}.old")
-    refused(["run", "my.toml", "--out", "o", "--quiet"], "o is not empty")
+    refused("run my.toml --out o --quiet", "o is not empty")
     assert names() == ["my.toml", "o"]
 
 
