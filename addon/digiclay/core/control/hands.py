@@ -25,14 +25,6 @@ NO_DISC: Disc = (0.0, 0.0, -1.0)
 Located = tuple[Follower, Disc | None]
 
 
-class Pressed(NamedTuple):
-    """Pressed pins: (q,), the fingers they belong to, (q,), and the undersides over them, (f, q), m."""
-
-    pins: Cells
-    owner: Cells
-    under: Floats
-
-
 @dataclass(frozen=True, eq=False)
 class HandControl:
     """Controller of several fingers."""
@@ -59,9 +51,9 @@ class HandControl:
     def locate(self, memory: Hands, touched: Measurement) -> tuple[Hands, Any]:
         """Divide the pressed pins among the fingers, and let each controller take in those of its finger."""
         (pins,) = touched.force.nonzero()
-        pressed = Pressed(pins, *self.division.assign(memory, touched, pins))
-        followers, discs = zip(*self.locate_each(memory, touched, pressed), strict=True)
-        owners = (touched.cells[pins], pressed.owner) if pins.size else None
+        owner, under = self.division.assign(memory, touched, pins)
+        followers, discs = zip(*self.locate_each(memory, touched, pins, owner, under), strict=True)
+        owners = (touched.cells[pins], owner) if pins.size else None
         return Hands(followers, tuple(disc or NO_DISC for disc in discs), owners), list(discs)
 
     def command(self, memory: Hands, seen: Measurement) -> tuple[Hands, Commands]:
@@ -77,8 +69,13 @@ class HandControl:
         self.division.remember(rows, columns.finger[obeyed])
         return memory, commands.take(obeyed)
 
-    def locate_each(self, memory: Hands, touched: Measurement, pressed: Pressed) -> list[Located]:
-        """Return what each controller remembers, and its disc."""
+    def locate_each(
+        self, memory: Hands, touched: Measurement, pins: Cells, owner: Cells, under: Floats
+    ) -> list[Located]:
+        """Return what each controller remembers, and its disc.
+
+        Pressed pins (q,), the fingers that they belong to, (q,), and the undersides over them, (f, q), m.
+        """
         raise NotImplementedError
 
     def command_each(
@@ -114,9 +111,10 @@ class HandTogether(HandControl):
     together: Controller
     """The method's of all fingers, as of the runs of a batch."""
 
-    def locate_each(self, memory: Hands, touched: Measurement, pressed: Pressed) -> list[Located]:
+    def locate_each(
+        self, memory: Hands, touched: Measurement, pins: Cells, owner: Cells, under: Floats
+    ) -> list[Located]:
         """Let each controller see all pressed pins, but no force on those of other fingers."""
-        pins, owner, under = pressed
         owner = self.division.flatten(memory, touched, owner, under, pins)
         columns = touched._replace(
             quadratic_basis=touched.quadratic_basis[:, pins, None],
@@ -176,9 +174,10 @@ class HandInGroups(HandControl):
             inner if inner is outer and isinstance(inner, GroupedControl) else None for inner, outer in pairs
         ]
 
-    def locate_each(self, memory: Hands, touched: Measurement, pressed: Pressed) -> list[Located]:
+    def locate_each(
+        self, memory: Hands, touched: Measurement, pins: Cells, owner: Cells, under: Floats
+    ) -> list[Located]:
         """Let each controller see the pins in its disc but those of other fingers, and all it presses."""
-        pins, owner, under = pressed
         shares = self.division.share_pressed(owner, under, touched, pins)
         shape = len(memory.fingers), touched.force.size
         visible, parts = np.zeros(shape, np.bool_), np.ones(shape)

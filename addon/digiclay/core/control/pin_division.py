@@ -117,9 +117,14 @@ class PinDivision:
         under[under > height + REACHED] = np.inf
         return self._begin_fingers(touched, pressed, find_lowest(under)), under
 
+    def find_places(self, memory: Hands) -> Floats:
+        """Return where the fingers are, (2, f), m."""
+        places: Floats = np.array([follower.place or NOWHERE for follower in memory.fingers]).T
+        return places
+
     def find_undersides(self, memory: Hands, basis: Floats, height: Floats) -> Floats:
         """Return the undersides of fingers over pins of a `height`, (f, q), m; infinite: too far away."""
-        x, y = np.array([follower.place or NOWHERE for follower in memory.fingers]).T
+        x, y = self.find_places(memory)
         tops = np.array([follower.top for follower in memory.fingers])[:, None]
         return self._lay_balls(measure_square(x, y, basis), tops)
 
@@ -242,16 +247,16 @@ class CellDivision(PinDivision):
     whose underside is nearest, for no pin is pressed deep; and pins obey the nearer finger.
     """
 
-    def _find_places(self, memory: Hands) -> Floats:
-        """Return where fingers are, (f, 2), m, from the first force on: cells follow later."""
+    def find_places(self, memory: Hands) -> Floats:
+        """Return where the fingers are, (2, f), m, from the first force on: cells follow later."""
         places = []
         for follower, (x, y, radius) in zip(memory.fingers, memory.discs, strict=True):
             places.append(follower.place or ((x, y) if radius >= 0.0 else NOWHERE))
-        return np.array(places)
+        return np.array(places).T
 
     def find_undersides(self, memory: Hands, basis: Floats, height: Floats) -> Floats:
         """Return how far pins are from undersides, (f, q), m; a fingertip is on the pin nearest to it."""
-        x, y = self._find_places(memory).T
+        x, y = self.find_places(memory)
         square = measure_square(x, y, basis)
         nearest = find_first_largest(-square.T)
         under: Floats = self._lay_balls(square, 0.0) + height[nearest][:, None] - height
@@ -271,7 +276,7 @@ class CellDivision(PinDivision):
         """
         copies = columns.copies
         finger, (x, y) = copies.row, columns.places
-        at_x, at_y = self._find_places(memory)[finger].T
+        at_x, at_y = self.find_places(memory)[:, finger]
         order = (x - at_x) ** 2 + (y - at_y) ** 2
         still = np.abs(target[copies.number] - seen.target[columns.cells]) <= TIE
         order += still & (order > ((UNDER * self.captures) ** 2)[finger, 0])
@@ -301,7 +306,7 @@ class PredictedDivision(PinDivision):
 
     def find_undersides(self, memory: Hands, basis: Floats, height: Floats) -> Floats:
         """Return the predicted undersides over pins, (f, q), m; infinite: too far away."""
-        x, y = np.array([follower.place or NOWHERE for follower in memory.fingers]).T
+        x, y = self.find_places(memory)
         under = np.full((x.size, basis.shape[1]), np.inf)
         for controller, fingers in self._alike.items():
             followed = [finger for finger in fingers if x[finger] < BEYOND]

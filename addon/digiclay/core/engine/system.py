@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 
@@ -27,12 +26,12 @@ class System:
     sensors: Sensors
     controller: Controller
     stepper: Stepper
-    plan: Any
+    plan: object
     """The stepper's constants of all periods."""
-    period: Any
-    """Control period, s; a number or (b,)."""
-    fastest: Any
-    """Largest speed of a rising pin, m/s; a number or (b,)."""
+    period: float
+    """Control period, s; of a batch (b,)."""
+    fastest: float
+    """Largest speed of a rising pin, m/s; of a batch (b,)."""
     selection: Selection
     """Of the active cells."""
     instants: Floats

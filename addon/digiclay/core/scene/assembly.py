@@ -82,7 +82,7 @@ def assemble(scene: Scene) -> System:
     motion, period = make_motion(scene), scene.simulation.control_period
     bed = make_grid(scene.layout)
     controller, sensors, rows = _make_control(scene, bed, motion)
-    fastest = find_speeds(motion.cell).rise
+    fastest = float(find_speeds(motion.cell).rise)
     noisy = scene.sensors and scene.sensors.noisy
     latency = scene.delay.dead_time if scene.delay else 0.0
     latency += scene.valve_lag.time_constant if scene.valve_lag else 0.0
