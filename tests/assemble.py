@@ -1,6 +1,7 @@
 """Beds put together part by part for tests: every part at its default unless a test names another."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -36,6 +37,19 @@ from numpy.typing import NDArray
 def table(columns: str, rows: Mapping[str, Any]) -> pytest.MarkDecorator:
     """Give a test each row of a table; the sentence before a row names it."""
     return pytest.mark.parametrize(columns, list(rows.values()), ids=list(rows))
+
+
+def assert_near(found: object, wanted: object, apart: float) -> None:
+    """Assert that numbers are no farther from those wanted than this, each."""
+    np.testing.assert_allclose(found, wanted, rtol=0, atol=apart)
+
+
+@contextmanager
+def refused_in_a_line(error: type[Exception], words: str) -> Iterator[pytest.ExceptionInfo[Exception]]:
+    """Assert that what is done here is refused, in one line that has some words (a pattern)."""
+    with pytest.raises(error, match=words) as caught:
+        yield caught
+    assert "\n" not in str(caught.value)
 
 
 def path(*waypoints: tuple[float, float, float, float], interpolation: str = "smooth") -> Trajectory:

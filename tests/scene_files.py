@@ -22,6 +22,16 @@ flat_radius = 0.002
 TOUCH = (0.0, 0.041), (0.05, 0.038), (0.1, 0.05)
 
 
+def read_text(path: Path) -> str:
+    """Return a text file's content."""
+    return path.read_text(encoding="utf-8")
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a text file."""
+    path.write_text(text, encoding="utf-8")
+
+
 def scene_text(rows: int, columns: int, *waypoints: tuple[float, float], parts: str = "") -> str:
     """Return a scene file: a bed, and a level finger over its middle (time in s, height in m)."""
     places = [f"  {{ time = {time}, position = [0, 0, {height}] }}," for time, height in waypoints]

@@ -9,9 +9,9 @@ from digiclay.core.model.fingertip import Fingertip
 from digiclay.core.model.layout import Layout, make_grid
 from digiclay.strokes.nominal import Device, extend, find_ghosts, find_nominal
 from digiclay.strokes.stroke import Brush, deepen, lay_path, lay_ring, make_images, start
-from numpy.testing import assert_allclose, assert_array_equal
+from numpy.testing import assert_array_equal
 
-from tests.assemble import table
+from tests.assemble import assert_near, table
 
 BED = make_grid(Layout(60, 60, pitch=1.5e-3))
 REST = 40e-3
@@ -58,7 +58,7 @@ def test_the_height_follows_from_the_distance_to_the_path_alone(name, brush):
     section = np.where(distance <= 7.5e-3, np.clip((7.5e-3 - distance) / 4.5e-3, 0.0, 1.0), 0.0)
     sign = 1.0 if brush is Brush.RAISE else -1.0
     # The flank goes 0.9 mm up a mm, and the points cut the path's corners by up to 0.5 µm.
-    assert_allclose(found, sign * 4e-3 * section, rtol=0, atol=1e-6)
+    assert_near(found, sign * 4e-3 * section, 1e-6)
 
 
 @pytest.mark.parametrize("name", PATHS)
@@ -69,7 +69,7 @@ def test_where_no_blister_is_the_fingertip_leaves_its_underside(name):
     )
     gap = 4e-3 - np.sqrt(np.maximum(16e-6 - measure_distance(path) ** 2, 0.0))
     # Of a ball 1.5 mm from one place of the path to the next: 0.07 mm between two.
-    assert_allclose(found.height - REST, np.minimum(gap - 2e-3, 0.0), rtol=0, atol=0.15e-3)
+    assert_near(found.height - REST, np.minimum(gap - 2e-3, 0.0), 0.15e-3)
 
 
 @pytest.mark.parametrize("accumulate, height", [(False, 4e-3), (True, 8e-3)])
@@ -91,7 +91,7 @@ def test_mirror_images_are_alike_and_meet_without_a_seam(symmetry, brush):
     )
     for axis in (0, 1):
         if "YX"[axis] in symmetry:
-            assert_allclose(found, np.flip(found, axis), rtol=0, atol=1e-12)
+            assert_near(found, np.flip(found, axis), 1e-12)
     assert np.ptp(found) > 2e-3
 
 
@@ -103,7 +103,7 @@ def test_images_about_a_center_are_alike_at_every_turn(count):
         find_nominal(stroke(np.array([image.place(*at) for at in LINE * 0.4 + [9e-3, 0.0]])), DEVICE, FLAT)
         for image in images
     ]
-    assert_allclose(found, np.max([one.height for one in single], axis=0), rtol=0, atol=1e-12)
+    assert_near(found, np.max([one.height for one in single], axis=0), 1e-12)
 
 
 @pytest.mark.parametrize("accumulate", [False, True])

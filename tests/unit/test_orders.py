@@ -15,9 +15,9 @@ from digiclay.core.model.physics import find_speeds
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.toml_table import resolve
 from digiclay.core.session.live_session import has_arrived, simulate_path
-from numpy.testing import assert_allclose, assert_array_equal
+from numpy.testing import assert_array_equal
 
-from tests.assemble import table
+from tests.assemble import assert_near, table
 from tests.reliefs import heighten, make_orders, make_spike_and_ridge, measure_roughness, stay_away
 
 ARRANGEMENTS = ("aligned", "staggered", "hexagonal")
@@ -41,23 +41,34 @@ def bed(
     return assemble(resolve({"layout": layout, "control": control, "simulation": simulation, **shown}))
 
 
+def rough(system):
+    """Return the state of a bed with a spike and a ridge."""
+    return heighten(system, make_spike_and_ridge(system.grid))
+
+
+def go_on(system, state, count, orders=None):
+    """Return the state after so many periods without a finger."""
+    *_, state = simulate_path(system, state, stay_away(count), orders)
+    return state
+
+
 @pytest.mark.parametrize("verb", [Verb.SMOOTH, Verb.AVERAGE])
 @pytest.mark.parametrize("arrangement", ARRANGEMENTS)
 def test_each_stroke_makes_a_spike_and_a_ridge_less_rough_and_keeps_the_volume(arrangement, verb):
     system = bed(arrangement)
     stroke = make_orders(100, -9e-3, 9e-3, -3e-3, RADIUS, verb=verb)
-    state = heighten(system, make_spike_and_ridge(system.grid))
+    state = rough(system)
     first = state.row(0)
-    rough = [measure_roughness(system.grid, first)]
+    roughness = [measure_roughness(system.grid, first)]
     for _ in range(3):
-        *_, state = simulate_path(system, state, stay_away(len(stroke)), stroke)
-        rough.append(measure_roughness(system.grid, state.row(0)))
+        state = go_on(system, state, len(stroke), stroke)
+        roughness.append(measure_roughness(system.grid, state.row(0)))
         # A pin stands within the dead band of its height; the heights' own sum does not change.
         assert abs((state.row(0) - first).sum()) <= BAND * first.size
         assert abs((state.row(system.rows.target) - first).sum()) < 1e-12
-    assert max(rough[1:]) < 0.45 * rough[0]
+    assert max(roughness[1:]) < 0.45 * roughness[0]
     # A quick one leaves so little that its own rim shows.
-    assert verb is Verb.SMOOTH or np.diff(rough).max() < 0.0
+    assert verb is Verb.SMOOTH or np.diff(roughness).max() < 0.0
 
 
 @pytest.mark.parametrize(
@@ -85,18 +96,18 @@ def test_pins_are_in_the_mode_blister_until_they_arrive_and_are_driven_home_by_t
     system = bed(method="absent")
     rest = system.cell.actuator.rest_height
     state = heighten(system, np.where(system.grid.x < 0.0, 4e-3, 0.0))
-    *_, state = simulate_path(system, state, stay_away(20), make_orders(20, 0.0, 0.0, 0.0, RADIUS, 0))
+    state = go_on(system, state, 20, make_orders(20, 0.0, 0.0, 0.0, RADIUS, 0))
     inside = np.hypot(system.grid.x, system.grid.y) < RADIUS - 1e-9
     assert_array_equal(state.mode() == Mode.BLISTER, inside)
-    *_, state = simulate_path(system, state, stay_away(60), make_orders(0, 0.0, 0.0, 0.0, RADIUS))
+    state = go_on(system, state, 60, make_orders(0, 0.0, 0.0, 0.0, RADIUS))
     formed = np.abs(state.row(system.rows.target) - rest) > BAND
     assert_array_equal(state.mode(), np.where(formed, Mode.HOLD, Mode.REST))
     system = bed()
-    state = heighten(system, make_spike_and_ridge(system.grid))
-    *_, state = simulate_path(system, state, stay_away(5), make_orders(5, 0.0, 0.0, 0.0, RADIUS, 0))
+    state = rough(system)
+    state = go_on(system, state, 5, make_orders(5, 0.0, 0.0, 0.0, RADIUS, 0))
     target = state.row(system.rows.target)
     assert np.abs(state.row(0) - target).max() > 1e-3
-    *_, state = simulate_path(system, state, stay_away(300))
+    state = go_on(system, state, 300)
     # Method I comes to a height like 1/t.
     assert np.abs(state.row(0) - target).max() < 0.2e-3
 
@@ -114,25 +125,25 @@ def test_a_finger_at_work_elsewhere_stays_under_the_methods_control():
     near = np.hypot(system.grid.x - 18e-3, system.grid.y - 18e-3) < 7e-3
     assert ends[0].min() < 38e-3
     # Sums over other cells round in another way.
-    assert_allclose(ends[0][~near], ends[1][~near], rtol=0, atol=1e-12)
+    assert_near(ends[0][~near], ends[1][~near], 1e-12)
     assert (ends[0] - ends[1])[near].max() > 2e-3
 
 
 @pytest.mark.parametrize("method", [*METHODS, "absent"])
 def test_every_method_lets_its_pins_be_smoothed_and_keeps_them_if_it_keeps_heights(method):
     system = bed(method=method)
-    state = heighten(system, make_spike_and_ridge(system.grid))
+    state = rough(system)
     spike = int(state.row(0).argmax())
     before = float(state.row(0)[spike])
-    *_, state = simulate_path(system, state, stay_away(100), Orders(STROKE.rows[:100]))
+    state = go_on(system, state, 100, Orders(STROKE.rows[:100]))
     assert float(state.row(0)[spike]) < before - 5e-3
-    *_, state = simulate_path(system, state, stay_away(60), Orders(STROKE.rows[100:]))
+    state = go_on(system, state, 60, Orders(STROKE.rows[100:]))
     # The shape display goes on with its own shape elsewhere.
     near = np.hypot(system.grid.x, system.grid.y) < RADIUS
     assert method == "shape_display" or not (state.mode() == Mode.BLISTER)[near].any()
     if method in KEEP_HEIGHTS:
         smoothed = state.row(0)
-        *_, state = simulate_path(system, state, stay_away(100))
+        state = go_on(system, state, 100)
         assert np.abs(state.row(0) - smoothed).max() <= 2.0 * BAND
 
 
@@ -145,7 +156,7 @@ def test_periods_without_an_order_or_with_locks_that_are_gone_are_those_of_the_m
     ):  # fmt: skip
         state = begin(system)
         for one in before:
-            *_, state = simulate_path(system, state, stay_away(1), one)
+            state = go_on(system, state, 1, one)
         *_, state = simulate_path(system, state._replace(period=64), path, orders)
         ends.add((state.row(0).tobytes(), state.mode().tobytes()))
     assert len(ends) == 1
@@ -176,7 +187,7 @@ def test_pins_are_placed_within_a_micrometer_and_stay_there_whatever_the_method(
     if method not in ("viscous", "shape_display"):
         assert np.abs(state.row(0) - system.cell.actuator.rest_height)[~driven].max() == 0.0
     if method in (*KEEP_HEIGHTS, "absent"):
-        *_, state = simulate_path(system, state, stay_away(60))
+        state = go_on(system, state, 60)
         assert np.abs(state.row(0) - surface)[driven].max() < 1e-6
         assert set(np.unique(state.mode()[driven])) <= {Mode.REST, Mode.HOLD}
 
@@ -234,7 +245,7 @@ def test_a_locked_pin_stays_whatever_the_method_and_orders_command(method, shape
     path = stay_away(160)
     path[:, 0, 2] = np.concatenate([np.linspace(46e-3, 36e-3, 81), np.linspace(36e-3, 60e-3, 80)])
     path[40:, 0, 0] = np.linspace(-9e-3, 9e-3, 121)
-    *_, state = simulate_path(system, begin(system), stay_away(1), lock(Verb.LOCK))
+    state = go_on(system, begin(system), 1, lock(Verb.LOCK))
     locked = np.hypot(system.grid.x, system.grid.y) <= 7e-3
     assert_array_equal(state.mode() == Mode.LOCKED, locked)
     before = state.row(0)
@@ -251,7 +262,7 @@ def test_a_locked_pin_stays_whatever_the_method_and_orders_command(method, shape
         *_, state = simulate_path(system, state, path, part)
         assert_array_equal(state.row(0)[locked], before[locked])
         assert_array_equal(state.mode() == Mode.LOCKED, locked)
-    *_, state = simulate_path(system, state, stay_away(1), lock(Verb.UNLOCK))
+    state = go_on(system, state, 1, lock(Verb.UNLOCK))
     assert not (state.mode() == Mode.LOCKED).any()
     assert np.abs(place_until_arrived(system, state, everywhere).row(0) - 45e-3).max() < 1e-6
 
@@ -259,42 +270,42 @@ def test_a_locked_pin_stays_whatever_the_method_and_orders_command(method, shape
 def test_a_pin_locked_on_its_way_stops_there_and_stays_there_when_it_is_unlocked():
     system = bed()
     surface = np.full(system.grid.count, 48e-3)
-    *_, state = simulate_path(system, begin(system), stay_away(12), place(12, surface))
-    *_, state = simulate_path(system, state, stay_away(10), Orders(repeat_order(10, Verb.LOCK, radius=7e-3)))
+    state = go_on(system, begin(system), 12, place(12, surface))
+    state = go_on(system, state, 10, Orders(repeat_order(10, Verb.LOCK, radius=7e-3)))
     stopped = state.row(0)
     middle = int(system.grid.at(np.zeros(1), np.zeros(1))[0])
     assert 40.1e-3 < stopped[middle] < 47e-3
-    *_, state = simulate_path(system, state, stay_away(1), lock(Verb.UNLOCK))
-    *_, state = simulate_path(system, state, stay_away(200))
+    state = go_on(system, state, 1, lock(Verb.UNLOCK))
+    state = go_on(system, state, 200)
     assert abs(state.row(0)[middle] - stopped[middle]) <= BAND
     assert abs(state.row(0)[0] - 48e-3) < 0.2e-3
 
 
-#: Pins of the beds that orders are checked for, and their stroke, m.
-PINS, HIGH = 9, 80e-3
-FLAT = np.full(PINS, 40e-3)
+#: Rows of orders: x, y and radius, m, strength and verb.
+FAULTY = [
+    "nan 0 1e-2 1 0", "0 inf 1e-2 1 0", "0 0 -1e-2 1 0", "0 0 1e-9 1 0", "0 0 1e9 1 0", "0 0 1e-2 101 0",
+    "0 0 1e-2 -0.1 0", "0 0 1e-2 1 0.5", "0 0 1e-2 1 7", "0 0 1e-2 1 -1", f"1 0 0 0 {Verb.PLACE:d}",
+    f"-1 0 0 0 {Verb.PLACE:d}", f"0.5 0 0 0 {Verb.PLACE:d}", f"nan 0 0 0 {Verb.PLACE:d}",
+]  # fmt: skip
+SOUND = [f"0 0 0 0 {Verb.PLACE:d}", "0 0 1e-6 0 0", f"1e3 -1e3 1e3 100 {Verb.INVERT:d}", "0 0 0 0 0"]
 
 
-@pytest.mark.parametrize(
-    "order, sound",
-    [((np.nan, 0.0, 1e-2, 1.0, 0.0), False), ((0.0, np.inf, 1e-2, 1.0, 0.0), False),
-     ((0.0, 0.0, -1e-2, 1.0, 0.0), False), ((0.0, 0.0, 1e-9, 1.0, 0.0), False),
-     ((0.0, 0.0, 1e9, 1.0, 0.0), False), ((0.0, 0.0, 1e-2, 101.0, 0.0), False),
-     ((0.0, 0.0, 1e-2, -0.1, 0.0), False), ((0.0, 0.0, 1e-2, 1.0, 0.5), False),
-     ((0.0, 0.0, 1e-2, 1.0, 7.0), False), ((0.0, 0.0, 1e-2, 1.0, -1.0), False),
-     ((1.0, 0.0, 0.0, 0.0, Verb.PLACE), False), ((-1.0, 0.0, 0.0, 0.0, Verb.PLACE), False),
-     ((0.5, 0.0, 0.0, 0.0, Verb.PLACE), False), ((np.nan, 0.0, 0.0, 0.0, Verb.PLACE), False),
-     ((0.0, 0.0, 0.0, 0.0, Verb.PLACE), True), ((0.0, 0.0, 1e-6, 0.0, 0.0), True),
-     ((1e3, -1e3, 1e3, 100.0, Verb.INVERT), True), ((0.0, 0.0, 0.0, 0.0, 0.0), True)],
-)  # fmt: skip
-def test_an_order_out_of_its_range_and_orders_of_another_shape_are_found(order, sound):
+def fault_in(rows):
+    """Return what is wrong with orders for three periods of nine pins of 80 mm."""
+    return find_fault(Orders(rows, (np.full(9, 40e-3),)), 3, 9, 80e-3)
+
+
+@pytest.mark.parametrize("order", [*FAULTY, *SOUND])
+def test_an_order_out_of_its_range_is_found(order):
     rows = np.zeros((3, 5))
-    rows[1] = order
-    found = find_fault(Orders(rows, (FLAT,)), 3, PINS, HIGH)
-    assert found == "" if sound else found.startswith("row 1 is [")
-    for shape in ((0, 5), (2, 5), (3, 4), (15,)):
-        words = f"an array of the shape {shape} of float64"
-        assert find_fault(Orders(np.zeros(shape)), 3, PINS, HIGH) == words
+    rows[1] = order.split()
+    assert fault_in(rows).startswith("row 1 is [" if order in FAULTY else "")
+    assert bool(fault_in(rows)) == (order in FAULTY)
+
+
+@pytest.mark.parametrize("shape", [(0, 5), (2, 5), (3, 4), (15,)])
+def test_orders_of_another_shape_are_found(shape):
+    assert fault_in(np.zeros(shape)) == f"an array of the shape {shape} of float64"
 
 
 @pytest.mark.parametrize("ridge", [0.0, 6e-3])
@@ -323,7 +334,7 @@ def test_one_quick_pass_of_smooth_halves_what_varies_on_flat_ground_and_on_a_rid
     line = (np.abs(y) < 0.5 * pitch) & (np.abs(x) < 12.0 * pitch)
     before = float(state.row(0)[line].std())
     orders = make_orders(count, -end, end, 0.0, radius, verb=Verb.SMOOTH)
-    *_, state = simulate_path(system, state, stay_away(len(orders)), orders)
+    state = go_on(system, state, len(orders), orders)
     assert float(state.row(0)[line].std()) < 0.5 * before
 
 

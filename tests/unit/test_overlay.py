@@ -21,6 +21,8 @@ from digiclay.overlay.sections import COMPACT, FULL, TAKEN, Readings, find_room,
 from hypothesis import given
 from hypothesis import strategies as st
 
+from tests.assemble import assert_near
+
 DARK, LIGHT = (0.09, 0.09, 0.09), (0.93, 0.93, 0.93)
 CHANNEL = st.floats(0.0, 1.0)
 COLOR = st.tuples(CHANNEL, CHANNEL, CHANNEL)
@@ -197,8 +199,8 @@ def test_a_curve_shows_its_window_alone_and_the_set_point_is_the_dashed_line_at_
     time, box = np.arange(11.0), Box(100.0, 50.0, 200.0, 40.0, DARK)
     value = np.where(time == 7.0, np.nan, time)
     points = scale_curve(time, value, (5.0, 10.0), (0.0, 10.0), box)
-    np.testing.assert_allclose(points[:, 0], [100.0, 140.0, 220.0, 260.0, 300.0], rtol=0, atol=1e-9)
-    np.testing.assert_allclose(points[:, 1], [70.0, 74.0, 82.0, 86.0, 90.0], rtol=0, atol=1e-9)
+    assert_near(points[:, 0], [100.0, 140.0, 220.0, 260.0, 300.0], 1e-9)
+    assert_near(points[:, 1], [70.0, 74.0, 82.0, 86.0, 90.0], 1e-9)
     picture = draw(session(set_point=0.25))
     (dashed,) = (line for line in picture.lines if line.dashed)
     low, high = (line.points[0, 1] for line in picture.lines[:2])

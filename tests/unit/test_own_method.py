@@ -20,9 +20,11 @@ from digiclay.core.session.finished_run import read_run
 from digiclay.core.session.run_scene import run
 from digiclay.plugins import method_loader
 from digiclay.plugins.method_loader import load_method
-from numpy.testing import assert_allclose, assert_array_equal
+from numpy.testing import assert_array_equal
 
+from tests.assemble import assert_near
 from tests.own_methods import COPY, HEAD, PAD, forgotten, refused, small, write_method
+from tests.scene_files import read_text, write_text
 from tests.timeouts import TIMEOUT
 
 
@@ -69,8 +71,8 @@ def test_an_installed_package_offers_a_method_by_its_name(here, monkeypatch):
     monkeypatch.syspath_prepend(here)
     info = here / "pads-1.2.dist-info"
     info.mkdir()
-    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: pads\nVersion: 1.2\n", encoding="utf-8")
-    (info / "entry_points.txt").write_text("[digiclay.methods]\npad = padpackage:SoftPad\n", encoding="utf-8")
+    write_text(info / "METADATA", "Metadata-Version: 2.1\nName: pads\nVersion: 1.2\n")
+    write_text(info / "entry_points.txt", "[digiclay.methods]\npad = padpackage:SoftPad\n")
     with pytest.raises(SceneError, match=r"must be one of virtual_master"):
         small("pad")  # installed is not loaded
     assert "padpackage" not in sys.modules
@@ -81,7 +83,7 @@ def test_an_installed_package_offers_a_method_by_its_name(here, monkeypatch):
     remove_method("pad")
     assert run(pickle.loads(packed)).metrics["method"] == "pad"
     remove_method("pad")
-    (here / "padpackage.py").write_text(PAD + "\n# another\n", encoding="utf-8")
+    write_text(here / "padpackage.py", PAD + "\n# another\n")
     with pytest.raises(MethodError, match=r"The method pad must be that of pads 1.2 here too"):
         pickle.loads(packed)
     monkeypatch.setattr("importlib.metadata.entry_points", lambda **_: [
@@ -134,7 +136,7 @@ def test_a_batch_gives_what_the_runs_give_alone_and_a_shape_is_displayed_before(
     scenes = [small(name, f"control.step={step} um", "sensors.force_noise=1 mN") for step in (20, 40, 80)]
     found = {number: result.history["height"].copy() for number, result in run_together(scenes)}
     for number, scene in enumerate(scenes):
-        assert_allclose(found[number], run(scene).history["height"], rtol=0, atol=1e-12)
+        assert_near(found[number], run(scene).history["height"], 1e-12)
     assert np.abs(found[0] - found[2]).max() > 1e-5
     shown = run(small(name, "shape.file=saddle", "simulation.duration=0.4")).history["height"]
     assert np.ptp(shown[-1]) > 1e-3
@@ -156,7 +158,7 @@ RUN = Path("jobs", "runs", "tap-soft_pad-small")
 
 @pytest.fixture
 def jobs(here):
-    (here / "jobs.toml").write_text(JOBS, encoding="utf-8")
+    write_text(here / "jobs.toml", JOBS)
     write_method(here)
     return here
 
@@ -171,13 +173,13 @@ def test_a_job_has_its_code_beside_it_and_is_done_again_after_a_change_of_it(job
     assert prepare() == 0
     assert sorted(path.name for path in JOB.iterdir()) == ["job.toml", "method.py", "scene.toml"]
     assert not (JOB.with_name("tap-elastic-small") / "method.py").exists()
-    assert (JOB / "method.py").read_text(encoding="utf-8") == PAD
+    assert read_text(JOB / "method.py") == PAD
     assert "--method path/to/mine.py:Mine" in refused(capsys, "job", str(JOB), "--quiet")
     assert judge_run(JOB, RUN) is RunState.ABSENT
     own = ["--method", "method.py:SoftPad", "--quiet"]
     assert main(["job", str(JOB), *own]) == 0
     assert judge_run(JOB, RUN) is RunState.WHOLE
-    found = json.loads((RUN / "metrics.json").read_text(encoding="utf-8"))
+    found = json.loads(read_text(RUN / "metrics.json"))
     assert found["versions"]["method"].startswith("method.py:SoftPad sha256:")
     remove_method("soft_pad")
     write_method(jobs, PAD.replace("50e-6", "60e-6"))
@@ -186,12 +188,12 @@ def test_a_job_has_its_code_beside_it_and_is_done_again_after_a_change_of_it(job
     assert main(["job", str(JOB), *own]) == 0
     assert judge_run(JOB, RUN) is RunState.WHOLE
     assert main(["batch", "jobs.toml", "--method", "pad.py:SoftPad", "--submit", "cuecmd", "--quiet"]) == 0
-    lists = "".join(path.read_text(encoding="utf-8") for path in sorted(jobs.glob("jobs/cuecmd/*.txt")))
+    lists = "".join(read_text(path) for path in sorted(jobs.glob("jobs/cuecmd/*.txt")))
     assert "--method method.py:SoftPad" in lists  # farms are told the code
 
 
 PAGE = Path(__file__).parents[2] / "docs" / "own-methods.md"
-CODE = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
+CODE = re.findall(r"```python\n(.*?)```", read_text(PAGE), re.DOTALL)
 
 
 def test_the_template_runs_as_it_is_and_its_run_needs_no_code_any_more(here, capsys):
@@ -202,8 +204,8 @@ def test_the_template_runs_as_it_is_and_its_run_needs_no_code_any_more(here, cap
     size = ["--set", "layout.rows=11", "--set", "layout.columns=11", "--set", "simulation.duration=0.25"]
     own = ["--method", "own/soft_pad.py:SoftPad", "--quiet", "--no-errors"]
     assert main(["run", "tap", *own, *size, "--out", "r"]) == 0
-    text = (here / "own" / "soft_pad.py").read_text(encoding="utf-8")
-    assert (here / "r" / "method.py").read_text(encoding="utf-8") == text
+    text = read_text(here / "own" / "soft_pad.py")
+    assert read_text(here / "r" / "method.py") == text
     pressed = read_run(here / "r", "height")
     assert pressed.history["height"].min() < 39.9e-3  # it gives way
     assert pressed.scene.method == "soft_pad"
@@ -228,7 +230,7 @@ def test_the_template_runs_as_it_is_and_its_run_needs_no_code_any_more(here, cap
     ],
 )
 def test_a_name_that_cannot_be_is_refused_in_a_line(here, arguments, said, capsys):
-    (here / "mine.py").write_text("", encoding="utf-8")
+    write_text(here / "mine.py", "")
     assert said in refused(capsys, "new-method", *arguments)
     assert [(path.name, path.stat().st_size) for path in here.iterdir()] == [("mine.py", 0)]
 
@@ -238,9 +240,9 @@ def test_a_sweep_varies_methods_and_goes_on_with_the_same_code_only(here, capsys
     size = ["--set", "layout.rows=11", "--set", "layout.columns=11", "--set", "simulation.duration=0.05"]
     varied = ["--vary", "control.method=elastic,mine.py:Mine", "--workers", "1", "--out", "s", "--quiet"]
     assert main(["sweep", "tap", *varied, *size]) == 0
-    assert (here / "s" / "sweep.csv").read_text(encoding="utf-8").split()[-2:][0].startswith("elastic,")
+    assert read_text(here / "s" / "sweep.csv").split()[-2:][0].startswith("elastic,")
     assert main(["sweep", "tap", *varied, *size]) == 0
-    (here / "mine.py").write_text((here / "mine.py").read_text(encoding="utf-8") + "\n", encoding="utf-8")
+    (here / "mine.py").write_text(read_text(here / "mine.py") + "\n", encoding="utf-8")
     remove_method("mine")
     assert main(["sweep", "tap", *varied, *size]) == 2
     assert "s holds another sweep" in capsys.readouterr().err
@@ -248,7 +250,7 @@ def test_a_sweep_varies_methods_and_goes_on_with_the_same_code_only(here, capsys
 
 @pytest.mark.parametrize("code", CODE)
 def test_the_code_of_the_page_runs(here, code):
-    (here / "page.py").write_text(code, encoding="utf-8")
+    write_text(here / "page.py", code)
     name = re.findall(r"class (\w+)", code)[-1]
     assert load_method(f"page.py:{name}") in list_added()
     assert run(small(load_method(f"page.py:{name}"))).history["height"].min() < 0.04
@@ -297,7 +299,7 @@ NONE = "command = lambda *_: None\n"
 def test_a_scene_never_loads_code_by_itself(here, capsys):
     write_method(here)
     for word in ("soft_pad", "pad.py:SoftPad"):
-        (here / "my.toml").write_text(f'[control]\nmethod = "{word}"\n', encoding="utf-8")
+        write_text(here / "my.toml", f'[control]\nmethod = "{word}"\n')
         said = refused(capsys, "run", "my.toml")
         assert "my.toml: control.method must be one of virtual_master" in said
         assert "--method path/to/mine.py:Mine" in said

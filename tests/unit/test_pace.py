@@ -16,6 +16,8 @@ from digiclay.sessions.sculpting import begin_session, follow_finger
 from digiclay.settings.devices import BEDS, make_scene
 from digiclay.strokes.tracking import SUDDEN, find_tracking
 
+from tests.assemble import assert_near
+
 #: Heights of the strokes over the bed at rest, m: a ridge, a valley.
 RIDGE, VALLEY = 8e-3, -6e-3
 #: Corners of a stroke in pitches: there, and back at a sharp angle; and rows and columns of the bed.
@@ -159,7 +161,7 @@ def test_pins_stay_where_a_stroke_of_method_iii_has_left_them():
     left = session.state.row(0).copy()
     later = follow_finger(session, session.pose, 60).state.row(0)
     # 1 µm is what counts as arrived.
-    np.testing.assert_allclose(later, left, rtol=0, atol=2e-6)
+    assert_near(later, left, 2e-6)
     assert later.max() <= scene.actuator.rest_height + 2e-6
 
 

@@ -19,6 +19,7 @@ from digiclay.plots.sweep import sweep_figure
 from mpl_toolkits.mplot3d.proj3d import proj_transform
 from numpy.testing import assert_allclose, assert_array_equal
 
+from tests.assemble import assert_near
 from tests.other_process import finish, start
 
 
@@ -91,7 +92,7 @@ def test_the_session_shows_force_set_point_and_the_chosen_cells_over_one_time(se
     x = case["position"][cells, 0]
     touched = case["fingertip"][case["total_force"] > 0.0, 0]
     assert np.abs(x[[0, -1]] - touched[[0, -1]]).max() <= 1.5e-3
-    assert_allclose(np.diff(x), np.ptp(touched) / 5, rtol=0.0, atol=3e-3)
+    assert_near(np.diff(x), np.ptp(touched) / 5, 3e-3)
     # Without contact those that moved most are shown.
     case["total_force"] = np.zeros(201)
     case["height"] = np.full_like(case["height"], 0.04)
@@ -139,7 +140,7 @@ def test_the_relief_is_in_the_middle_of_its_room_and_as_large(rows, columns, sha
     flat = np.column_stack(proj_transform(*np.reshape(corners, (3, 8)), relief.get_proj())[:2])
     seen = relief.figure.transFigure.inverted().transform(relief.transData.transform(flat))
     below, above = np.reshape(ROOM, (2, 2)) - [seen.min(axis=0), seen.max(axis=0)]
-    assert_allclose(below, -above, rtol=0, atol=1e-9)
+    assert_near(below, -above, 1e-9)
     assert above.min() == pytest.approx(0.0, abs=1e-3)  # a size is that of another zoom, but for rounding
 
 
@@ -255,7 +256,7 @@ def test_a_figure_of_several_fingertips_has_force_cell_and_path_of_each():
     assert [line.get_color() for line in heights.get_lines()] == [line.get_color() for line in lines[:2]]
     reached = case["position"][plots.session_cells(case)]
     halfway = [case["fingertip"][row, finger, :2] for finger, row in enumerate((40, 50))]
-    assert_allclose(reached, halfway, rtol=0, atol=2.2e-3)  # half a diagonal of a cell
+    assert_near(reached, halfway, 2.2e-3)  # half a diagonal of a cell
     assert [line.get_label() for line in plan.get_lines()][:4] == [
         "lifted",
         "in contact",

@@ -13,7 +13,8 @@ from digiclay.core.surface.pointing import (
 from digiclay.press.tool import drape
 from hypothesis import example, given
 from hypothesis import strategies as st
-from numpy.testing import assert_allclose
+
+from tests.assemble import assert_near
 
 DOWN = np.array([0.0, 0.0, -1.0])
 
@@ -30,7 +31,7 @@ def test_a_ray_from_above_meets_each_pin_on_its_top(arrangement, size):
     for cell in range(cells.count):
         origin = np.array([cells.x[cell], cells.y[cell], 1.0])
         found = intersect_surface(cells, height, origin, 3.0 * DOWN)
-        assert_allclose(found, [*origin[:2], height[cell]], rtol=0, atol=1e-12)
+        assert_near(found, [*origin[:2], height[cell]], 1e-12)
 
 
 @example(turn=5e-324, slope=-1.0, x=0.0, y=0.0)
@@ -97,7 +98,7 @@ def test_every_place_lies_on_the_ray_through_where_it_is_seen(lens):
         along = (place - origin) @ way
         assert along > 0.0
         # Twelve digits of the distance from where the ray begins.
-        assert_allclose(origin + along * way, place, rtol=0, atol=1e-12 * along + 1e-12)
+        assert_near(origin + along * way, place, 1e-12 * along + 1e-12)
 
 
 def test_the_ground_is_the_mean_of_pins_in_reach_and_a_high_pin_raises_a_line_by_a_sixth():
@@ -123,7 +124,7 @@ def test_the_patch_is_where_the_underside_of_the_finger_is_as_high_as_the_plane(
     x, y = rim.T
     place = np.array([np.ones_like(x), x, y, x * x, x * y, y * y])
     height = compute_underside(*compute_forms(outline), place)[0]
-    assert_allclose(height, depth, rtol=0, atol=1e-12)
+    assert_near(height, depth, 1e-12)
 
 
 @pytest.mark.parametrize("depth", [-1.0, 0.0, 0.05, np.inf])
@@ -131,4 +132,4 @@ def test_the_patch_never_leaves_the_finger(depth):
     rim = find_contact_outline(Fingertip(), np.array(LEVEL), depth)
     radius = np.hypot(rim[:, 0] / 10e-3, rim[:, 1] / 8e-3)
     # The root of a rounding error of 1e-16 is 1e-8.
-    assert_allclose(radius, 1.0 if depth > 0.0 else 0.0, rtol=0, atol=1e-7)
+    assert_near(radius, 1.0 if depth > 0.0 else 0.0, 1e-7)

@@ -5,13 +5,15 @@ import pytest
 from digiclay.core.base.errors import ParameterError
 from digiclay.core.session.render_settings import Film, Turntable
 
+from tests.assemble import assert_near
+
 TIME = np.arange(201) * 5e-3
 
 
 def test_a_film_lasts_as_long_as_its_session_or_a_part_of_it_and_shows_the_nearest_row():
     moments = Film(rate=25).moments(TIME)
     assert len(moments) == 26
-    np.testing.assert_allclose(moments, np.arange(26) / 25, rtol=0, atol=1e-12)
+    assert_near(moments, np.arange(26) / 25, 1e-12)
     assert len(Film(rate=25, speed=0.5).moments(TIME)) == 51
     assert Film().rows([0.0]).tolist() == [0]  # a session of a single row
     film = Film(rate=25, start=0.2, stop=0.4)

@@ -11,6 +11,7 @@ from digiclay.core.session import snapshot
 from digiclay.core.session.live_session import simulate_path
 from digiclay.sessions import sculpting
 
+from tests.assemble import assert_near
 from tests.hand import SCENE, SIZES, Hand, heights, pose, started
 
 pytestmark = pytest.mark.usefixtures("quick_machine")
@@ -43,7 +44,7 @@ def test_what_was_taken_back_within_a_press_counts_again_when_the_finger_moves(o
     back = hand.move(back, [(1e3 * off, 38.0)] * 3)
     assert len(back.gestures) == 1
     # Under a finger at rest pins still settle by hundredths of a millimeter, of 2 mm pressed.
-    np.testing.assert_allclose(heights(back), first, rtol=0, atol=5e-5)
+    assert_near(heights(back), first, 5e-5)
     again = hand.move(back, [(x, 38.0) for x in np.linspace(1, 5, 10)])
     assert len(again.gestures) == 2
     back = sculpting.rewind(sculpting.rewind(again))

@@ -1,5 +1,6 @@
 """Fingers with identities: requests; lines of a Quest and of touch pads."""
 
+import asyncio
 import json
 import math
 
@@ -17,6 +18,7 @@ from digiclay_serve.hts import Hands
 from digiclay_serve.osc_door import read_osc, read_request
 from digiclay_serve.protocol import Bed, Poses, check_fingers, read_json
 from digiclay_serve.tuio import Pad
+from tests.assemble import assert_near, refused_in_a_line
 
 LEVEL = (1.0, 0.0, 0.0, 0.0)
 PLACE = (0.01, -0.02, 0.05)
@@ -82,9 +84,8 @@ def test_a_wrong_finger_is_told_and_the_others_go_on(wrong, message):
     ],
 )
 def test_a_message_that_is_none_is_refused_in_one_line(said, message):
-    with pytest.raises(ParameterError, match=message) as caught:
+    with refused_in_a_line(ParameterError, message):
         read_json(json.dumps({"type": "poses", **said}))
-    assert "\n" not in str(caught.value)
 
 
 def poses(*identities, alive=(), **given):
@@ -93,22 +94,19 @@ def poses(*identities, alive=(), **given):
     return Poses(fingers, alive or identities, **given)
 
 
-def test_the_first_that_appear_have_the_fingertips_and_33_are_told(monkeypatch):
-    import asyncio
+@pytest.mark.parametrize("fingers, identities", [(2, (5, 4, 3)), (32, tuple(range(33)))])
+def test_the_first_that_appear_have_the_fingertips_and_33_are_told(fingers, identities):
+    orders, path = make_slot(LAYOUT.size)
+    path.unlink()
+    link = DoorLink(Bed("", 1, 1, 1.0, 1.0, 1.0, (), fingers=fingers), orders, orders, "")
 
-    for fingers, identities, held in ((2, (5, 4, 3), [5, 4]), (32, tuple(range(33)), list(range(32)))):
-        orders, path = make_slot(LAYOUT.size)
-        path.unlink()
-        bed = Bed("", 1, 1, 1.0, 1.0, 1.0, (), fingers=fingers)
-        link = DoorLink(bed, orders, orders, "")
+    async def order():
+        link.order(poses(*identities), "me")
 
-        async def order(link=link, identities=identities):
-            link.order(poses(*identities), "me")
-
-        with pytest.raises(FrequentError, match=f"at most {fingers}.*got 1 more"):
-            asyncio.run(order())
-        seen = unpack_order(orders.read() or b"")
-        assert [identity for identity, _ in seen.fingers] == held
+    with pytest.raises(FrequentError, match=f"at most {fingers}.*got 1 more"):
+        asyncio.run(order())
+    seen = unpack_order(orders.read() or b"")
+    assert tuple(identity for identity, _ in seen.fingers) == identities[:fingers]
 
 
 def test_an_order_keeps_what_is_alive_and_its_bytes_are_read_as_they_were_written():
@@ -133,12 +131,22 @@ def lines(side="Right", wrist=WRIST, joints=JOINTS, meta=""):
     return f"{side} wrist{meta}:, {wrist}\n{side} landmarks{meta}:, {numbers}".encode()
 
 
-def tips(*packets):
-    """Return the fingertips that packets show."""
+def take(*packets):
+    """Return the hands that packets show at 1 s."""
     hands = Hands(0.04)
     for packet in packets:
         hands = hands.take(packet, 1.0)
-    return np.array(list(hands.fingers(1.0).values()))
+    return hands
+
+
+def tips(*packets):
+    """Return the fingertips that packets show."""
+    return np.array(list(take(*packets).fingers(1.0).values()))
+
+
+def middle(hands, time):
+    """Return the mean x of the fingertips, m."""
+    return np.mean([tip[0] for tip in hands.fingers(time).values()])
 
 
 def test_fingertips_of_a_quest_are_in_axes_of_the_bed_whatever_the_place_in_the_room():
@@ -152,37 +160,32 @@ def test_fingertips_of_a_quest_are_in_axes_of_the_bed_whatever_the_place_in_the_
     # Turned by 90 degrees about Unity's y, clockwise from above, its fingers point to the right.
     turned = tips(lines(wrist="0, 0, 0, 0, 0.7071, 0, 0.7071"))
     assert_allclose(turned[:, :2], plain[:, [1, 0]] * [1.0, -1.0], atol=1e-4)
-    assert list(Hands(0.04).take(lines(meta=" | f = 12 | t = 123456"), 1.0).fingers(1.0)) == [5, 6, 7, 8, 9]
+    assert list(take(lines(meta=" | f = 12 | t = 123456")).fingers(1.0)) == [5, 6, 7, 8, 9]
 
 
 def test_the_left_hand_is_the_mirrored_right_one():
     x, y, z, a, b, c, w = (float(word) for word in WRIST.split(","))
     mirrored = lines("Left", ", ".join(map(str, (-x, y, z, a, -b, -c, w))), JOINTS * [-1.0, 1.0, 1.0])
     assert_allclose(tips(mirrored), tips(lines()) * [-1.0, 1.0, 1.0], atol=1e-12)
-    assert list(Hands(0.04).take(mirrored, 1.0).take(lines(), 1.0).fingers(1.0)) == list(range(10))
+    assert list(take(mirrored, lines()).fingers(1.0)) == list(range(10))
 
 
 def test_a_hand_is_gone_after_50_ms_and_after_a_second_begins_over_the_middle_again():
-    hands = Hands(0.04).take(lines(), 1.0)
+    hands = take(lines())
     assert len(hands.fingers(1.04)) == 5
     assert hands.fingers(1.06) == {}
     aside = "0.3502" + WRIST[6:]
-    soon, late = (
-        hands.take(lines(wrist=aside), 1.9).fingers(1.9),
-        hands.take(lines(wrist=aside), 2.1).fingers(2.1),
-    )
-    assert np.mean([tip[0] for tip in soon.values()]) == pytest.approx(0.1)
-    assert np.mean([tip[0] for tip in late.values()]) == pytest.approx(0.0, abs=1e-12)
+    soon, late = (middle(hands.take(lines(wrist=aside), time), time) for time in (1.9, 2.1))
+    assert (soon, late) == pytest.approx((0.1, 0.0), abs=1e-12)
 
 
 @pytest.mark.parametrize("pause, seen", [(0.0, 5), (0.9, 5), (1.1, 0), (60.0, 0), (1e5, 0)])
 def test_joints_are_put_on_a_wrist_of_a_second_ago_but_of_none_from_before_a_pause(pause, seen):
-    hands = Hands(0.04).take(lines(), 1.0).take(lines().split(b"\n")[1], 1.0 + pause)
+    hands = take(lines()).take(lines().split(b"\n")[1], 1.0 + pause)
     assert len(hands.fingers(1.0 + pause)) == seen
     # The next wrist places the hand over the middle.
     hands = hands.take(lines(wrist="0.3502" + WRIST[6:]), 1.03 + pause)
-    middle = np.mean([tip[0] for tip in hands.fingers(1.03 + pause).values()])
-    assert middle == pytest.approx(0.1 if seen else 0.0, abs=1e-12)
+    assert middle(hands, 1.03 + pause) == pytest.approx(0.1 if seen else 0.0, abs=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -198,22 +201,14 @@ def test_joints_are_put_on_a_wrist_of_a_second_ago_but_of_none_from_before_a_pau
     ],
 )
 def test_a_hostile_line_is_refused_in_one_line(packet, message):
-    with pytest.raises(ParameterError, match=message) as caught:
-        Hands(0.04).take(packet, 1.0)
-    assert "\n" not in str(caught.value)
+    with refused_in_a_line(ParameterError, message):
+        take(packet)
 
 
 def test_other_lines_are_passed_over_and_a_hand_that_is_not_turned_at_all_does_no_harm():
-    others = [
-        b"",
-        b"\xff\xfe",
-        b"Head pose:, 1, 2",
-        b":::",
-        lines().split(b"\n")[1],
-        b"\n\n",
-        b"wrist right:, 1",
-    ]
-    assert [len(Hands(0.04).take(packet, 1.0).fingers(1.0)) for packet in others] == [0] * len(others)
+    joints = lines().split(b"\n")[1]
+    others = b"", b"\xff\xfe", b"Head pose:, 1, 2", b":::", joints, b"\n\n", b"wrist right:, 1"
+    assert take(*others).fingers(1.0) == {}
     assert np.isfinite(tips(lines(wrist="0, 0, 0, 0, 0, 0, 0"))).all()
 
 
@@ -242,11 +237,7 @@ def point(*fingers):
     pointers = [
         osc("/tuio2/ptr", one, 1, 0, x, y, 0.0, 0.0, 0.01, pressure) for one, x, y, pressure in fingers
     ]
-    ends = (
-        osc("/tuio2/alv", *(one for one, *_ in fingers))
-        if fingers
-        else OscMessageBuilder("/tuio2/alv").build().dgram
-    )
+    ends = osc("/tuio2/alv", *(one for one, *_ in fingers))
     return bundle(osc("/tuio2/frm", 1, 0, 0, "me"), *pointers, ends)
 
 
@@ -255,16 +246,12 @@ PAD = Pad(0.04, 0.08, 0.01)
 
 def test_a_pads_corners_are_the_beds_and_pressure_is_depth():
     old = PAD.take(touch((4, 0.0, 0.0), (5, 1.0, 0.25)), 1.0).fingers(1.0)
-    assert {one: tip.tolist() for one, tip in old.items()} == {
-        4: pytest.approx([-0.04, 0.04, 0.035]),
-        5: pytest.approx([0.04, 0.02, 0.035]),
-    }
+    assert list(old) == [4, 5]
+    assert_near([*old.values()], [[-0.04, 0.04, 0.035], [0.04, 0.02, 0.035]], 1e-9)
     new = PAD.take(point((4, 0.5, 1.0, 1.0), (5, 0.0, 0.0, 0.25), (6, 0.0, 0.0, 0.0)), 1.0).fingers(1.0)
-    assert {one: tip.tolist() for one, tip in new.items()} == {
-        4: pytest.approx([0.0, -0.04, 0.03]),
-        5: pytest.approx([-0.04, 0.04, 0.0375]),
-        6: pytest.approx([-0.04, 0.04, 0.04]),  # it only just touches
-    }
+    assert list(new) == [4, 5, 6]
+    # The last one only just touches.
+    assert_near([*new.values()], [[0.0, -0.04, 0.03], [-0.04, 0.04, 0.0375], [-0.04, 0.04, 0.04]], 1e-9)
     light = PAD.take(point((6, 0.0, 0.0, 0.0)), 1.0)
     assert light.fingers(1.0)[6][2] == pytest.approx(0.035)  # a pad without pressure: half
     light = light.take(point((6, 0.0, 0.0, 0.5)), 1.1).take(point((6, 0.0, 0.0, 0.0)), 1.2)

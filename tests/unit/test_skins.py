@@ -18,6 +18,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.interpolate import LinearNDInterpolator, PchipInterpolator, RegularGridInterpolator
 from scipy.spatial import Delaunay
 
+from tests.assemble import assert_near
 from tests.live_skin import interpolate
 
 ARRANGEMENTS = ("aligned", "staggered", "hexagonal")
@@ -117,7 +118,7 @@ def test_every_edge_has_two_faces_and_all_face_outward(bed):
     assert mesh.area_faces.min() > 0.0
     assert len(np.unique(faces)) == len(vertices)
     tops = np.column_stack([bed.position, bed.height])
-    assert_allclose(vertices[: len(tops)], tops, rtol=0.0, atol=0.51e-7)  # in steps of 0.1 µm
+    assert_near(vertices[: len(tops)], tops, 0.51e-7)  # in steps of 0.1 µm
 
 
 @pytest.mark.parametrize("arrangement", ARRANGEMENTS)
@@ -170,7 +171,7 @@ def test_the_bilinear_skin_of_an_aligned_bed_is_scipys():
     known = RegularGridInterpolator((y, x), formed.height.reshape(7, 9))
     # Points of the edge may be a rounding error outside.
     inside = np.clip(sheet.position, formed.position.min(axis=0), formed.position.max(axis=0))
-    assert_allclose(sheet.height, known(inside[:, ::-1]), rtol=0.0, atol=1e-14)
+    assert_near(sheet.height, known(inside[:, ::-1]), 1e-14)
 
 
 @pytest.mark.parametrize("mirrored", [False, True])
@@ -184,7 +185,7 @@ def test_the_bilinear_skin_of_a_shifted_bed_is_flat_on_the_triangles_of_delaunay
     compared = np.isfinite(known)
     # At the zig-zag ends the hull has triangles that the bed has not, but no point of ours lies in them.
     assert compared.mean() > 0.95
-    assert_allclose(sheet.height[compared], known[compared], rtol=0.0, atol=1e-12)
+    assert_near(sheet.height[compared], known[compared], 1e-12)
 
 
 @pytest.mark.parametrize("arrangement", ARRANGEMENTS)
@@ -212,7 +213,7 @@ def test_a_spline_may_have_its_knots_anywhere(falling, count):
     value, at = random.integers(-2, 3, size=(count, 30)) * 1.0, np.linspace(knot.min(), knot.max(), 101)
     order = np.argsort(knot)
     known = PchipInterpolator(knot[order], value[order])(at)
-    assert_allclose(interpolate_monotone(knot, value, at), known, rtol=0.0, atol=1e-12)
+    assert_near(interpolate_monotone(knot, value, at), known, 1e-12)
 
 
 @pytest.mark.parametrize("skin", SKINS)
@@ -273,7 +274,7 @@ def test_the_skin_goes_through_the_top_of_every_pin(arrangement, kind, parts):
         apart = np.hypot(*(lattice.place[top] - place).T)
         assert apart.min() < 1e-9
         # A point of the surface may have a second one for the sides, of the same height.
-        assert_allclose(skin[top][apart < 1e-9], height[pin], rtol=0, atol=ROUNDING)
+        assert_near(skin[top][apart < 1e-9], height[pin], ROUNDING)
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -288,14 +289,14 @@ def test_inside_the_bed_it_is_the_skin_of_the_exports(kind):
     # The two end the slopes at the outermost pins differently, which the next pin inside feels no more.
     cut = slice(parts, -parts)
     known = exported.reshape(inside.shape)[cut, cut]
-    assert_allclose(inside[cut, cut], known, rtol=0, atol=1e-12)
+    assert_near(inside[cut, cut], known, 1e-12)
 
 
 @pytest.mark.parametrize("rows, columns", [(1, 1), (1, 5), (5, 1), (2, 2)])
 def test_the_smallest_beds_have_a_skin_too(rows, columns):
     lattice = make_lattice(at_rest(rows, columns), 4)
     skin = interpolate(lattice, np.full(rows * columns, 0.04), "smooth")
-    assert_allclose(skin, np.where(lattice.sunk, 0.0, 0.04), rtol=0, atol=ROUNDING)
+    assert_near(skin, np.where(lattice.sunk, 0.0, 0.04), ROUNDING)
 
 
 @pytest.mark.parametrize("arrangement", ARRANGEMENTS)

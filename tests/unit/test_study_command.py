@@ -11,7 +11,7 @@ from digiclay.core.scene.scene_source import Setting, find, load
 from digiclay.core.session.run_scene import run
 
 from digiclay_study.point_series import Range, fit_ranges, read_range
-from tests.scene_files import SCENE, rows, timeless
+from tests.scene_files import SCENE, read_text, rows, timeless, write_text
 
 pytest.importorskip("SALib", reason="digiclay[study] is not installed")
 
@@ -26,7 +26,7 @@ pytestmark = pytest.mark.usefixtures("here")
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory):
     folder = tmp_path_factory.mktemp("study")
-    (folder / "my.toml").write_text(SCENE, encoding="utf-8")
+    write_text(folder / "my.toml", SCENE)
     study = [str(folder / "my.toml") if word == "my.toml" else word for word in STUDY]
     assert main([*study, "--second", "--out", str(folder / "out"), "--quiet"]) == 0
     return folder / "out"
@@ -53,7 +53,7 @@ def test_a_study_leaves_tables_a_page_and_a_plot_and_every_point_is_the_run_with
     assert [row["index"] == "" for row in found] == [row["output"] == "lag_mean" for row in found]
     assert all(float(row["interval (95%, +-)"]) > 0.0 for row in found if row["index"])
     assert (whole / "indices.png").read_bytes()[:4] == b"\x89PNG"
-    page = (whole / "study.md").read_text(encoding="utf-8")
+    page = read_text(whole / "study.md")
     assert "| `control.position_gain` | 100 to 1000, log |" in page
     assert "| `rfd` | N |" in page
     assert (page.count("± "), page.count("It does not vary.")) == (2 * 5 + 1, 1)
@@ -77,7 +77,7 @@ def test_the_command_of_the_page_runs_points_that_are_missing_and_all_is_as_befo
     shutil.copytree(whole, here / "again")
     for path in [*sorted((here / "again" / "points").iterdir())[3::4], here / "again" / "indices.csv"]:
         path.unlink()
-    page = (whole / "study.md").read_text(encoding="utf-8")
+    page = read_text(whole / "study.md")
     command = next(line for line in page.splitlines() if line.startswith("    digiclay study"))
     assert main([*command.split()[1:-1], "again", "--workers", "1", "--quiet"]) == 0
     assert files(Path("again")) == files(whole)
@@ -91,7 +91,7 @@ def test_runs_that_fail_are_counted_and_leave_no_hole_in_the_indices(here):
     found = rows(here / "out" / "points.csv")
     failed = [row for row in found if row["error"]]
     assert 0 < len(failed) < len(found) - 1
-    assert f"| {len(failed)} | 0 |" in (here / "out" / "study.md").read_text(encoding="utf-8")
+    assert f"| {len(failed)} | 0 |" in read_text(here / "out" / "study.md")
     assert all(row["index"] for row in rows(here / "out" / "indices.csv"))
 
 
@@ -99,7 +99,7 @@ def test_runs_that_fail_are_counted_and_leave_no_hole_in_the_indices(here):
 def test_the_time_a_study_takes_is_less_in_batches_where_there_are_some(fingers, batches, here, capsys):
     bed, _, path = SCENE.partition("[trajectory]")
     fingers_of = "".join(f"[[finger]]\n[finger.trajectory]{path}" for _ in range(fingers))
-    (here / "my.toml").write_text(bed + fingers_of, encoding="utf-8")
+    write_text(here / "my.toml", bed + fingers_of)
     ranges = ["--vary", "control.position_gain=100:1000", "--vary", "contact.stiffness=200:300"]
     options = ["--samples", "4", "--workers", "1", "--metric", "rfd", "--out", "out"]
     assert main(["study", "my.toml", *ranges, *options]) == 0
@@ -215,6 +215,6 @@ def test_what_is_no_range_of_the_parameter_is_refused_with_key_rule_and_value(sa
 
 
 def test_a_file_that_is_wrong_by_itself_is_told_first(tmp_path):
-    (tmp_path / "my.toml").write_text("[layout]\nrows = 0\n", encoding="utf-8")
+    write_text(tmp_path / "my.toml", "[layout]\nrows = 0\n")
     with pytest.raises(DigiclayError, match="rows"):
         fit_ranges([read_range("a.b=1:2")], tmp_path / "my.toml", ())

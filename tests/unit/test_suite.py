@@ -28,7 +28,7 @@ from digiclay_study.method_trials import (
     place_trial,
 )
 from tests.own_methods import forgotten, write_method
-from tests.scene_files import folder_with, left, scene_text
+from tests.scene_files import folder_with, left, read_text, scene_text, write_text
 
 SCENE = scene_text(11, 11, (0.0, 0.041), (0.1, 0.036), (0.2, 0.036))
 BOTH = ("virtual_master", "hybrid")
@@ -37,7 +37,7 @@ BOTH_METHODS = [*SHORT, "--methods", ",".join(BOTH), "--out", "league", "--quiet
 
 
 def read_table(path):
-    lines = path.read_text(encoding="utf-8").splitlines()
+    lines = read_text(path).splitlines()
     comments = [line for line in lines if line.startswith("#")]
     return comments, list(csv.DictReader(line for line in lines if not line.startswith("#")))
 
@@ -77,9 +77,9 @@ def test_the_folder_holds_plots_and_tables_with_a_row_a_trial_that_differs_by_se
 
 
 def test_tables_and_page_name_their_origin_and_no_other_suite_goes_there(league, refused, monkeypatch):
-    identity = json.loads((league / "suite.json").read_text(encoding="utf-8"))["scenes"]
+    identity = json.loads(read_text(league / "suite.json"))["scenes"]
     comments, _ = read_table(league / "league.csv")
-    page = (league / "index.html").read_text(encoding="utf-8")
+    page = read_text(league / "index.html")
     command = "digiclay compare my.toml --suite --methods virtual_master,hybrid"
     for text in ("\n".join(comments), page):
         assert [word for word in (identity, command, "seeds 1 to 2", "noise 2 mN") if word not in text] == []
@@ -117,7 +117,7 @@ def test_a_mistake_is_one_line_and_leaves_nothing(words, said, here, refused):
 
 
 def test_a_scene_without_a_finger_has_no_suite(here, refused):
-    (here / "my.toml").write_text("finger = []\nsimulation.duration = 1\n", encoding="utf-8")
+    write_text(here / "my.toml", "finger = []\nsimulation.duration = 1\n")
     refused(["compare", "my.toml", "--suite"], "scene.fingers must be at least 1 (got 0)")
     assert left(here) == []
 

@@ -26,7 +26,7 @@ from digiclay.core.studies.series import finish
 
 from tests.other_process import PROGRAM, start
 from tests.other_process import finish as finish_process
-from tests.scene_files import interrupt_after, scene_text, timeless
+from tests.scene_files import interrupt_after, read_text, scene_text, timeless, write_text
 from tests.scene_files import rows as read_table
 from tests.timeouts import TIMEOUT, wait_until
 
@@ -44,7 +44,7 @@ def rows(folder):
 
 def kept(folder):
     found = sorted(Path(folder).glob("points/*"))
-    return {path.name: json.loads(path.read_text(encoding="utf-8")) for path in found}
+    return {path.name: json.loads(read_text(path)) for path in found}
 
 
 READ = {
@@ -140,10 +140,10 @@ def test_finished_points_are_kept_for_another_metric_too_and_unreadable_ones_run
     assert main([*GAINS, "--metric", "highest"]) == 0
     assert float(rows("out")[0]["highest (m)"]) > 0.03
     assert kept("out") == files
-    (points / "000001.json").write_text('{"figures"', encoding="utf-8")
+    write_text(points / "000001.json", '{"figures"')
     assert main(GAINS) == 0
     assert timeless(here / "out/sweep.csv") == before
-    (points / "000000.json").write_text('{"figures": {"rfd": 42.0}}', encoding="utf-8")
+    write_text(points / "000000.json", '{"figures": {"rfd": 42.0}}')
     assert main([*GAINS, "--workers", "2"]) == 0
     assert rows("out")[0]["rfd (N)"] == "42.0"
 
@@ -192,12 +192,12 @@ def test_a_sweep_estimates_errors_at_the_ends_of_what_varies_and_says_where(caps
     assert "estimated at 4 of 9 points: 0, 2, 6, 8\n" in said
     # A sweep whose estimates were stopped, or that an older version made, goes on to them alone.
     file = Path("grid/points/000006.json")
-    record = json.loads(file.read_text(encoding="utf-8"))
+    record = json.loads(read_text(file))
     record["figures"] = {
         name: value for name, value in record["figures"].items() if "_error" not in name[-6:]
     }
     record["figures"]["rfd"] = 7.0
-    file.write_text(json.dumps(record), encoding="utf-8")
+    write_text(file, json.dumps(record))
     before = {name: value for name, value in kept("grid").items() if name != file.name}
     assert main([*sweep, "--quiet"]) == 0
     assert kept("grid").items() >= before.items()

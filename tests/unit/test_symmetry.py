@@ -16,6 +16,7 @@ from digiclay.strokes.nominal import find_nominal
 from digiclay.strokes.stroke import ALONE, FINISHING, PRESSING, YIELDING, Brush, lay_path, make_images
 from numpy.testing import assert_allclose, assert_array_equal
 
+from tests.assemble import assert_near
 from tests.hand import finish, heights
 
 #: Pins on a side, their distance, m, and the height at which the fingertip waits, m.
@@ -104,7 +105,7 @@ def test_images_form_alike_in_the_time_of_one_and_are_replayed_bit_for_bit(metho
     table = 1e3 * heights(session).reshape(COUNT, COUNT) - 40.0
     part = np.roll(table, (-row, -column), (0, 1))[5:-5, 5:-5]
     # Valves place pins to 1 µm; pins that only give way differ by the order in which fingertips press them.
-    assert_allclose(part, turn(part), rtol=0, atol=0.03 if method == "plastic" else 2e-3)
+    assert_near(part, turn(part), 0.03 if method == "plastic" else 2e-3)
     assert np.abs(part).max() > 2.5
     assert (session.poses.shape, session.system.fingers, len(session.gestures)) == ((1, 7), 1, 1)
     take = keep(session)
@@ -244,7 +245,7 @@ def test_rays_leave_their_nominal_surface_whenever_the_hand_lets_go(drawn):
     session, force, _ = follow_to_the_end(session)
     assert force < 0.6
     nominal = find_nominal(laid, sculpting.find_device(session), np.full(COUNT**2, 40e-3))
-    assert_allclose(heights(session), nominal.height, rtol=0, atol=2e-6)
+    assert_near(heights(session), nominal.height, 2e-6)
 
 
 def test_there_are_no_more_fingertips_than_a_bed_can_have_and_the_others_stay():
@@ -318,13 +319,13 @@ def test_settings_and_fingertips_change_in_the_middle_of_a_stroke(change):
     assert_allclose(pressing, force, rtol=0.1)
     done = finish(session)
     table = 1e3 * heights(done).reshape(COUNT, COUNT)
-    assert_allclose(table, np.rot90(table), rtol=0, atol=2e-3)
+    assert_near(table, np.rot90(table), 2e-3)
     assert done.system.fingers == len(numbers)
     back = done
     while back.gestures:  # a change is where another one begins
         back = sculpting.rewind(back)
         assert back.system.fingers == len(numbers)
-    assert_allclose(heights(back), 40e-3, rtol=0, atol=1e-9)
+    assert_near(heights(back), 40e-3, 1e-9)
 
 
 def test_a_session_begins_from_the_state_that_was_kept_in_the_middle_of_a_stroke():

@@ -11,7 +11,7 @@ from digiclay.core.scene.toml_table import format_scene
 from digiclay.core.session.run_scene import run
 
 from digiclay_study.tune_command import find_front, find_knee
-from tests.scene_files import SMALL_BLISTER, interrupt_after, rows, timeless
+from tests.scene_files import SMALL_BLISTER, interrupt_after, read_text, rows, timeless, write_text
 
 pytest.importorskip("optuna", reason="digiclay[study] is not installed")
 
@@ -41,7 +41,7 @@ pytestmark = pytest.mark.usefixtures("here")
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory):
     folder = tmp_path_factory.mktemp("tune")
-    (folder / "my.toml").write_text(SCENE, encoding="utf-8")
+    write_text(folder / "my.toml", SCENE)
     command = ["tune", str(folder / "my.toml"), *VARIED, *SMALL, "--generations", "4"]
     assert main([*command, "--out", str(folder / "out"), "--quiet"]) == 0
     return folder / "out"
@@ -67,7 +67,7 @@ def test_a_tuning_leaves_tables_a_plot_and_a_scene_that_gives_the_same_metrics(w
     near = np.isclose(values(whole / "front.csv"), [metrics["rfd"], metrics["lag_mean"]], rtol=1e-9)
     assert np.all(near, axis=1).any()
     # A preset of Blender is a file of this text.
-    assert (whole / "chosen.toml").read_text(encoding="utf-8") == format_scene(scene)
+    assert read_text(whole / "chosen.toml") == format_scene(scene)
     assert scene.name == "my_tuned"
     assert scene.description.startswith("Chosen by digiclay tune from 32 runs, knee of the front: rfd ")
 
@@ -99,7 +99,7 @@ def test_points_of_another_search_are_refused_and_without_any_contact_there_is_n
     one.write_bytes(other.read_bytes())
     refused([*TUNE, "--generations", "4"], "out holds points of another version of optuna")
     shutil.rmtree(here / "out")
-    (here / "my.toml").write_text(SCENE.replace("0.038", "0.045"), encoding="utf-8")
+    write_text(here / "my.toml", SCENE.replace("0.038", "0.045"))
     refused([*TUNE, "--generations", "1"], "No run has both metrics without losing the fingertip")
 
 
