@@ -230,7 +230,7 @@ class CellStatesControl:
         return memory, commands
 
     def sort(self, memory: Patch) -> bool:
-        """Return what is the same for all fingers that are served together: all are."""
+        """Return one key for all fingers: they are served together."""
         return True
 
     def locate_all(

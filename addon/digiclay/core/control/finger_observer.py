@@ -123,19 +123,19 @@ class FingerObserver:
     def _follow(
         self, memories: list[Follower], touched: Measurement, cells: tuple[Cells, Cells], sections: Whole
     ) -> list[Follower]:
-        """Fit the fingertips, but those not felt, those that hold, and those that have jumped.
+        """Fit the fingertips that are felt, unless they hold; those that have jumped are found anew.
 
-        `cells`, those whose force is felt, and those under a predicted fingertip.
+        `cells`: those whose force is felt, and those under a predicted fingertip.
         """
         (felt, here), force = cells, touched.force
         counts, bounds = sections.find_bounds(felt), sections.find_bounds(here)
-        total, after, fits = list[float](), list(memories), [False] * len(memories)
+        totals, after, fits = sections.add(force), list(memories), [False] * len(memories)
         for i, memory in enumerate(memories):
             # Forces under the predicted fingertip are felt where they are more than their noise together.
             if counts[i] == counts[i + 1] and not self._is_felt(force.take(here[bounds[i] : bounds[i + 1]])):
                 touched.own[self.at.residual, sections.parts[i]] = 0.0
                 after[i] = self.loss.wait(memory)
-            elif memory.period % EVERY and self.holds(memory, (total := total or sections.add(force))[i]):
+            elif memory.period % EVERY and self.holds(memory, totals[i]):
                 after[i] = memory._replace(alone=0) if memory.alone else memory
             else:
                 fits[i] = True
@@ -158,7 +158,7 @@ class FingerObserver:
         return float(np.add.reduce(force)) > self.felt * math.sqrt(force.size)
 
     def holds(self, memory: Follower, force: float) -> bool:
-        """Tell whether a fingertip is slow, and a total force, N, near the set point: then less is solved."""
+        """Tell whether a fingertip is slow and its force, N, near the set point: it is fitted less often."""
         _, _, _, vx, vy, vz, *_ = memory.estimate.mean.tolist()
         return abs(force - self.asked) <= self.near and math.hypot(vx, vy, vz) <= SLOW
 
@@ -211,7 +211,7 @@ class FingerObserver:
                 heading = update_heading(memory.heading, x, y, self.travel)
                 after.append(memory._replace(estimate=estimate, heading=heading, alone=0))
             else:
-                # No fingertip is that quick: these undersides are not its own.
+                # No fingertip is that fast: another one has these undersides.
                 left[part] = 0.0
                 after.append(memory._replace(alone=0))
         touched.own[self.at.residual, here] = left

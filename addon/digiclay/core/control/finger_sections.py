@@ -1,6 +1,7 @@
-"""Cells of several fingers, one after the other or in columns, in the formulas of one finger, and sums.
+"""Layouts of the cells of several fingers: one finger's after the other's, or in columns.
 
-Arrays are (m,) or (r, m), of m cells; numbers of the fingers are lists of f.
+The formulas of one finger hold for several: `Whole` lets them combine numbers of fingers, lists of f, with
+arrays of m cells, (m,) or (r, m).
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ import numpy as np
 from ..base.arrays import Cells, Flags, Floats, count_true, find_copies, find_first_largest
 from ..model.layout import RELATIVE_TOLERANCE
 
-#: Where a pin stands that makes up the number of a finger's, m: beyond every blister.
+#: Coordinate of a pin that only fills up a column, m: beyond every blister; and its basis.
 BEYOND = 1e3
 OUTSIDE = np.array([1.0, BEYOND, BEYOND, *(BEYOND**2,) * 3])[:, None]
 
@@ -27,11 +28,11 @@ class Whole:
     parts: Sequence[slice] = (slice(None),)
 
     def spread(self, numbers: Sequence[Any]) -> Any:
-        """Return numbers, or tuples of r numbers, of the fingers such that arrays combine with them."""
+        """Return one number per finger, or a tuple of r, in a form that arrays combine with."""
         return numbers[0]
 
     def repeat(self, values: Floats) -> Floats:
-        """Return values (..., f) of the fingers such that arrays (..., m) combine with them."""
+        """Return values (..., f), one per finger, in a form that arrays (..., m) combine with."""
         return values
 
     def cut(self, values: Any) -> list[Any]:
@@ -39,7 +40,7 @@ class Whole:
         return [values]
 
     def reduce(self, ufunc: np.ufunc, values: Floats) -> Floats:
-        """Return what a ufunc makes of the values (..., m) of each finger, (..., f)."""
+        """Return the values (..., m) of each finger, reduced by a ufunc, (..., f)."""
         reduced: Floats = ufunc.reduce(values, -1, None, None, True)
         return reduced
 
@@ -49,7 +50,7 @@ class Whole:
         return sums
 
     def average(self, values: Floats, test: Flags, instead: list[float]) -> list[float]:
-        """Return the mean of values where a test holds, or where it holds nowhere what is instead."""
+        """Return the mean of each finger's values where a test holds; `instead`: where it holds nowhere."""
         count = count_true(test)
         return [float(values.dot(test)) / count] if count else instead
 
@@ -59,11 +60,11 @@ class Whole:
         return rows
 
     def find_bounds(self, cells: Cells) -> list[int]:
-        """Return where in some of the cells, in ascending order, those of each finger begin, and the end."""
+        """Return where in a selection of the cells, ascending, each finger's begin, and the end."""
         return [0, cells.size]
 
     def pick(self, cells: Cells, wanted: list[bool]) -> tuple[Cells, list[int], Whole]:
-        """Return those of some cells whose finger is wanted, the fingers that have any, their sections."""
+        """Return those of a selection whose finger is wanted, the fingers that have any, their sections."""
         return cells, [0] if wanted[0] and cells.size else [], self
 
 

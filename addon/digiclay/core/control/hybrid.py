@@ -226,7 +226,7 @@ class HybridControl:
         return memory, commands
 
     def sort(self, memory: Follower) -> Phase | None:
-        """Return what is the same for all fingers that are served together; None: one is served alone."""
+        """Return the phase: fingers of one phase are served together; None: Method I serves it, alone."""
         return memory.phase if memory.master.phase is IDLE else None
 
     def locate_all(
@@ -315,7 +315,7 @@ class HybridControl:
         coasting: Coasting,
         sections: Whole,
     ) -> list[Follower]:
-        """Turn forces into the heights of tops; without contact go back to where it was felt."""
+        """Move tops to where the forces reach the set point; without contact, to the last height with it."""
         forces, tops = sections.add(seen.force), list[Top | None]()
         for memory, force, part in zip(memories, forces, sections.parts, strict=True):
             if memory.period % EVERY and not memory.alone and self._observer.holds(memory, force):
@@ -410,7 +410,7 @@ class HybridControl:
         sections: Whole,
         tops: list[Top | None],
     ) -> None:
-        """Find, in place, the tops at which predicted forces add up to the set point, with the sums."""
+        """Set, in place, the tops at which predicted forces add up to the set point, and these sums."""
         (near,) = (region.cells.distance <= self.contact_radius + TIE).nonzero()
         wanted = [not (top or memory.alone) for top, memory in zip(tops, memories, strict=True)]
         near, fingers, picked = sections.pick(near, wanted)
