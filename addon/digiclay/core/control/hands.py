@@ -115,7 +115,7 @@ class HandTogether(HandControl):
         self, memory: Hands, touched: Measurement, pins: Cells, owner: Cells, under: Floats
     ) -> list[Located]:
         """Let each controller see all pressed pins, but no force on those of other fingers."""
-        owner = self.division.flatten(memory, touched, owner, under, pins)
+        owner = self.division.assign_by_tips(memory, touched, owner, under, pins)
         columns = touched._replace(
             quadratic_basis=touched.quadratic_basis[:, pins, None],
             height=touched.height[pins, None],

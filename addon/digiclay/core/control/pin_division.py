@@ -158,7 +158,7 @@ class PinDivision:
         near = (owner == NOBODY) & (distances < np.inf).any(axis=0)
         return np.where(near, fingers[find_first_largest(-distances)], owner)
 
-    def flatten(
+    def assign_by_tips(
         self, memory: Hands, touched: Measurement, owner: Cells, under: Floats, pressed: Cells
     ) -> Cells:
         """Return the owners of pressed pins by fingertips that are less tall than wide.
