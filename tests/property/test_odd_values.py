@@ -3,7 +3,6 @@
 `DIGICLAY_HYPOTHESIS=many` tries a hundred times as many odd inputs.
 """
 
-import copy
 import io
 import itertools
 import json
@@ -43,16 +42,14 @@ from tests.assemble import path
 
 Draw = Callable[[st.SearchStrategy[Any]], Any]
 
-#: Numbers at the ends of what there is, and beyond; and what is no number.
-NUMBERS = st.sampled_from([
-    0, 0.0, -0.0, 1, -1, 5e-324, 1e-310, 2.3e-308, 1e-200, 1e-30, 1e-12, 1e-9, 1e-6, 1e-3, 0.5, 1e3, 1e6, 1e9,
-    1e12, 1e30, 1e100, 1e200, 1.7e308, -5e-324, -1e-9, -1e308, float("inf"), float("-inf"), float("nan"),
-    2**31, 2**53, 2**63, 10**19, 10**30, 10**308, 10**309, 10**400, -(10**400), True,
-])  # fmt: skip
-OTHERS = st.sampled_from([
-    "", "a", "1e400 mm", "5e-324 mm", "-1 mm", "nan s", "inf Pa", "1 parsec", "absent", "\0", None, [], {},
-    [[]], [1, 2], [1e308] * 4, [5e-324] * 3, [0.0] * 4, {"a": 1}, ["a"], "é" * 50,
-]).map(copy.deepcopy)  # fmt: skip
+#: Numbers, those at the ends of what there is and beyond among them; and what is no number.
+NUMBERS = st.one_of(
+    st.floats(), st.integers(), st.sampled_from([1e-9, 1e-6, 1e-3, 0.5, 1e3, 10**309, -(10**400), True])
+)
+OTHERS = st.one_of(
+    st.text(max_size=3), st.lists(NUMBERS, max_size=4), st.dictionaries(st.just("a"), NUMBERS), st.none(),
+    st.sampled_from(["1e400 mm", "5e-324 mm", "-1 mm", "nan s", "inf Pa", "1 parsec", "absent", "é" * 50]),
+)  # fmt: skip
 #: Types of arrays that no file of ours has.
 TYPES = st.sampled_from(
     ["M8[s]", "m8[s]", "c16", "U3", "S2", "?", "i8", "u1", "f4", "f2", "f16", ">f8", "V8", "f4,i4"]
@@ -60,7 +57,7 @@ TYPES = st.sampled_from(
 #: Most cells and control periods of a session that is begun, and numbers of a row that it announces.
 CELLS, PERIODS, RECORDED = 200, 3, 1_000_000
 #: One of so many is true.
-OFTEN, SELDOM, RARELY = (st.integers(0, last).map(lambda number: number == 0) for last in (1, 4, 19))
+OFTEN, SELDOM, RARELY = (st.integers(0, last).map(lambda number: number == 0) for last in (1, 3, 19))
 POSE = [0.0, 0.0, 37e-3, 1.0, 0.0, 0.0, 0.0]
 
 
@@ -98,7 +95,7 @@ def make_tables(draw: Draw) -> dict[str, Any]:
     method = draw(st.sampled_from([*METHODS, ABSENT]))
     tables = parse_tables(write_scene(method)) | {"preset": draw(st.sampled_from(list(PRESETS)))}
     given = sorted({*SECTIONS, "trajectory"} & tables.keys() - {"layout", "control", "blister"})
-    for section in draw(st.sets(st.sampled_from(given))):
+    for section in draw(st.sets(st.sampled_from(given), min_size=len(given) // 2)):
         del tables[section]
     for section in OPTIONAL:
         if section != "control" and draw(RARELY):
@@ -110,7 +107,7 @@ def make_tables(draw: Draw) -> dict[str, Any]:
     if draw(SELDOM):
         # The same finger none, one or two times in a list.
         finger = {section: tables.pop(section) for section in FINGER_SECTIONS if section in tables}
-        tables[FINGERS] = make_odd(draw, [finger]) if draw(RARELY) else [finger] * draw(st.integers(0, 2))
+        tables[FINGERS] = make_odd(draw, [finger]) if draw(OFTEN) else [finger] * draw(st.integers(0, 2))
     return tables
 
 
@@ -261,7 +258,7 @@ def evaluate_run(draw: Draw) -> None:
 
 @pytest.mark.parametrize(
     ("use", "count"),
-    [(begin_scene, 100), (go_on, 150), (replay_take, 100), (evaluate_run, 100)],
+    [(begin_scene, 200), (go_on, 120), (replay_take, 80), (evaluate_run, 80)],
 )
 def test_what_is_odd_is_taken_or_refused_in_one_line(use: Callable[[Draw], None], count: int) -> None:
     refusals: list[str] = []
