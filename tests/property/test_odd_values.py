@@ -317,6 +317,12 @@ def test_steps_whose_plan_would_fill_the_memory_and_waypoints_at_one_time_are_re
     assert said in str(caught.value)
 
 
+@pytest.mark.parametrize("waypoints", [[], [3], {"time": 0}, 5e-324])
+def test_waypoints_that_are_no_list_of_tables_are_refused_by_name(waypoints: object) -> None:
+    with pytest.raises(DigiclayError, match=r"waypoints must .* \(got"):
+        resolve({"trajectory": {"waypoints": waypoints}})
+
+
 SYSTEM, KEPT = press_half("virtual_master")
 
 
