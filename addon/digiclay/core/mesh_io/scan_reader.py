@@ -128,17 +128,17 @@ class _Element:
             fields.append((part.name, self.order + part.code, (size,) if part.length else ()))
         return np.dtype(fields)
 
-    def measure(self, body: bytes, place: int) -> tuple[tuple[int, ...], int]:
+    def measure(self, body: bytes, at: int) -> tuple[tuple[int, ...], int]:
         """Return the lengths of a row's lists, 1 for a number, and where the row ends."""
         sizes = []
         for part in self.properties:
             size = 1
             if part.length:
-                size = int(struct.unpack_from(self.order + part.length, body, place)[0])
-                place += struct.calcsize(part.length)
+                size = int(struct.unpack_from(self.order + part.length, body, at)[0])
+                at += struct.calcsize(part.length)
             sizes.append(size)
-            place += struct.calcsize(part.code) * size
-        return tuple(sizes), place
+            at += struct.calcsize(part.code) * size
+        return tuple(sizes), at
 
     def read(self, body: bytes, start: int) -> tuple[dict[str, list[NDArray[Any]]], int]:
         """Return the values by property, arrays (rows[, length of a list]), and where they end."""
@@ -161,9 +161,9 @@ class _Element:
         if start > len(body):
             raise ValueError("its lists end behind the file")
         octets, groups = np.frombuffer(body, np.uint8), []
-        for sizes, places in starts.items():
+        for sizes, rows in starts.items():
             row = self.make_row(sizes)
-            groups.append(octets[np.add.outer(places, np.arange(row.itemsize))].view(row)[:, 0])
+            groups.append(octets[np.add.outer(rows, np.arange(row.itemsize))].view(row)[:, 0])
         return groups, start
 
 
@@ -194,8 +194,8 @@ def _read_ply(data: bytes, name: str) -> tuple[Floats, Indices]:
     if "face" not in tables:
         raise make_refusal("must have faces", name, f"only {' and '.join(tables)} elements")
     vertices, faces = tables["vertex"], tables["face"]
-    places = np.column_stack([np.concatenate(vertices[axis]).astype(np.float64) for axis in "xyz"])
-    return places, _cut(next(faces[word] for word in CORNERS if word in faces), name)
+    points = np.column_stack([np.concatenate(vertices[axis]).astype(np.float64) for axis in "xyz"])
+    return points, _cut(next(faces[word] for word in CORNERS if word in faces), name)
 
 
 def _read_head(head: str) -> tuple[bool, list[_Element]]:
@@ -241,7 +241,7 @@ def _read_off(data: bytes, name: str) -> tuple[Floats, Indices]:
     refuse_many_triangles(name, max(faces, count // 3))
     if len(lines) < count + faces:
         raise make_refusal(WHOLE, name, f"{len(lines):,} of its {count + faces:,} lines")
-    places = np.array([line[:3] for line in lines[:count]], np.float64).reshape(-1, 3)
+    points = np.array([line[:3] for line in lines[:count]], np.float64).reshape(-1, 3)
     polygons = []
     for line in lines[count : count + faces]:
         corners = int(line[0])
@@ -249,7 +249,7 @@ def _read_off(data: bytes, name: str) -> tuple[Floats, Indices]:
         if polygon.shape[1] != corners:
             raise make_refusal(WHOLE, name, f"a face of {corners} corners without them")
         polygons.append(polygon)
-    return places, _cut(polygons, name)
+    return points, _cut(polygons, name)
 
 
 READERS = {".stl": _read_stl, ".ply": _read_ply, ".off": _read_off}

@@ -304,10 +304,10 @@ def _read_discs(gathered: dict[str, Any]) -> tuple[list[Disc | None], list[Disc 
     return [_read_disc(finger["reach"]) for finger in fingers], [_read_disc(disc) for disc in controls]
 
 
-def change_fingers(former: System, system: System, state: State, kept: Sequence[int | None]) -> State:
+def change_fingers(former: System, system: System, state: State, origins: Sequence[int | None]) -> State:
     """Return a state for another number of fingers, of beds and methods that are otherwise the same.
 
-    `kept`: which of the former fingers each one was; None: it is new. `state` is used up.
+    `origins`: for each finger the number of the former one it was; None: it is new. Overwrites `state`.
     """
     former.selection.release(state)
     fresh, old, new = begin(system), former.rows, system.rows
@@ -316,19 +316,19 @@ def change_fingers(former: System, system: System, state: State, kept: Sequence[
     rows[system.cell.lag_rows] = state.rows[former.cell.lag_rows]
     rows[new.commands.start : new.force] = state.rows[old.commands.start : old.force]
     pressing = state.rows[old.pressing] if old.fingers else state.rows[old.force][None]
-    rows[new.force] = sum(pressing[was] for was in kept if was is not None)
+    rows[new.force] = sum(pressing[origin] for origin in origins if origin is not None)
     rows[new.sensed] = state.rows[old.sensed]
-    _take_fingers(rows[system.cell.pulp_rows], state.rows[former.cell.pulp_rows], former.fingers, kept)
+    _take_fingers(rows[system.cell.pulp_rows], state.rows[former.cell.pulp_rows], former.fingers, origins)
     # Behind the display of a shape stands the memory of the method.
     after, before = (getattr(memory, "method", memory) for memory in (fresh.memory, state.memory))
     if isinstance(after, Hands) or isinstance(before, Hands):
-        begun, had = (
-            list(memory.fingers) if isinstance(memory, Hands) else [memory] for memory in (after, before)
-        )
+        begun, had = (list(each.fingers) if isinstance(each, Hands) else [each] for each in (after, before))
         # A controller with other rows per cell begins anew.
         if new.control * former.fingers == old.control * system.fingers:
-            _take_fingers(rows[new.controlled], state.rows[old.controlled], former.fingers, kept)
-            begun = [new if was is None else had[was] for new, was in zip(begun, kept, strict=True)]
+            _take_fingers(rows[new.controlled], state.rows[old.controlled], former.fingers, origins)
+            for finger, origin in enumerate(origins):
+                if origin is not None:
+                    begun[finger] = had[origin]
         before = after._replace(fingers=tuple(begun)) if isinstance(after, Hands) else begun[0]
     else:
         rows[new.controlled] = state.rows[old.controlled]
@@ -340,13 +340,13 @@ def change_fingers(former: System, system: System, state: State, kept: Sequence[
     return bed._replace(active=system.selection.take(bed, chosen))
 
 
-def _take_fingers(into: Floats, of: Floats, former: int, kept: Sequence[int | None]) -> None:
+def _take_fingers(into: Floats, of: Floats, former: int, origins: Sequence[int | None]) -> None:
     """Copy rows (r, n) of former fingers to those of fingers, in place; either may have more at the end."""
-    parts, sources = np.split(into, len(kept)), np.split(of, former)
-    for part, was in zip(parts, kept, strict=True):
-        if was is not None:
-            least = min(len(part), len(sources[was]))
-            part[:least] = sources[was][:least]
+    parts, sources = np.split(into, len(origins)), np.split(of, former)
+    for part, origin in zip(parts, origins, strict=True):
+        if origin is not None:
+            least = min(len(part), len(sources[origin]))
+            part[:least] = sources[origin][:least]
 
 
 def _read_disc(values: Any) -> Disc | None:

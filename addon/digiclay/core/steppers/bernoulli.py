@@ -282,7 +282,7 @@ class StepWorkspace:
         self.stops = Constants((0.0, cell.actuator.stroke))[every]
 
     def __call__(self, under: Floats) -> Floats:
-        """Move the block on by one control period, in place; see `interfaces.Movement`."""
+        """Move the block by one control period, in place; see `interfaces.Movement`."""
         self.open_valves()
         self.lag[:] = self.opening_after
         self._conduct()

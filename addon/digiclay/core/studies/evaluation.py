@@ -198,7 +198,7 @@ def evaluate(
 def _make_record(result: Result, *, errors: bool) -> Record:
     """Return the record of a finished session, with `ERRORS` only if they were requested."""
     names = [name for name in FIGURES if errors or name not in ERRORS]
-    notes = {name: found for name in NOTED if (found := result.metrics.get(name))}
+    notes = {name: result.metrics[name] for name in NOTED if result.metrics.get(name)}
     return {"figures": {name: result.metrics.get(name) for name in names}, **notes}
 
 
