@@ -1,6 +1,6 @@
 """Beds put together part by part for tests: every part at its default unless a test names another."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Any
@@ -12,47 +12,47 @@ from digiclay.core.base.modes import Mode
 from digiclay.core.control.blister import Blister
 from digiclay.core.control.travel import Heading
 from digiclay.core.control.virtual_master import Master, Phase, VirtualMaster
-from digiclay.core.engine.simulation import System, begin, periods
+from digiclay.core.engine.simulation import begin, periods
 from digiclay.core.engine.state import State
 from digiclay.core.model.actuator import Actuator, Supply
 from digiclay.core.model.conduit import Conduit
 from digiclay.core.model.contact import Contact
-from digiclay.core.model.control_interface import Commands, Measurement
+from digiclay.core.model.control_interface import Commands
 from digiclay.core.model.delay import Delay
 from digiclay.core.model.fingertip import LEVEL, Fingertip, compute_forms, compute_underside
 from digiclay.core.model.lag import ValveLag
 from digiclay.core.model.layout import Layout
 from digiclay.core.model.relaxation import Relaxation
-from digiclay.core.model.trajectory import Path, Trajectory, make_level
+from digiclay.core.model.trajectory import Path, make_level
 from digiclay.core.model.valve import Fluid, Valve
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.scene_source import Setting, find, load
 from digiclay.core.scene.schema import Finger, Scene, Simulation
 from digiclay.core.scene.toml_table import resolve
 from digiclay.core.session import snapshot
-from digiclay.core.session.take import Take, replay
+from digiclay.core.session.take import replay
 from numpy.typing import NDArray
 
 
-def table(columns: str, rows: Mapping[str, Any]) -> pytest.MarkDecorator:
+def table(columns, rows):
     """Give a test each row of a table; the sentence before a row names it."""
     return pytest.mark.parametrize(columns, list(rows.values()), ids=list(rows))
 
 
-def assert_near(found: object, wanted: object, apart: float) -> None:
+def assert_near(found, wanted, apart):
     """Assert that numbers are no farther from those wanted than this, each."""
     np.testing.assert_allclose(found, wanted, rtol=0, atol=apart)
 
 
 @contextmanager
-def refused_in_a_line(error: type[Exception], words: str) -> Iterator[pytest.ExceptionInfo[Exception]]:
+def refused_in_a_line(error, words):
     """Assert that what is done here is refused, in one line that has some words (a pattern)."""
     with pytest.raises(error, match=words) as caught:
         yield caught
     assert "\n" not in str(caught.value)
 
 
-def path(*waypoints: tuple[float, float, float, float], interpolation: str = "smooth") -> Trajectory:
+def path(*waypoints, interpolation="smooth"):
     """Return the path of a level finger through waypoints (time in s, then x, y, z in mm)."""
     table = np.array(waypoints, float)
     return make_level(table[:, 0], table[:, 1:] * 1e-3, interpolation)
@@ -68,14 +68,14 @@ class Motion:
 
     height: Callable[[Floats], Floats]
 
-    def poses(self, times: Floats) -> Floats:
+    def poses(self, times):
         """Return poses (k, 7)."""
         poses = np.tile([0.0, 0.0, 0.0, *LEVEL], (times.size, 1))
         poses[:, 2] = self.height(times)
         return poses
 
 
-def fitting(layout: Layout) -> Blister:
+def fitting(layout):
     """Return the default blister, made smaller where it would be wider than the bed."""
     share = min(1.0, max(layout.columns * layout.pitch, layout.rows * layout.row_spacing) / 30e-3)
     usual = Blister()
@@ -83,17 +83,17 @@ def fitting(layout: Layout) -> Blister:
 
 
 def make_system(
-    layout: Layout | None = None,
+    layout=None,
     *,
-    stepper: str = "bernoulli",
-    period: float = 5e-3,
-    step: float = 1e-3,
-    dead_time: float = 1e-3,
-    control: VirtualMaster | Callable[[float], Any] | None = None,
-    blister: Blister | None = None,
-    others: Sequence[Mapping[str, Any]] = (),
-    **parts: Any,
-) -> System:
+    stepper="bernoulli",
+    period=5e-3,
+    step=1e-3,
+    dead_time=1e-3,
+    control=None,
+    blister=None,
+    others=(),
+    **parts,
+):
     """Return a bed; parts that are None are left out, and without `control` every valve stays shut.
 
     `others`: what further fingers have unlike the first.
@@ -128,22 +128,22 @@ class Scripted:
 
     rows = 0
 
-    def begin(self) -> int:
+    def begin(self):
         """Return the number of periods done."""
         return 0
 
-    def locate(self, memory: int, touched: Measurement) -> tuple[int, tuple[float, float, float]]:
+    def locate(self, memory, touched):
         """Ask for the whole bed."""
         return memory, (0.0, 0.0, 1.0)
 
-    def command(self, memory: int, seen: Measurement) -> tuple[int, Commands]:
+    def command(self, memory, seen):
         """Command what the script says."""
         _, x, y, *_ = seen.quadratic_basis
         command = np.broadcast_to(self.script(memory * self.period, x, y), x.shape).astype(float)
         return memory + 1, Commands(seen.target.copy(), np.full(x.size, Mode.HOLD, np.int8), command)
 
 
-def scripted(script: Callable[[float, Floats, Floats], Any]) -> Callable[[float], Scripted]:
+def scripted(script):
     """Return a scripted controller for `make_system`; `script` takes time, x and y."""
     return lambda period: Scripted(script, period)
 
@@ -162,17 +162,17 @@ class Record:
     last: State
 
 
-def whole(state: State) -> Floats:
+def whole(state):
     """Return all rows of all cells, (r, n)."""
     return np.array([state.row(index) for index in range(len(state.rows))])
 
 
 def record(
-    system: System,
-    trajectory: Trajectory | Motion | Sequence[Trajectory | Motion],
-    count: int,
-    state: State | None = None,
-) -> Record:
+    system,
+    trajectory,
+    count,
+    state=None,
+):
     """Simulate `count` control periods, of a finger or several; row 0 is the state handed in."""
     fingers = trajectory if isinstance(trajectory, Sequence) else [trajectory]
     state = state.copy() if state else begin(system)
@@ -188,28 +188,28 @@ def record(
     return Record(time, kept[:, 0], kept[:, system.rows.force], command, mode, kept, memory, state)
 
 
-def replayed(take: Take) -> bool:
+def replayed(take):
     """Tell whether a take played again ends in the very same state, bit for bit."""
     *_, last = replay(take)
     return snapshot.dump(assemble(take.scene), last) == take.end
 
 
-def make_basis(x: Floats, y: Floats) -> Floats:
+def make_basis(x, y):
     """Return rows 1, x, y, x², x y, y² of some places."""
     return np.array([np.ones(x.size), x, y, x * x, x * y, y * y])
 
 
-def under(outline: Floats, x: Floats, y: Floats) -> Floats:
+def under(outline, x, y):
     """Return the finger's underside, (k, n), m, for outlines (k, 10)."""
     return compute_underside(*compute_forms(outline), make_basis(x, y))
 
 
-def one_cell(**parts: Any) -> System:
+def one_cell(**parts):
     """Return a bed of a single cell at the origin."""
     return make_system(Layout(rows=1, columns=1), **parts)
 
 
-def master(*toward: float, **known: Any) -> Master:
+def master(*toward, **known):
     """Return a master that shapes at the bed's center, 5 mm above it, and travels some way or none."""
     start = Master(Phase.SHAPING, height=45e-3, reference=40e-3, edge=40e-3)
     return start._replace(heading=Heading(0.0, 0.0, *toward), **known)
@@ -229,12 +229,12 @@ STACKABLE = {
 }
 
 
-def sample(name: str, *settings: str) -> Scene:
+def sample(name, *settings):
     """Return a sample scene with some settings, ``key=value``."""
     return load(find(name), [Setting(*setting.split("=")) for setting in settings])
 
 
-def followed(method: str, way: Sequence[tuple[float, ...]], cells: int = 15, **sections: Any) -> Scene:
+def followed(method, way, cells=15, **sections):
     """Return a scene of a square bed whose fingertip goes through places (time in s, then x, y, z in mm)."""
     points = [{"time": t, "position": [x * 1e-3, y * 1e-3, z * 1e-3]} for t, x, y, z in way]
     layout = {"rows": cells, "columns": cells, **sections.pop("layout", {})}
@@ -242,7 +242,7 @@ def followed(method: str, way: Sequence[tuple[float, ...]], cells: int = 15, **s
     return resolve({"layout": layout, "control": {"method": method}, "trajectory": trajectory, **sections})
 
 
-def beginning(name: str, lasting: float, stepper: str, step: float, *settings: str) -> Scene:
+def beginning(name, lasting, stepper, step, *settings):
     """Return at most the first seconds of a sample scene, with a stepper and a physics step, s."""
     stepped = (f"simulation.stepper={stepper}", f"simulation.physics_step={step}")
     scene = sample(name, *stepped, *settings)
@@ -250,7 +250,7 @@ def beginning(name: str, lasting: float, stepper: str, step: float, *settings: s
     return replace(scene, simulation=replace(scene.simulation, duration=duration))
 
 
-def moved(known: Scene, x: float, z: float, lasting: float | None = None, pace: float = 1.0) -> Scene:
+def moved(known, x, z, lasting=None, pace=1.0):
     """Return a scene of the same way elsewhere, m, in a share of its time, that lasts so long, s."""
     points = tuple(
         replace(point, time=point.time * pace, position=tuple(np.add(point.position, (x, 0.0, z))))

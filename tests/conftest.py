@@ -4,7 +4,6 @@ import gc
 import os
 import shlex
 import tempfile
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -43,13 +42,13 @@ WINDOW = Path(__file__).parent / "window"
 gc.disable()
 
 
-def pytest_collection_finish() -> None:
+def pytest_collection_finish():
     """Begin to collect garbage."""
     gc.freeze()
     gc.enable()
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+def pytest_collection_modifyitems(items):
     """Skip the window's tests where no Blender with a window is named."""
     if os.environ.get("DIGICLAY_BLENDER_WINDOW"):
         return
@@ -60,7 +59,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 
 @pytest.fixture
-def quick_machine(monkeypatch: pytest.MonkeyPatch) -> None:
+def quick_machine(monkeypatch):
     """Leave out no control period: what a test forms must not depend on the machine's load."""
     from digiclay.core.session import live_session
 
@@ -68,7 +67,7 @@ def quick_machine(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.fixture
-def here(request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def here(request, tmp_path, monkeypatch):
     """Work in an empty folder with one scene, my.toml: the module's SCENE, or a tap on 3 x 4 pins."""
     from tests.scene_files import SCENE, folder_with
 
@@ -78,11 +77,11 @@ def here(request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.Mon
 
 
 @pytest.fixture
-def refused(capsys: pytest.CaptureFixture[str]) -> Callable[[list[str] | str, str], None]:
+def refused(capsys):
     """Give a check that a command ends with exit code 2 and one line that has some words."""
     from digiclay.cli import main
 
-    def check(line: list[str] | str, said: str) -> None:
+    def check(line, said):
         arguments = shlex.split(line) if isinstance(line, str) else line
         code, (out, err) = main(arguments), capsys.readouterr()
         assert (code, out, err.count("\n"), said in err) == (2, "", 1, True), err

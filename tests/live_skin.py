@@ -1,11 +1,9 @@
 """Heights of the live skin by numpy, to compare with those of Blender's geometry nodes."""
 
 import numpy as np
-from digiclay.core.base.arrays import Floats
-from digiclay.device.skin_lattice import SkinLattice
 
 
-def interpolate(lattice: SkinLattice, height: Floats, kind: str) -> Floats:
+def interpolate(lattice, height, kind):
     """Return the heights of a skin, as the geometry nodes of a bed work them out, m."""
     for step in (lattice.along, lattice.across):
         before, after = height - height[step.previous], height[step.following] - height

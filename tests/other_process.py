@@ -4,7 +4,6 @@ import os
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any
 
 from tests.timeouts import TIMEOUT
 
@@ -15,14 +14,14 @@ PACKAGES = os.pathsep.join([str(ROOT / "addon"), str(ROOT)])
 PROGRAM = "from digiclay.cli import console; console()"
 
 
-def dead() -> int:
+def dead():
     """Return the number of a process that has ended."""
     process = subprocess.Popen([sys.executable, "-c", ""])
     process.wait(TIMEOUT)
     return process.pid
 
 
-def start(script: str, *arguments: str, env: dict[str, str] | None = None, **options: Any) -> Any:
+def start(script, *arguments, env=None, **options):
     """Start Python on a script that may import the package."""
     return subprocess.Popen(
         [sys.executable, "-c", script, *arguments], text=True, encoding="utf-8", stdin=subprocess.PIPE,
@@ -31,7 +30,7 @@ def start(script: str, *arguments: str, env: dict[str, str] | None = None, **opt
     )  # fmt: skip
 
 
-def finish(process: Any) -> tuple[int, str, str]:
+def finish(process):
     """Wait for a process; return exit code, stdout and stderr."""
     try:
         out, err = process.communicate(timeout=TIMEOUT)

@@ -1,14 +1,10 @@
 """Control methods of one's own as files, for the tests."""
 
-from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
 
-import pytest
 from digiclay.cli import main
 from digiclay.core.control.methods import list_added, remove_method
 from digiclay.core.scene.scene_source import Setting, find, load
-from digiclay.core.scene.schema import Scene
 
 HEAD = '''
 """Method of a test."""
@@ -50,7 +46,7 @@ PLACED = (
 )
 
 
-def write_method(folder: Path, text: str = PAD, name: str = "pad.py") -> Path:
+def write_method(folder, text=PAD, name="pad.py"):
     """Write the file of a method, and return it."""
     path = folder / name
     path.write_text(text, encoding="utf-8")
@@ -58,7 +54,7 @@ def write_method(folder: Path, text: str = PAD, name: str = "pad.py") -> Path:
 
 
 @contextmanager
-def forgotten() -> Iterator[None]:
+def forgotten():
     """Make methods that the block adds unknown again at its end."""
     before = list_added()
     try:
@@ -68,14 +64,14 @@ def forgotten() -> Iterator[None]:
             remove_method(name)
 
 
-def small(method: str, *settings: str) -> Scene:
+def small(method, *settings):
     """Return a press on a small bed with a method."""
     said = ("layout.rows=11", "layout.columns=11", "simulation.duration=0.2", *settings)
     changes = [Setting(*one.split("=", 1)) for one in said]
     return load(find("tap"), [Setting("control.method", method), *changes])
 
 
-def refused(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
+def refused(capsys, *arguments):
     """Return the line with which the command refuses."""
     assert main(list(arguments)) == 2
     said = capsys.readouterr().err

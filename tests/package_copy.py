@@ -11,14 +11,14 @@ from tests.timeouts import TIMEOUT
 ROOT = Path(__file__).parents[1]
 
 
-def copy_package(folder: Path) -> Path:
+def copy_package(folder):
     """Copy the package into a folder; return it."""
     name = "addon/digiclay"
     shutil.copytree(ROOT / name, folder / name, ignore=shutil.ignore_patterns("__pycache__"))
     return folder
 
 
-def run_python(copy: Path, *arguments: str) -> str:
+def run_python(copy, *arguments):
     """Run Python on the copy; return what it printed."""
     done = subprocess.run(
         [sys.executable, *arguments], env={"PYTHONPATH": str(copy / "addon"), "PATH": ""},
@@ -28,12 +28,12 @@ def run_python(copy: Path, *arguments: str) -> str:
     return done.stdout
 
 
-def find_changes(copy: Path) -> list[str]:
+def find_changes(copy):
     """Return the Python files of the copied package that are new or differ, sorted by name."""
     return sorted(_compare(dircmp(ROOT / "addon" / "digiclay", copy / "addon" / "digiclay")))
 
 
-def _compare(compared: dircmp[str]) -> list[str]:
+def _compare(compared):
     """Return the files that are new or differ in the second of two folders."""
     names = [*compared.right_only, *compared.diff_files]
     return [

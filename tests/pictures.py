@@ -1,7 +1,6 @@
 """Pictures that ImageMagick wrote of known numbers, and their brightness; see samples/README.md."""
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from PIL import Image, TiffImagePlugin
@@ -29,14 +28,14 @@ BLENDER = {
 }  # fmt: skip
 
 
-def find_brightness(name: str) -> np.ndarray:
+def find_brightness(name):
     """Return the brightness of a picture, of 65535, the upper row first; what is clear is black."""
     weights = (1.0, 0.0, 0.0) if name.startswith(("gray", "palette")) else (0.299, 0.587, 0.114)
     bright = sum(weight * channel for weight, channel in zip(weights, COLORS, strict=True))
     return np.asarray(bright * (ALPHA if "alpha" in name or "rgba" in name else 1.0))
 
 
-def measure_error(name: str, read: np.ndarray) -> float:
+def measure_error(name, read):
     """Return the largest error of a picture as read, the lowest row first and of any scale, of 65535."""
     known = find_brightness(name)
     found = np.asarray(read, np.float64)[::-1]
@@ -52,7 +51,7 @@ STORED = {
 }  # fmt: skip
 
 
-def write_turned(path: Any, orientation: int) -> None:
+def write_turned(path, orientation):
     """Write the letter as a camera does that was held so."""
     pixels = np.kron(STORED[orientation] * 20, np.ones((8, 8))).astype(np.uint8)
     exif = Image.Exif()
@@ -60,7 +59,7 @@ def write_turned(path: Any, orientation: int) -> None:
     Image.fromarray(pixels).save(path, exif=exif, quality=100)
 
 
-def write_geotiff(path: Any, kind: str, absent: str, *, big: bool = False) -> np.ndarray:
+def write_geotiff(path, kind, absent, *, big=False):
     """Write a slope from -40 to 900 m whose left half has no data, as GDAL marks it; return the heights."""
     heights = np.tile(np.linspace(-40.0, 900.0, 12), (10, 1)).astype(kind)
     heights[:, :6] = float(absent)

@@ -1,11 +1,10 @@
 """The volume under a skin, reckoned without the solid that it is compared with."""
 
 import numpy as np
-from digiclay.core.base.arrays import Floats
 from digiclay.core.surface.formed import find_base_level, make_skin
 
 
-def prism_volume(place: Floats, height: Floats, rows: int, columns: int, base: float | None = None) -> float:
+def prism_volume(place, height, rows, columns, base=None):
     """Return the volume between the skin and the base, m³.
 
     Exact: the sum over the triangles of area in plan times mean height above the base, which is

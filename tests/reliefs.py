@@ -1,25 +1,21 @@
 """Beds with a relief of pins that stand still, and strokes that smooth it, for tests."""
 
 import numpy as np
-from digiclay.core.base.arrays import Floats
 from digiclay.core.base.modes import Mode
 from digiclay.core.control.exchange import make_exchange
 from digiclay.core.control.orders import ORDER, Orders, Verb
 from digiclay.core.engine.simulation import begin
-from digiclay.core.engine.state import State
-from digiclay.core.engine.system import System
 from digiclay.core.model.fingertip import LEVEL
-from digiclay.core.model.layout import Grid
 
 
-def make_spike_and_ridge(grid: Grid) -> Floats:
+def make_spike_and_ridge(grid):
     """Return a relief over the bed at rest, (n,), m: a pin 10 mm high, and a ridge of 6 mm beside it."""
     relief = 6e-3 * np.exp(-(((grid.y + 9e-3) / 4e-3) ** 2))
     relief[grid.at(np.array([0.0]), np.array([0.0]))] += 10e-3
     return relief
 
 
-def heighten(system: System, relief: Floats) -> State:
+def heighten(system, relief):
     """Return the state of a bed whose pins stand still at a relief (n,), m above rest."""
     state = begin(system)
     height = system.cell.actuator.rest_height + relief
@@ -29,9 +25,9 @@ def heighten(system: System, relief: Floats) -> State:
 
 
 def make_orders(
-    periods: int, start: float, end: float, y: float, radius: float, settle: int = 60,
-    verb: Verb = Verb.AVERAGE,
-) -> Orders:  # fmt: skip
+    periods, start, end, y, radius, settle = 60,
+    verb = Verb.AVERAGE,
+):  # fmt: skip
     """Return the orders of a stroke along a row, m, at full strength, and of a wait (control periods)."""
     rows = np.zeros((periods + settle, ORDER))
     rows[:periods, 0] = np.linspace(start, end, periods)
@@ -40,12 +36,12 @@ def make_orders(
     return Orders(rows)
 
 
-def stay_away(periods: int) -> Floats:
+def stay_away(periods):
     """Return the path of a finger that meets nothing, (t + 1, 1, 7)."""
     return np.tile([0.0, 0.0, 0.2, *LEVEL], (periods + 1, 1, 1))
 
 
-def measure_roughness(grid: Grid, height: Floats) -> float:
+def measure_roughness(grid, height):
     """Return the rms of how far the pins are off the mean of their neighbors, m; exact but for a factor."""
     cells = np.arange(grid.count)
     # Ten times what the exchange of so short a time moves.

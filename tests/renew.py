@@ -7,7 +7,6 @@ are. Commit the differences with their reason, and add it to `samples/README.md`
 
 import json
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from digiclay.core.base.quantity import list_quantities
@@ -16,12 +15,11 @@ from digiclay.core.engine.simulation import periods
 from digiclay.core.model.valve import Fluid
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.scene_source import load
-from digiclay.core.scene.schema import SECTIONS, Scene, import_parameters
+from digiclay.core.scene.schema import SECTIONS, import_parameters
 from digiclay.core.session import snapshot
 from digiclay.core.session.accuracy import estimate_errors
-from digiclay.core.session.run_scene import Result, run
+from digiclay.core.session.run_scene import run
 from digiclay.core.session.take import from_bytes, replay
-from numpy.typing import NDArray
 
 from tests.assemble import one_cell, path, record, sample, scripted
 
@@ -29,7 +27,7 @@ SAMPLES = Path(__file__).parent / "samples"
 GOLDEN = SAMPLES / "golden.json"
 
 
-def run_golden(*settings: str) -> dict[str, Any]:
+def run_golden(*settings):
     """Return forces, N, and heights, mm, of the first nine seconds of the paper's session.
 
     ``forces``: in total, every second; ``heights``: at the end, of every eighth pin that is off its rest by
@@ -44,7 +42,7 @@ def run_golden(*settings: str) -> dict[str, Any]:
     }
 
 
-def run_turbulent() -> dict[str, Any]:
+def run_turbulent():
     """Return heights, mm, and forces, N, of a pin that is pressed while its valve follows a script."""
     system = one_cell(
         fluid=Fluid(viscosity=1.6e-9), control=scripted(lambda t, x, y: 0.05 * np.sin(40.0 * t))
@@ -56,7 +54,7 @@ def run_turbulent() -> dict[str, Any]:
     }
 
 
-def list_declarations() -> dict[str, list[Any]]:
+def list_declarations():
     """Return default, unit and bounds of every parameter of a scene, by section, method and name."""
     return {
         f"{section} {method} {name}": [
@@ -69,7 +67,7 @@ def list_declarations() -> dict[str, list[Any]]:
     }  # fmt: skip
 
 
-def go_on(file: Path) -> dict[str, NDArray[np.float64]]:
+def go_on(file):
     """Return heights and forces of 50 periods from a state, or heights of a take, every tenth row."""
     if file.suffix == ".take":
         return {"height": np.array([state.row(0) for state in replay(from_bytes(file.read_bytes()))][::10])}
@@ -85,19 +83,19 @@ def go_on(file: Path) -> dict[str, NDArray[np.float64]]:
     }
 
 
-def run_again(scene: Scene, metrics: dict[str, Any]) -> Result:
+def run_again(scene, metrics):
     """Return the run of a scene, with its errors where its metrics have them."""
     result = run(scene)
     errors = estimate_errors(scene, result.history) if "height_error" in metrics else None
     return result.with_errors(errors) if errors else result
 
 
-def collect_golden() -> dict[str, Any]:
+def collect_golden():
     """Return the present numbers and declarations."""
     return {**run_golden(), **run_turbulent(), "parameters": list_declarations()}
 
 
-def renew() -> None:
+def renew():
     """Write all of it."""
     GOLDEN.write_text(json.dumps(collect_golden(), indent=1) + "\n", encoding="utf-8")
     for file in sorted([*SAMPLES.glob("states/*.state"), *SAMPLES.glob("takes/*.take")]):

@@ -7,14 +7,12 @@ import re
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache, partial
 from pathlib import Path
-from typing import Any
 
-from websockets.sync.client import ClientConnection, connect
+from websockets.sync.client import connect
 
 from tests.timeouts import TIMEOUT
 
@@ -34,7 +32,7 @@ class Server:
     osc_port: int
     report: Path
 
-    def connect(self, wishes: str = "", token: str = TOKEN, **options: Any) -> ClientConnection:
+    def connect(self, wishes="", token=TOKEN, **options):
         """Return a client's connection."""
         header = {"Authorization": f"Bearer {token}"} if token else {}
         address = f"ws://127.0.0.1:{self.port}/{wishes}"
@@ -42,25 +40,25 @@ class Server:
             address, additional_headers=header, compression=None, **{"close_timeout": 1.0, **options}
         )
 
-    def count(self, name: str) -> int:
+    def count(self, name):
         """Return a count of the doors."""
         with self.connect("?rate=0") as client:
             client.recv(TIMEOUT)
             client.send('{"type": "status"}')
             return int(json.loads(client.recv(TIMEOUT))["counts"].get(name, 0))
 
-    def stop(self, number: int = signal.SIGINT) -> dict[str, Any]:
+    def stop(self, number=signal.SIGINT):
         """Stop the server; return its report."""
         self.process.send_signal(number)
         out, err = self.process.communicate(timeout=TIMEOUT)
         assert self.process.returncode == 0, out + err
         assert err == ""
-        report: dict[str, Any] = json.loads(self.report.read_text(encoding="utf-8"))
+        report = json.loads(self.report.read_text(encoding="utf-8"))
         return report
 
 
 @cache
-def load_example(name: str) -> Any:
+def load_example(name):
     """Return a program of docs/examples as a module."""
     spec = importlib.util.spec_from_file_location(name, ROOT / "docs" / "examples" / f"{name}.py")
     assert spec
@@ -70,13 +68,13 @@ def load_example(name: str) -> Any:
     return module
 
 
-def frame_message(packed: bytes) -> bytes:
+def frame_message(packed):
     """Return a binary message of up to 125 bytes as RFC 6455 has it, masked by zeros."""
     return bytes([0x82, 0x80 | len(packed), 0, 0, 0, 0]) + packed
 
 
 @contextmanager
-def serve(folder: Path, *options: str, rate: int = 200) -> Iterator[Server]:
+def serve(folder, *options, rate=200):
     """Run a server of a small bed, and end it with the block."""
     settings = [word for one in SMALL for word in ("--set", one)]
     command = [sys.executable, "-m", "digiclay", "serve", *settings, "--rate", str(rate), "--port", "0"]

@@ -1,14 +1,12 @@
 """Press strokes of every brush in sessions without Blender, and the shape that they leave."""
 
 import numpy as np
-from digiclay.core.base.arrays import Floats
 from digiclay.core.model.fingertip import LEVEL
 from digiclay.core.model.layout import Layout
 from digiclay.sessions import sculpting
-from digiclay.sessions.running import Running
 from digiclay.sessions.sculpting import change_stroke, queue_stroke
 from digiclay.settings.devices import BEDS, make_scene
-from digiclay.strokes.stroke import Brush, draw
+from digiclay.strokes.stroke import draw
 
 from tests import hand
 from tests.hand import heights, let_go
@@ -19,7 +17,7 @@ Places = list[tuple[float, float]]
 CHUNK = 64
 
 
-def begin_bed(name: str, rows: int, columns: int) -> Running:
+def begin_bed(name, rows, columns):
     """Return a session on a part of a bed that Add offers."""
     scene = make_scene("paper", Layout(rows, columns, BEDS[name].pitch), "virtual_master", BEDS[name].share)
     above = np.array([0.0, 0.0, 46e-3, *LEVEL])
@@ -27,7 +25,7 @@ def begin_bed(name: str, rows: int, columns: int) -> Running:
     return sculpting.advance(session, above, 0.0, 100)
 
 
-def queue(session: Running, ends: Places, brush: Brush, depth: float = 15.0, share: float = 1.0) -> Running:
+def queue(session, ends, brush, depth=15.0, share=1.0):
     """Queue a quick stroke straight from place to place, mm."""
     places = np.array(ends) * 1e-3
     way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(places, axis=0).T))])
@@ -40,7 +38,7 @@ def queue(session: Running, ends: Places, brush: Brush, depth: float = 15.0, sha
     return let_go(session, number)
 
 
-def finish(session: Running, most: float = 60.0) -> Running:
+def finish(session, most=60.0):
     """Let the session go on until its strokes are finished and the pins at rest, at most so long, s."""
     last = session.state.period + round(most / hand.PERIOD)
     while session.strokes and session.state.period < last:
@@ -49,19 +47,19 @@ def finish(session: Running, most: float = 60.0) -> Running:
     return hand.go_on(session, 15)
 
 
-def form(session: Running, ends: Places, brush: Brush, depth: float = 15.0, share: float = 1.0) -> Running:
+def form(session, ends, brush, depth=15.0, share=1.0):
     """Queue a stroke and finish it."""
     return finish(queue(session, ends, brush, depth, share))
 
 
-def relief(session: Running) -> Floats:
+def relief(session):
     """Return the heights above rest, (rows, columns), mm; rows along y."""
     layout = session.scene.layout
     risen = 1e3 * (heights(session) - session.system.cell.actuator.rest_height)
     return risen.reshape(layout.rows, layout.columns)
 
 
-def measure_spikes(formed: Floats) -> float:
+def measure_spikes(formed):
     """Return how far the worst pin is above or below all 8 pins about it, or the 16 about those, mm."""
     worst = 0.0
     rows, columns = formed.shape

@@ -1,13 +1,12 @@
 """How long tests wait for other processes: so much longer than any takes that only what hangs is given up."""
 
 import time
-from collections.abc import Callable
 
 #: A process that starts in a second takes fifteen on a slow machine that is busy; beyond this it hangs, s.
 TIMEOUT = 240.0
 
 
-def wait_until(holds: Callable[[], object]) -> None:
+def wait_until(holds):
     """Wait until something holds."""
     deadline = time.monotonic() + TIMEOUT
     while not holds():

@@ -12,7 +12,6 @@ from contextlib import redirect_stderr
 from html import unescape
 from io import BytesIO, StringIO
 from pathlib import Path
-from typing import Any
 
 import matplotlib.image
 import numpy as np
@@ -56,7 +55,7 @@ def folder(tmp_path, monkeypatch):
     return folder
 
 
-def write(said: str) -> Path:
+def write(said):
     path = Path("two.toml").resolve()
     path.write_text(said, encoding="utf-8")
     return path
@@ -89,7 +88,7 @@ def test_a_scene_beside_the_jobs_file_is_found_from_any_folder(tmp_path, monkeyp
 
 
 @pytest.mark.parametrize(
-    ("said", "told"),
+    "said, told",
     [
         ("", "scenes must be a list of scenes"),
         ("scenes = []", "scenes must be a list of scenes"),
@@ -169,7 +168,7 @@ b = { simulation.duration = 1e4, recorder.every = 1000 }
 """
 
 
-def started() -> Any:
+def started():
     """Start a batch of sessions of hours in a process of its own; return it when both have begun."""
     write(HOURS)
     process = start(PROGRAM, "batch", "two.toml", "--jobs", "2", start_new_session=True)
@@ -177,21 +176,21 @@ def started() -> Any:
     return process
 
 
-def runs() -> list[str]:
+def runs():
     """Return what lies in the folder of runs, hidden things too."""
     return sorted(path.name for path in Path("two/runs").iterdir())
 
 
-def index() -> str:
+def index():
     return Path("two/index.html").read_text(encoding="utf-8")
 
 
 def test_every_job_leaves_a_whole_folder_and_the_page_links_to_it(capsys, monkeypatch):
     write(TWO)
-    pages: list[str] = []
+    pages = []
     write_index = Folder.write_index
 
-    def keep(*given: Any) -> Path:
+    def keep(*given):
         path = write_index(*given)
         pages.append(index())
         return path
@@ -278,7 +277,7 @@ def test_when_a_batch_is_killed_its_processes_end_and_a_process_that_dies_is_tol
 
 
 @pytest.mark.parametrize(
-    ("arguments", "said", "told"),
+    "arguments, said, told",
     [
         ([], 'scenes = ["tap"]\nexport = ["doc"]', "export: "),
         ([], 'scenes = ["tap"]\nexport = ["stl"]\nsettings.a.recorder = "absent"', "need a recorder"),
@@ -294,7 +293,7 @@ def test_a_mistake_is_refused_in_one_line_before_any_work(arguments, said, told,
     assert [path.name for path in Path().iterdir()] == ["two.toml"]
 
 
-def read(made: str) -> list[str]:
+def read(made):
     """Return what a page refers to; its tags are closed."""
     tags = re.findall(r"<(/?)(\w+)", made)
     opened, closed = (Counter(tag for end, tag in tags if end == kind) for kind in ("", "/"))
@@ -347,14 +346,14 @@ AGAIN = 'http-equiv="refresh"'
 JOB, RUN = Path("two/jobs/tap-quick"), Path("two/runs/tap-quick")
 
 
-def prepare(said: str = ENDLESS) -> None:
+def prepare(said=ENDLESS):
     """Write the files of the jobs, none of which is done."""
     write(said)
     with redirect_stderr(StringIO()):
         assert call("batch two.toml --prepare --quiet") == int("narrow" in said)
 
 
-def written(run: Path = RUN) -> int:
+def written(run=RUN):
     """Return when a run was written, ns."""
     return (run / "history.npz").stat().st_mtime_ns
 
@@ -406,7 +405,7 @@ def test_a_folder_outside_the_series_is_replaced_only_when_asked(refused):
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    "words, said",
     [
         ("--frames 0-9", "--frames must be given with --only film or --only turntable."),
         ("--only run --frames 0-9", "--frames must be given with --only film"),
@@ -421,13 +420,13 @@ def test_a_part_that_cannot_be_done_is_refused_in_one_line(words, said, refused)
     assert list(Path("two/runs").iterdir()) == []
 
 
-RANGES: dict[str, tuple[int, int] | None] = {
+RANGES = {
     "0-24": (0, 25), "7": (7, 8), "50+25": (50, 60), "59+1": (59, 60), "0-59": (0, 60), " 3-3 ": (3, 4),
     **dict.fromkeys(["", "a", "1-", "-3", "5-2", "0-60", "60", "60+1", "3+0", "1e2", "٣"]),
 }  # fmt: skip
 
 
-@pytest.mark.parametrize(("text", "ends"), RANGES.items())
+@pytest.mark.parametrize("text, ends", RANGES.items())
 def test_a_range_of_frames_reads_back_and_one_that_is_none_is_refused(text, ends):
     if ends is None:
         with pytest.raises(OutputError, match="--frames must be "):

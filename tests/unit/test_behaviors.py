@@ -1,36 +1,33 @@
 """The behaviors: what each commands, remembers and refuses on measurements handed to it; and their parts."""
 
 import re
-from typing import Any
 
 import numpy as np
 import pytest
 from digiclay.core.base.errors import ParameterError
 from digiclay.core.base.modes import Mode
 from digiclay.core.control.displays import SHAPES, evaluate_shape
-from digiclay.core.control.drive import Drive
 from digiclay.core.control.exchange import make_exchange
-from digiclay.core.model.control_interface import Commands, Measurement
-from digiclay.core.model.layout import Grid, Layout, make_grid
+from digiclay.core.model.control_interface import Measurement
+from digiclay.core.model.layout import ARRANGEMENTS, Layout, make_grid
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.toml_table import resolve
 
 from tests.assemble import master
 
 BEHAVIORS = ("elastic", "plastic", "viscous", "push_pull", "force_display", "shape_display")
-ARRANGEMENTS = ("aligned", "staggered", "hexagonal")
 REST = 40e-3
 #: Speed of a free pin at full valve without a conduit, m/s, two digits.
 FREE = 24e-3
 
 
-def control(method: str, **known: Any) -> Any:
+def control(method, **known):
     """Return a behavior, put together for a bed of 5 x 5 cells, without conduits."""
     table = {"layout": {"rows": 5, "columns": 5}, "conduit": "absent", "control": {"method": method, **known}}
     return assemble(resolve(table)).controller
 
 
-def seen(behavior: Any, height: Any = 0.0, force: Any = 0.0, target: Any = 0.0, mode: int = 0) -> Measurement:
+def seen(behavior, height=0.0, force=0.0, target=0.0, mode=0):
     """Return a measurement of the whole 5 x 5 bed: heights above rest in mm, forces in mN."""
     x, y = np.tile((np.arange(5) - 2.0) * 3e-3, 5), np.repeat((np.arange(5) - 2.0) * 3e-3, 5)
     full = np.zeros(25)
@@ -45,12 +42,12 @@ def seen(behavior: Any, height: Any = 0.0, force: Any = 0.0, target: Any = 0.0, 
     )
 
 
-def middle(value: float) -> np.ndarray:
+def middle(value):
     """Return a row of the bed that is 0 but in the middle."""
     return np.where(np.arange(25) == 12, value, 0.0)
 
 
-def orders(behavior: Any, measurement: Measurement) -> Commands:
+def orders(behavior, measurement):
     memory, _ = behavior.locate(behavior.begin(), measurement)
     return behavior.command(memory, measurement)[1]
 
@@ -97,7 +94,7 @@ TABLE = 2e-5 * FREE
 
 
 @pytest.mark.parametrize(
-    ("method", "known", "given", "speed"),
+    "method, known, given, speed",
     [
         # Elastic: 20 N/m x 3 mm = 60 mN balance; (20 N/m x 1 mm - 60 mN) / 5 N s/m.
         ("elastic", {"stiffness": 20.0}, {"height": -3.0, "force": 60.0}, 0.0),
@@ -122,7 +119,7 @@ def test_a_cell_moves_by_its_law(method, known, given, speed):
 
 
 @pytest.mark.parametrize(
-    ("method", "known", "given", "target", "mode"),
+    "method, known, given, target, mode",
     [
         pytest.param("plastic", {}, {"height": -2.0, "force": 50.0}, -2e-3, None, id="yields"),
         pytest.param("plastic", {}, {"height": -1.0, "force": 50.0, "target": -2.0}, -2e-3, None, id="low"),
@@ -154,7 +151,7 @@ def test_a_cell_of_the_force_display_is_kept_for_its_release_time_after_the_fing
 
 
 @pytest.mark.parametrize(
-    ("diffusivity", "sunk"), [(10e-6, [7, 11, 12, 13, 17]), (0.0, [12])], ids=["with neighbors", "alone"]
+    "diffusivity, sunk", [(10e-6, [7, 11, 12, 13, 17]), (0.0, [12])], ids=["with neighbors", "alone"]
 )
 def test_a_dent_draws_its_neighbors_along_and_the_cells_asked_for_hold_them(diffusivity, sunk):
     behavior = control("viscous", diffusivity=diffusivity)
@@ -170,7 +167,7 @@ def test_a_dent_draws_its_neighbors_along_and_the_cells_asked_for_hold_them(diff
     assert radius == pytest.approx((np.hypot(3e-3, 3e-3) if diffusivity else 0.0) + 6e-3)
 
 
-def cycle(behavior: Any, measurement: Measurement) -> Commands:
+def cycle(behavior, measurement):
     """Return the orders at the end of a cycle of listening."""
     memory = behavior.begin()
     for _ in range(2):
@@ -198,7 +195,7 @@ def test_push_pull_never_reads_the_force_and_listens_down_as_fast_as_up():
 
 
 @pytest.mark.parametrize(
-    ("drift", "dragged"), [(-0.09, 0.0), (-0.11, -0.01), (0.09, 0.0), (0.11, 0.01), (-0.5, -0.4), (0.5, 0.4)]
+    "drift, dragged", [(-0.09, 0.0), (-0.11, -0.01), (0.09, 0.0), (0.11, 0.01), (-0.5, -0.4), (0.5, 0.4)]
 )
 def test_a_drift_beyond_the_threshold_is_a_touch_that_takes_the_commanded_height_along(drift, dragged):
     behavior = control("push_pull", threshold=0.1e-3)
@@ -208,7 +205,7 @@ def test_a_drift_beyond_the_threshold_is_a_touch_that_takes_the_commanded_height
 
 
 # The pyramid's first row is at rest already; 11 periods of 5 ms are the first to be longer than 52.5 ms.
-@pytest.mark.parametrize(("patience", "starts"), [(0.0525, [0, 11, 22, 33]), (0.05, [0, 10, 20, 30])])
+@pytest.mark.parametrize("patience, starts", [(0.0525, [0, 11, 22, 33]), (0.05, [0, 10, 20, 30])])
 def test_a_move_of_blocked_pins_waits_for_its_patience(patience, starts):
     behavior = control("shape_display", shape="pyramid", refresh="one_time", patience=patience)
     blocked, memory, moves = seen(behavior), behavior.begin(), []
@@ -218,11 +215,11 @@ def test_a_move_of_blocked_pins_waits_for_its_patience(patience, starts):
     assert np.flatnonzero(np.diff([0, *moves])).tolist() == starts
 
 
-def driven(**table: object) -> Drive:
+def driven(**table):
     return assemble(resolve({"control": {"method": "elastic"}, **table})).controller.drive
 
 
-def bed(arrangement: str, rows: int = 7, columns: int = 7) -> Grid:
+def bed(arrangement, rows=7, columns=7):
     return make_grid(Layout(rows, columns, arrangement=arrangement))
 
 
@@ -303,7 +300,7 @@ WRONG = [
 ]
 
 
-@pytest.mark.parametrize(("method", "given", "said"), WRONG)
+@pytest.mark.parametrize("method, given, said", WRONG)
 def test_a_bad_parameter_is_refused_in_one_line(method, given, said):
     with pytest.raises(ParameterError, match=re.escape(said)) as caught:
         assemble(resolve({"layout": {"rows": 5, "columns": 5}, "control": {"method": method, **given}}))
@@ -312,7 +309,7 @@ def test_a_bad_parameter_is_refused_in_one_line(method, given, said):
 
 
 @pytest.mark.parametrize(
-    ("array", "said"),
+    "array, said",
     [
         (np.zeros((4, 5)), "an array of the bed's 5 x 5 cells (got {}: 4 x 5)."),
         (np.full((5, 5), 0.2), "values from 0 to 0.1 m (got {}: 0.2 m)."),

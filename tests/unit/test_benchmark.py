@@ -5,7 +5,6 @@ import statistics
 import sys
 from collections import Counter
 from dataclasses import replace
-from types import FrameType
 
 import numpy as np
 import pytest
@@ -57,7 +56,7 @@ def test_a_period_of_method_i_makes_at_most_115_numpy_calls_all_counted_and_of_m
     scene, asked = sample("ridge_mound_valley"), 0
     system, trajectories = assemble(scene), scene.trajectories()
 
-    def note(frame: FrameType, event: str, called: object) -> None:
+    def note(frame, event, called):
         # Python's own profiler counts the products of the master's view of the cells.
         nonlocal asked
         owner = getattr(called, "__self__", None)
@@ -79,7 +78,7 @@ def test_a_period_of_method_i_makes_at_most_115_numpy_calls_all_counted_and_of_m
 
 
 @pytest.mark.parametrize(
-    ("line", "message"),
+    "line, message",
     [
         ("session --repeats 0", "must be a whole number from 1 to 1000"),
         ("scale --out my.toml/new", "scale: argument --out: my.toml/new cannot be a folder: my.toml is a fi"),

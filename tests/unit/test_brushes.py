@@ -6,7 +6,6 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from digiclay.core.base.arrays import Floats
 from digiclay.core.base.modes import Mode
 from digiclay.core.control.methods import METHODS
 from digiclay.core.model.fingertip import LEVEL, Fingertip
@@ -17,7 +16,6 @@ from digiclay.core.session import snapshot
 from digiclay.core.session.live_session import simulate_path
 from digiclay.recorded.takes import read_recording
 from digiclay.sessions import sculpting
-from digiclay.sessions.running import Running
 from digiclay.sessions.sculpting import change_stroke, find_device, queue_stroke
 from digiclay.settings.devices import BEDS, make_scene
 from digiclay.strokes.nominal import find_nominal, find_radius
@@ -26,30 +24,30 @@ from digiclay.strokes.stroke import Brush, draw, make_images
 from tests.assemble import replayed
 from tests.hand import TICK, go_on, heights, let_go, pin, pose, risen, started
 from tests.reliefs import heighten
-from tests.strokes import Places, begin_bed, finish, form, measure_spikes, queue, relief
+from tests.strokes import begin_bed, finish, form, measure_spikes, queue, relief
 
 pytestmark = pytest.mark.usefixtures("quick_machine")
 
 
 #: Half the length of a stroke, mm.
 HALF = 18.0
-ALONG: Places = [(-HALF, 0.0), (HALF, 0.0)]
+ALONG = [(-HALF, 0.0), (HALF, 0.0)]
 
 
-def begin(**tables: object) -> Running:
+def begin(**tables):
     above = np.array([0.0, 0.0, 46e-3, *LEVEL])
     session, _ = sculpting.begin_session(7, "Bed", resolve(dict(tables)), above)
     return sculpting.advance(session, above, 0.0, 100)
 
 
-def along(session: Running, y: float = 0.0) -> Floats:
+def along(session, y=0.0):
     """Return the heights of the pins that a stroke along x at y, mm, has passed, above rest, mm."""
     row = 12 + round(y / 3.0)
     return relief(session)[row, 12 - round(HALF / 3.0) : 13 + round(HALF / 3.0)]
 
 
 #: A line at 17 degrees, mm, that ends on the bed, and half of its breadth that is level.
-SLANTING: Places = [(-19.0, -5.0), (17.0, 6.0)]
+SLANTING = [(-19.0, -5.0), (17.0, 6.0)]
 CASES = {
     "2 mm deep": (Brush.LOWER, 2.0, {}),
     "4 mm deep": (Brush.LOWER, 4.0, {}),
@@ -80,7 +78,7 @@ def test_a_stroke_leaves_its_nominal_surface_and_presses_no_harder_than_a_finger
 
 
 @pytest.mark.parametrize(
-    ("tables", "height", "off"),
+    "tables, height, off",
     [
         (
             {"sensors": {"force_noise": "2 mN", "height_noise": "20 um"}},
@@ -117,7 +115,7 @@ def test_level_lowers_a_hill_raises_a_hollow_and_fills_a_valley_that_it_crosses_
     level = form(session, [(-34.0, 0.0), (34.0, 0.0)], Brush.LEVEL)
     np.testing.assert_allclose(along(level), 0.0, rtol=0, atol=0.01)
     # Under a slanting view the pointer moves aside on the floor of a valley, and back when it comes out.
-    way: Places = [(0.0, -24.0), (0.0, -15.0), (-8.0, -5.0), (-8.0, 6.0), (0.0, 14.0), (0.0, 24.0)]
+    way = [(0.0, -24.0), (0.0, -15.0), (-8.0, -5.0), (-8.0, 6.0), (0.0, 14.0), (0.0, 24.0)]
     valley = form(begin_bed("paper", 25, 25), ALONG, Brush.LOWER, 4.0)
     assert along(valley).max() < -3.0
     leveled = relief(form(valley, way, Brush.LEVEL, 4.0))
@@ -138,7 +136,7 @@ def test_a_queued_raise_ends_at_once_when_the_method_has_lost_its_blister_meanwh
 SPIKE = 8e-3
 
 
-def spiked(*places: tuple[float, float]) -> Running:
+def spiked(*places):
     session = started()
     system, relief = session.system, np.zeros(session.system.grid.count)
     for x, y in places:
@@ -147,9 +145,9 @@ def spiked(*places: tuple[float, float]) -> Running:
 
 
 def queue_smooth(
-    session: Running, start: tuple[float, float], end: tuple[float, float], share: float = 1.0,
-    symmetry: str = "NONE",
-) -> Running:  # fmt: skip
+    session, start, end, share = 1.0,
+    symmetry = "NONE",
+):  # fmt: skip
     """Queue a stroke of half a second from place to place, mm."""
     (x, y), (to_x, to_y) = start, end
     session, number = queue_stroke(
@@ -193,7 +191,7 @@ def test_strokes_that_press_and_smooth_are_queued_behind_each_other():
     assert risen(done, -12.0, 0.0) < 0.5 * SPIKE
 
 
-def smoothed() -> Running:
+def smoothed():
     session = sculpting.set_recording(spiked((0.0, 0.0)), True)
     return finish(queue_smooth(session, (-9.0, 0.0), (9.0, 0.0)))
 
@@ -216,7 +214,7 @@ def test_undo_shortens_the_orders_of_a_recording_with_its_path():
     assert snapshot.dump(back.system, again) == back.snapshot
 
 
-@pytest.mark.parametrize(("width", "radius"), [(8e-3, 8e-3), (1e-3, 6e-3)])
+@pytest.mark.parametrize("width, radius", [(8e-3, 8e-3), (1e-3, 6e-3)])
 def test_the_disc_is_the_fingers_width_and_no_less_than_two_pitches(width, radius):
     assert find_radius(Fingertip(width=width), Layout()) == pytest.approx(radius)
 
@@ -242,7 +240,7 @@ BOUND = 0.2
 BESIDE = {"paper": 1.0, "design": 0.5}
 
 
-def turned(bed: str, degrees: float, beside: float = 0.0) -> Places:
+def turned(bed, degrees, beside=0.0):
     half, turn = SIZES[bed][1], np.radians(degrees)
     x, y = float(half * np.cos(turn)), float(half * np.sin(turn))
     aside, along = float(-beside * np.sin(turn)), float(beside * np.cos(turn))
@@ -250,13 +248,13 @@ def turned(bed: str, degrees: float, beside: float = 0.0) -> Places:
 
 
 @functools.cache
-def ridged(bed: str) -> Running:
+def ridged(bed):
     pins, _, height, _ = SIZES[bed]
     return form(begin_bed(bed, pins, pins), turned(bed, 0.0, BESIDE[bed]), Brush.RAISE, height)
 
 
 @functools.cache
-def crossed(bed: str, degrees: float, brush: Brush) -> tuple[Running, Running]:
+def crossed(bed, degrees, brush):
     """Return the session of a ridge, and that after another stroke, which is recorded."""
     amount = SIZES[bed][2 if brush is Brush.RAISE else 3]
     session = sculpting.set_recording(replace(ridged(bed), state=ridged(bed).state.copy()), on=True)
@@ -264,7 +262,7 @@ def crossed(bed: str, degrees: float, brush: Brush) -> tuple[Running, Running]:
 
 
 @pytest.mark.parametrize(
-    ("bed", "degrees"),
+    "bed, degrees",
     [("paper", 30.0), ("paper", 90.0), ("design", 30.0), ("design", 45.0)],
 )
 def test_a_ridge_across_a_ridge_cuts_nothing_off_and_leaves_no_spikes(bed, degrees):
@@ -297,7 +295,7 @@ def test_a_groove_across_a_ridge_goes_through_it_and_piles_nothing_up(bed):
 LEFT = 1.0
 
 
-def move(session: Running, goal: tuple[float, float, float], duration: float) -> Running:
+def move(session, goal, duration):
     """Move the finger by hand to a place, mm, within a time, s."""
     start, now = session.pose[:3].copy(), session.clock.seen or 0.0
     count = max(1, round(duration / TICK))
@@ -308,7 +306,7 @@ def move(session: Running, goal: tuple[float, float, float], duration: float) ->
 
 
 @functools.cache
-def shaped(bed: str) -> Running:
+def shaped(bed):
     """Return a session whose finger has pressed, risen and gone aside by hand."""
     session = begin_bed(bed, 25, 25)
     for place, duration in (((-4, 0, 46), 0.1), ((-4, 0, 37), 0.4), ((-4, 0, 46), 1.5), ((5, 0, 46), 1.0)):

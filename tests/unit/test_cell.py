@@ -2,7 +2,6 @@
 
 import itertools
 import math
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -23,7 +22,7 @@ from scipy.integrate import quad
 from tests.assemble import AWAY, Motion, make_system, one_cell, path, record, scripted, under
 
 RAISE, LOWER = scripted(lambda t, x, y: 1.0), scripted(lambda t, x, y: -1.0)
-STEPPERS = pytest.mark.parametrize(("stepper", "step"), [("bernoulli", 1e-3), ("runge_kutta_4", 0.5e-3)])
+STEPPERS = pytest.mark.parametrize("stepper, step", [("bernoulli", 1e-3), ("runge_kutta_4", 0.5e-3)])
 #: Force that the high reservoir balances, N: half a bar on a bore of 2 mm.
 BALANCE = 0.5e5 * math.pi * 1e-6
 
@@ -37,7 +36,7 @@ def test_pressure_is_force_and_speed_flow_over_area_and_reservoirs_move_pins_the
 
 
 @pytest.mark.parametrize(
-    ("parts", "rise", "fall", "digits"),
+    "parts, rise, fall, digits",
     [
         ({}, 24e-3, -24e-3, 0.01),  # as printed
         ({"valve": Valve(orifice_diameter=0.6e-3)}, 50e-3, -50e-3, 0.05),  # the fast preset; to one digit
@@ -56,7 +55,7 @@ def test_a_free_cell_has_the_printed_speed_at_full_valve_exactly_that_of_the_bou
 
 
 @pytest.mark.parametrize(
-    ("start", "pulp", "count", "error", "stepper", "step"),
+    "start, pulp, count, error, stepper, step",
     [
         # The pole is 150 1/s or faster: half a second leaves rounding.
         (49e-3, None, 100, 1e-9, "bernoulli", 1e-3),
@@ -77,7 +76,7 @@ def test_a_pin_under_a_still_finger_comes_to_the_balance_force(start, pulp, coun
 
 
 @STEPPERS
-@pytest.mark.parametrize(("control", "stop"), [(RAISE, 100e-3), (LOWER, 0.0)])
+@pytest.mark.parametrize("control, stop", [(RAISE, 100e-3), (LOWER, 0.0)])
 def test_a_pin_rests_exactly_at_its_end_stop(control, stop, stepper, step):
     start = Actuator(rest_height=98e-3 if stop else 2e-3)
     run = record(one_cell(actuator=start, control=control, stepper=stepper, step=step), AWAY, 60)
@@ -117,7 +116,7 @@ COMMANDS = [0.5, -1.0, 0.25, 1.0, 0.125, -0.5, -0.75, 1.0, 0.3, 0.6, -0.2, 0.4]
 SCRIPT = scripted(lambda t, x, y: COMMANDS[min(int(t / PERIOD + 1e-6), len(COMMANDS) - 1)])
 
 
-def opening(dead_time: float, time: float) -> float:
+def opening(dead_time, time):
     """Return the analytic opening: exponentials from one command's arrival to the next one's."""
     value, last = 0.0, dead_time
     for index, target in enumerate(COMMANDS):
@@ -139,7 +138,7 @@ def test_the_opening_follows_the_command_the_dead_time_later(dead_time):
         assert np.all(run.height[run.time <= dead_time] == 40e-3)  # nothing moves before
 
 
-@pytest.mark.parametrize(("stepper", "step"), [("bernoulli", 1e-3), ("runge_kutta_4", 0.25e-3)])
+@pytest.mark.parametrize("stepper, step", [("bernoulli", 1e-3), ("runge_kutta_4", 0.25e-3)])
 @pytest.mark.parametrize("dead_time", [0.37e-3, 7.3e-3])
 def test_a_free_pin_moves_as_the_delayed_opening_says(dead_time, stepper, step):
     system = one_cell(dead_time=dead_time, step=step, stepper=stepper, control=SCRIPT)
@@ -147,7 +146,7 @@ def test_a_free_pin_moves_as_the_delayed_opening_says(dead_time, stepper, step):
     full = float(law.flow(np.ones(1), np.array([0.5e5]))[0]) / system.cell.actuator.area
     series = law.resistance * law.valve.laminar
 
-    def speed(time: float) -> float:
+    def speed(time):
         k = opening(dead_time, time)
         return full * math.copysign(k**2 * (1.0 + series) / (1.0 + series * k**2), k)
 
@@ -203,7 +202,7 @@ def test_tension_begins_at_the_offset_follows_the_exponential_and_stays_finite()
     assert LARGEST_EXPONENT / Contact().exponent > 0.1  # more than a stroke
 
 
-@pytest.mark.parametrize(("arrangement", "share"), [("aligned", 0.34), ("hexagonal", 0.29)])
+@pytest.mark.parametrize("arrangement, share", [("aligned", 0.34), ("hexagonal", 0.29)])
 def test_the_cells_together_carry_what_a_flat_plate_does(arrangement, share):
     # The share f_d was fitted for this: 0.34 on the square grid, 0.29 on the hexagonal one. One constant
     # cannot match all depths: a quarter from 1 to 2.4 mm, averaged over where the finger stands.
@@ -215,16 +214,16 @@ def test_the_cells_together_carry_what_a_flat_plate_does(arrangement, share):
         assert carried.mean() == pytest.approx(float(contact.tension(np.array([depth]))[0]), rel=0.25)
 
 
-def reduced(time: float) -> float:
+def reduced(time):
     """Return G(t) as equation 12 is written."""
     decays = (c * math.exp(-time / t) for c, t in zip(WEIGHTS[1:], TIMES, strict=True))
     return (WEIGHTS[0] + sum(decays)) / sum(WEIGHTS)
 
 
-def convolved(depth: Callable[[float], float], speed: Callable[[float], float], time: float) -> float:
+def convolved(depth, speed, time):
     """Return the force by equation 10: G convolved with dT/dt = (b + m T) dx/dt, by adaptive quadrature."""
 
-    def integrand(tau: float) -> float:
+    def integrand(tau):
         x = depth(tau)
         return reduced(time - tau) * 250.0 * math.exp(2000.0 * x) * speed(tau) if x > 0.0 else 0.0
 
@@ -233,7 +232,7 @@ def convolved(depth: Callable[[float], float], speed: Callable[[float], float], 
     return quad(integrand, 0.0, time, points=points or None, epsabs=1e-12, epsrel=1e-11, limit=400)[0]
 
 
-def filtered(own: np.ndarray, first: float, last: float, step: float) -> np.ndarray:
+def filtered(own, first, last, step):
     """Return the filters after a step in which the tension goes linearly from `first` to `last`."""
     return Relaxation().propagator(step) @ np.array([*own, first, 0.5 * (first + last), last])
 
@@ -250,7 +249,7 @@ def test_relaxation_is_the_sum_of_equation_12_and_what_relaxes_quicker_than_the_
 
 
 @pytest.mark.parametrize("slope", [0.0, 3.0])
-@pytest.mark.parametrize(("step", "count"), [(1e-4, 500), (1e-3, 200), (20e-3, 10), (50e-3, 4)])
+@pytest.mark.parametrize("step, count", [(1e-4, 500), (1e-3, 200), (20e-3, 10), (50e-3, 4)])
 def test_a_constant_and_a_linear_tension_are_filtered_exactly(step, count, slope):
     own, start = np.zeros(3), 0.0 if slope else 1.7
     for i in range(count):
@@ -262,10 +261,10 @@ def test_a_constant_and_a_linear_tension_are_filtered_exactly(step, count, slope
 
 
 @pytest.mark.parametrize(
-    ("stepper", "step", "tolerance"), [("bernoulli", 1e-4, 1e-4), ("runge_kutta_4", 5e-4, 1e-6)]
+    "stepper, step, tolerance", [("bernoulli", 1e-4, 1e-4), ("runge_kutta_4", 5e-4, 1e-6)]
 )
 @pytest.mark.parametrize(
-    ("depth", "speed"),
+    "depth, speed",
     [
         (lambda t: 20e-3 * t, lambda t: 20e-3),
         (lambda t: 1e-3 * (1.0 - math.cos(40.0 * t)), lambda t: 40e-3 * math.sin(40.0 * t)),
@@ -294,7 +293,7 @@ def test_a_pulp_one_of_whose_filters_is_cut_in_two_is_the_same():
 def test_the_force_lost_over_a_step_is_its_mean_for_a_linear_tension(step):
     own, first, last = np.array([0.3, 0.2, 0.1]), 2.0, 1.2
 
-    def lost_at(time: float) -> float:
+    def lost_at(time):
         now = first + (last - first) * time / step
         return float(Relaxation().relaxed(filtered(own, first, now, time)))
 
@@ -316,7 +315,7 @@ def test_a_tap_loses_81_percent_of_its_work(duration):
     assert work.sum() / work[work > 0.0].sum() == pytest.approx(0.81, abs=0.03)
 
 
-def test_a_valve_that_closes_is_open_until_a_billionth() -> None:
+def test_a_valve_that_closes_is_open_until_a_billionth():
     closing = scripted(lambda t, x, y: 1.0 if t < 0.05 else 0.0)
     system = make_system(Layout(1, 2), dead_time=0.0, valve_lag=ValveLag(50e-3), control=closing)
     run = record(system, AWAY, 230)

@@ -19,7 +19,7 @@ from digiclay.core.control.cell_states import (
 )
 from digiclay.core.control.travel import Heading, Rim
 from digiclay.core.model.actuator import Actuator
-from digiclay.core.model.control_interface import Commands, Measurement
+from digiclay.core.model.control_interface import Measurement
 from digiclay.core.model.layout import Layout, make_grid
 
 REST = 40e-3
@@ -31,7 +31,7 @@ BED = make_grid(Layout(rows=13, columns=13))
 MIDDLE = 6 * 13 + 6
 
 
-def seen(forces: dict[int, float] | None = None, modes: dict[int, Mode] | None = None) -> Measurement:
+def seen(forces=None, modes=None):
     """Measure a bed at rest on which some cells are pressed, or in some mode."""
     force, mode = np.zeros(BED.count), np.full(BED.count, Mode.REST, np.int8)
     for row, values in ((force, forces), (mode, modes)):
@@ -42,17 +42,17 @@ def seen(forces: dict[int, float] | None = None, modes: dict[int, Mode] | None =
     )
 
 
-def ordered(measured: Measurement, memory: Patch | None = None) -> tuple[Patch, Commands]:
+def ordered(measured, memory=None):
     memory, _ = CONTROL.locate(memory or CONTROL.begin(), measured)
     return CONTROL.command(memory, measured)
 
 
-def distance(cell: int) -> float:
+def distance(cell):
     return float(np.hypot(BED.x[cell] - BED.x[MIDDLE], BED.y[cell] - BED.y[MIDDLE]))
 
 
 @pytest.mark.parametrize(
-    ("before", "force", "after", "command"),
+    "before, force, after, command",
     [
         pytest.param(Mode.REST, 0.06, Mode.FORCE_FOLLOW, -0.3, id="pressed to the trigger: it follows"),
         pytest.param(Mode.REST, 0.059, Mode.SPRING, -1.0, id="pressed less: on its spring"),
@@ -70,7 +70,7 @@ def test_a_cell_is_driven_by_its_own_force(before, force, after, command):
 
 
 @pytest.mark.parametrize(
-    ("low", "high", "mode"), [(0.0, BLISTER.radius * (1 - 1e-6), Mode.BLISTER), (12e-3, 15.5e-3, Mode.EDGE)]
+    "low, high, mode", [(0.0, BLISTER.radius * (1 - 1e-6), Mode.BLISTER), (12e-3, 15.5e-3, Mode.EDGE)]
 )
 def test_the_neighbors_of_a_following_cell_become_its_blister_and_its_edge(low, high, mode):
     modes = ordered(seen({MIDDLE: 0.1}))[1].mode
@@ -103,7 +103,7 @@ def test_the_blister_falls_off_to_the_edge_and_a_cell_behind_the_finger_is_froze
     assert (orders.mode[MIDDLE - 3], orders.target[MIDDLE - 3]) == (Mode.FROZEN, 47e-3)
 
 
-@pytest.mark.parametrize(("low", "expected"), [(1e-3, 0.0), (99.5e-3, 0.1)])
+@pytest.mark.parametrize("low, expected", [(1e-3, 0.0), (99.5e-3, 0.1)])
 def test_the_blister_stays_within_the_stroke(low, expected):
     measured = seen({MIDDLE: 0.1}, {MIDDLE: Mode.FORCE_FOLLOW})
     measured.height[:] = low
@@ -126,9 +126,7 @@ def test_the_blister_s_edge_is_the_mean_height_of_the_ring_ahead_and_abeam(towar
     assert memory.edge == pytest.approx(measured.height[ahead].mean(), abs=1e-15)
 
 
-@pytest.mark.parametrize(
-    ("toward", "leaves"), [((1.0, 0.0), True), ((-1.0, 0.0), False), ((0.0, 1.0), False)]
-)
+@pytest.mark.parametrize("toward, leaves", [((1.0, 0.0), True), ((-1.0, 0.0), False), ((0.0, 1.0), False)])
 def test_no_cell_rises_for_a_finger_that_leaves_the_bed(toward, leaves):
     # The outer cells begin 2 mm beyond the pressed one, and 3 mm ahead carry the finger.
     cell, gains = MIDDLE + 2, CONTROL.parameters
@@ -149,7 +147,7 @@ SHORT, WIDE = (replace(CONTROL, blister=replace(BLISTER, flat_radius=flat)) for 
 
 
 @pytest.mark.parametrize(
-    ("control", "forces", "before", "after"),
+    "control, forces, before, after",
     [
         pytest.param(
             CONTROL, {MIDDLE: 0.05, MIDDLE + 1: 0.016}, {MIDDLE: FF, MIDDLE + 1: PATCH}, {MIDDLE + 1: FF},
@@ -180,7 +178,7 @@ def test_what_a_cell_becomes_under_a_finger_that_travels_east(control, forces, b
 
 
 @pytest.mark.parametrize(
-    ("name", "value", "said"),
+    "name, value, said",
     [("blister_trigger", 0.07, "below spring_trigger, 0.06 N (got 0.07 N)."),
      ("critical_trigger", 0.02, "below blister_trigger, 0.015 N (got 0.02 N).")],
 )  # fmt: skip

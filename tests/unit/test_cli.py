@@ -5,7 +5,6 @@ import re
 import signal
 import sys
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -96,7 +95,7 @@ MISTAKES = {
 }
 
 
-@pytest.mark.parametrize(("line", "said"), MISTAKES.items())
+@pytest.mark.parametrize("line, said", MISTAKES.items())
 def test_a_mistake_is_one_line_exit_code_2_and_no_folder(line, said, here, refused):
     (here / "d.png").mkdir()
     (here / "d.png" / "metrics.json").touch()
@@ -177,7 +176,7 @@ MEANT = {
 }
 
 
-@pytest.mark.parametrize(("line", "asked"), MEANT.items())
+@pytest.mark.parametrize("line, asked", MEANT.items())
 def test_a_misspelt_word_gets_a_suggestion_and_what_is_like_nothing_gets_none(line, asked, capsys):
     assert main(line.split()) == 2
     said = capsys.readouterr().err
@@ -206,7 +205,7 @@ def test_an_error_is_one_line_of_a_sane_length(arguments, capsys):
 
 
 def test_a_file_that_fails_half_way_is_one_line(monkeypatch, capfd):
-    def full(*given: Any) -> None:
+    def full(*given):
         raise OSError(28, "No space left on device", "a file")
 
     monkeypatch.setattr(describe, "description", full)
@@ -256,7 +255,7 @@ def test_what_is_written_before_a_signal_is_not_denied(here, monkeypatch, capfd)
     call("run my.toml --quiet --no-errors")
     write = export.write
 
-    def interrupted(*given: Any) -> Path:
+    def interrupted(*given):
         if given[3] == "ply":
             raise KeyboardInterrupt
         return write(*given)
@@ -268,7 +267,7 @@ def test_what_is_written_before_a_signal_is_not_denied(here, monkeypatch, capfd)
     )  # fmt: skip
 
 
-@pytest.mark.parametrize(("said", "cores"), [("", "1"), ("3", "3")])
+@pytest.mark.parametrize("said, cores", [("", "1"), ("3", "3")])
 def test_the_program_works_on_one_core_unless_told_otherwise(said, cores):
     script = (
         "import os, sys\n"
@@ -293,7 +292,7 @@ def test_the_backend_of_a_notebook_does_not_hinder_plots(here):
 
 
 def test_a_run_is_kept_whatever_goes_wrong_with_what_is_made_of_it(here, monkeypatch):
-    def draw(*_: Any) -> None:
+    def draw(*_):
         raise ValueError("a fault of a library")
 
     monkeypatch.setattr(render, "plotted", draw)
@@ -315,7 +314,7 @@ def test_a_run_imports_no_other_command_and_none_of_the_packages_it_does_without
 
 
 @pytest.mark.parametrize(
-    ("line", "missing", "install"),
+    "line, missing, install",
     [
         ("run my.toml --render", "bpy", "digiclay[blender]"),
         ("run my.toml --plots", "matplotlib", "pip install digiclay[plots]"),
@@ -340,7 +339,7 @@ def test_a_job_of_a_batch_exports_without_any_library(here):
     assert {"surface.stl", "surface.3mf"} <= {path.name for path in (here / "jobs/runs/my").iterdir()}
 
 
-def described(capsys: pytest.CaptureFixture[str], *settings: str) -> dict[str, str]:
+def described(capsys, *settings):
     """Return the lines of the section on pins, by what they are about."""
     assert main(["describe", "slow_press", *(part for one in settings for part in ("--set", one))]) == 0
     section = capsys.readouterr().out.split("\nThe pins\n")[1].split("\n\n")[0]
@@ -348,7 +347,7 @@ def described(capsys: pytest.CaptureFixture[str], *settings: str) -> dict[str, s
     return {line[:12].strip(): line[12:].strip() for line in joined.splitlines()}
 
 
-def numbers(text: str) -> list[float]:
+def numbers(text):
     return [float(found) for found in re.findall(r"-?\d+(?:\.\d+)?", text)]
 
 

@@ -4,9 +4,7 @@ import json
 import shlex
 import shutil
 import signal
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import digiclay
 import numpy as np
@@ -72,7 +70,7 @@ def test_both_methods_are_printed_side_by_side_and_kept_with_a_picture_of_the_sa
     assert 0.03 <= known["cell_states"]["set_point"] < 121 * 0.03
 
 
-def read_times(folder: Path) -> dict[str, float]:
+def read_times(folder):
     """Return how long each method took, which no other run takes to the last digit."""
     known = read_json(folder / "metrics.json")["methods"]
     return {name: metrics["run_time"] for name, metrics in known.items()}
@@ -119,14 +117,12 @@ def test_the_table_has_a_dash_for_what_was_not_found_and_every_panel_a_bar_for_e
 OUT = "first run"
 
 
-def stop_before(
-    monkeypatch: pytest.MonkeyPatch, module: Any, name: str, number: int = signal.SIGINT, before: int = 0
-) -> None:
+def stop_before(monkeypatch, module, name, number=signal.SIGINT, before=0):
     """Send Ctrl-C, or another signal, when a command comes to a step; `before`: how often it may before."""
-    step: Callable[..., Any] = getattr(module, name)
+    step = getattr(module, name)
     passed = iter(range(before))
 
-    def interrupted(*given: Any, **known: Any) -> Any:
+    def interrupted(*given, **known):
         assert signal.getsignal(number) is not signal.SIG_DFL  # it would end the tests
         if next(passed, None) is None:
             signal.raise_signal(number)
@@ -139,7 +135,7 @@ def stop_before(
 def stopped(monkeypatch, capsys):
     """Give a way to stop a command before a step; it returns the commands on stderr by their files."""
 
-    def run(module: Any, name: str, *arguments: str, number: int = signal.SIGINT) -> dict[str, list[str]]:
+    def run(module, name, *arguments, number=signal.SIGINT):
         with monkeypatch.context() as patched:
             stop_before(patched, module, name, number)
             assert main([*arguments, "--out", OUT]) == 130
@@ -150,7 +146,7 @@ def stopped(monkeypatch, capsys):
     return run
 
 
-def list_files(folder: Path) -> set[str]:
+def list_files(folder):
     return {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
 
 
@@ -158,7 +154,7 @@ FEW = ["--set", "layout.rows=13", "--set", "layout.columns=13", "--quiet"]
 
 
 @pytest.mark.parametrize(
-    ("command", "made"),
+    "command, made",
     [
         (
             ["run", "my.toml", "--quiet", "--export", "stl,obj", "--plots", "--no-errors"],
@@ -249,7 +245,7 @@ def run(pressed, tmp_path, monkeypatch):
     return tmp_path / "run"
 
 
-def listed(capsys: pytest.CaptureFixture[str], *options: str) -> list[dict]:
+def listed(capsys, *options):
     assert main(["features", "run", "--json", *options]) == 0
     return json.loads(capsys.readouterr().out)
 
@@ -263,7 +259,7 @@ def test_features_are_listed_in_a_table_and_none_at_the_start(run, capsys):
     assert capsys.readouterr().out == "0 bosses and 0 creases\n"
 
 
-def deepest(run: Path) -> tuple[float, float]:
+def deepest(run):
     """Return how far the deepest pin has sunk, and how high it is at the end, m."""
     with np.load(run / "history.npz") as history:
         return float((history["height"][0] - history["height"][-1]).max()), float(history["height"][-1].min())
@@ -282,7 +278,7 @@ def test_json_is_in_si_units_from_any_former_surface_and_a_threshold_has_a_unit(
 
 
 @pytest.mark.parametrize(
-    ("options", "names"),
+    "options, names",
     [
         ([], ["surface.stl"]),
         (["--kind", "surface"], ["skin.stl"]),
@@ -314,7 +310,7 @@ def test_a_length_is_in_millimeters_or_has_a_unit_behind_it(said, run):
 
 
 @pytest.mark.parametrize(
-    ("line", "said"),
+    "line, said",
     [
         ("export run --separate", "--separate needs --kind features."),
         ("export run --base-thickness 0", "--base-thickness must be above 0 m (got 0 m)."),
@@ -339,14 +335,14 @@ SMALL = ["--set", "layout.rows=13", "--set", "layout.columns=13"]
 BED = make_grid(Layout(13, 13))
 
 
-def form(folder: Path, word: str, *options: str) -> Path:
+def form(folder, word, *options):
     """Form a shape on a bed of 13 x 13 cells; return its folder."""
     out = folder / "out"
     assert main(["form", word, "--out", str(out), "--overwrite", *SMALL, *options]) == 0
     return out
 
 
-def read(out: Path) -> dict[str, np.ndarray]:
+def read(out):
     with np.load(out / "history.npz") as stored:
         return dict(stored)
 
@@ -385,7 +381,7 @@ def test_the_finger_comes_when_the_shape_stands_and_the_folder_alone_repeats_the
 
 
 @pytest.mark.parametrize(
-    ("refresh", "preset"), [("one_time", "viscous"), ("gradual", "paper"), ("approximate_gradual", "fast")]
+    "refresh, preset", [("one_time", "viscous"), ("gradual", "paper"), ("approximate_gradual", "fast")]
 )
 def test_a_shape_stands_by_the_time_it_is_said_to(refresh, preset):
     table = {
@@ -407,7 +403,7 @@ def test_a_shape_stands_by_the_time_it_is_said_to(refresh, preset):
     assert not stands[round(0.2 * ready / 5e-3)]
 
 
-@pytest.mark.parametrize(("x", "y"), [(0.0, 0.0), (7.3e-3, -2.1e-3)])
+@pytest.mark.parametrize("x, y", [(0.0, 0.0), (7.3e-3, -2.1e-3)])
 def test_the_finger_touches_the_highest_part_nearest_to_the_middle_at_the_height_it_is_said_to(x, y):
     top = np.full(169, 40e-3)
     top[[0, 60, 84]] = 50e-3, 49.9e-3, 41e-3
@@ -438,7 +434,7 @@ def test_a_run_has_heights_metrics_and_a_summary():
     # Importing it imports no part of the simulation.
     parts = "{'numpy', 'bpy', 'trimesh', 'digiclay.core.base'}"
     assert finish(start(f"import sys, digiclay; print({parts} & {{*sys.modules}})"))[1] == "set()\n"
-    periods: list[tuple[int, int]] = []
+    periods = []
     done = digiclay.run(digiclay.scene(TABLES), lambda *counts: periods.append(counts))
     assert periods == [(count, 10) for count in range(1, 11)]
     assert done.history["height"].shape == done.history["force"].shape == (11, 25)
@@ -449,7 +445,7 @@ def test_a_run_has_heights_metrics_and_a_summary():
 
 
 @pytest.mark.parametrize(
-    ("content", "message"),
+    "content, message",
     [
         ({"contrl": {}}, "contrl must be a known key (got an empty section). Did you mean control?"),
         ({"valve": {"orifice_diameter": "3 s"}}, "valve.orifice_diameter must be in m or a multiple"),

@@ -4,7 +4,6 @@ import re
 import sys
 import time
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -20,7 +19,7 @@ from digiclay.core.engine.simulation import simulate_period
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.scene_source import Setting, find
 from digiclay.core.session.run_scene import run
-from digiclay.core.studies.axes import Point, make_points, read_axis
+from digiclay.core.studies.axes import make_points, read_axis
 from digiclay.core.studies.evaluation import (
     RUNS,
     TIMES,
@@ -73,15 +72,15 @@ def test_constants_of_one_run_are_shared_few_and_read_only_and_of_many_the_numbe
 SHORT = [Setting("simulation.duration", "0.1")]
 
 
-def some(*varied: str, settings: list[Setting] | None = None) -> list[Point]:
+def some(*varied, settings=None):
     return make_points(find("tap"), settings or SHORT, [read_axis(one) for one in varied])
 
 
-def indices(parts: tuple[tuple[Point, ...], ...]) -> list[list[int]]:
+def indices(parts):
     return [[point.index for point in part] for part in parts]
 
 
-def calls(count: int) -> list[int]:
+def calls(count):
     """Return how many functions of numpy and others each control period of so many taps calls."""
     scenes = [point.scene for point in some(f"control.force_gain=1:6:{count}", settings=[])]
     systems = [assemble(scene) for scene in scenes if scene]
@@ -89,7 +88,7 @@ def calls(count: int) -> list[int]:
     state, ways = begin(stack), [scene.section("trajectory").trajectory() for scene in scenes if scene]
     made, counted = [0], []
 
-    def count_one(frame: Any, event: str, argument: Any) -> None:
+    def count_one(frame, event, argument):
         made[0] += event == "c_call"
 
     fingers = extend_path(None, systems, ways, 0)
@@ -111,7 +110,7 @@ def test_a_control_period_of_a_larger_stack_takes_no_more_calls():
 
 
 @pytest.mark.parametrize(
-    ("count", "duration", "sizes"),
+    "count, duration, sizes",
     [
         (2 * RUNS - 1, "0.1", [2 * RUNS - 1]),
         (2 * RUNS + 1, "0.1", [RUNS, RUNS + 1]),
@@ -134,7 +133,7 @@ TRIGGERS = ("control.blister_trigger=0.01,0.03", "control.spring_trigger=0.02,0.
 
 
 @pytest.mark.parametrize(
-    ("varied", "setting", "errors", "batches", "alone", "said"),
+    "varied, setting, errors, batches, alone, said",
     [
         pytest.param(
             ("control.force_gain=1,2,3,4", "layout.rows=11,13"), "", False, [[0, 2, 4, 6], [1, 3, 5, 7]], [],
@@ -183,7 +182,7 @@ BLIP = "".join(f"{{ time = {time}, position = [0, 0, {height}] }}, " for time, h
 
 
 @pytest.mark.parametrize(
-    ("step", "errors", "doubted"), [("20 ms", True, True), ("20 ms", False, False), ("1 ms", True, False)]
+    "step, errors, doubted", [("20 ms", True, True), ("20 ms", False, False), ("1 ms", True, False)]
 )
 def test_errors_of_points_whose_contact_a_step_may_hide_are_doubted(step, errors, doubted):
     ways = (
@@ -217,8 +216,8 @@ def test_a_bundle_comes_to_the_figures_of_its_points_and_can_be_stopped(errors):
         assert own == pytest.approx(other, rel=1e-9, abs=1e-15)
 
 
-def break_stacks(monkeypatch: pytest.MonkeyPatch, error: Exception) -> None:
-    def faulty(*given: Any, **known: Any) -> Any:
+def break_stacks(monkeypatch, error):
+    def faulty(*given, **known):
         raise error
 
     monkeypatch.setattr("digiclay.core.studies.evaluation.measure_together", faulty)
@@ -259,7 +258,7 @@ VARIED = "--vary control.force_gain=1:2 --vary control.position_gain=100:900 --p
 TUNING = ["tune", "my.toml", *VARIED.split(), "--metric", "rfd,highest", "--quiet"]
 
 
-def cluster_here(workers: int) -> LocalCluster:
+def cluster_here(workers):
     """Return a scheduler with workers, on threads of this process."""
     return LocalCluster(
         n_workers=workers, threads_per_worker=2, processes=False, protocol="tcp://", host="127.0.0.1",
@@ -274,20 +273,20 @@ def address():
         yield cluster.scheduler_address
 
 
-def hours(count: int) -> list[Point]:
+def hours(count):
     long = [Setting("simulation.duration", "1e5"), Setting("recorder.every", "1000")]
     return make_points(find("slow_press"), long, [read_axis(f"layout.rows=20:{19 + count}:{count}")])
 
 
-def silent(note: str) -> None:
+def silent(note):
     """Draw nothing."""
 
 
-def never() -> bool:
+def never():
     return False
 
 
-@pytest.mark.parametrize(("words", "tables"), [(SWEEP, 1), (TUNING, 2)], ids=["sweep", "tuning"])
+@pytest.mark.parametrize("words, tables", [(SWEEP, 1), (TUNING, 2)], ids=["sweep", "tuning"])
 def test_a_series_on_a_cluster_comes_to_the_tables_of_this_machine(words, tables, here, address):
     assert main([*words, "--workers", "1", "--out", "own"]) == 0
     assert main([*words, "--scheduler", address, "--out", "far"]) == 0
@@ -301,12 +300,12 @@ def test_a_series_on_a_cluster_comes_to_the_tables_of_this_machine(words, tables
 def test_after_a_stop_no_task_is_left_in_the_cluster(address):
     with Client(address, set_as_default=False) as client:
 
-        def look(dask_worker: Any) -> tuple[int, int]:
+        def look(dask_worker):
             return len(dask_worker.active_threads), len(dask_worker.state.tasks)
 
-        running: list[int] = []
+        running = []
 
-        def stop() -> bool:
+        def stop():
             if not running and [busy for busy, _ in client.run(look).values()] == [2]:
                 running.append(2)
             return bool(running)
@@ -318,12 +317,12 @@ def test_after_a_stop_no_task_is_left_in_the_cluster(address):
         wait_until(lambda: list(client.run(look).values()) == [(0, 0)])
 
 
-def evaluate_hours(point: Point) -> Any:
+def evaluate_hours(point):
     return evaluate_on_worker([point])
 
 
 def test_a_cluster_without_workers_is_waited_for_and_the_wait_can_be_stopped(capsys):
-    notes: list[str] = []
+    notes = []
     with (
         cluster_here(0) as empty,
         open_cluster(empty.scheduler_address, lambda: len(notes) > 1, notes.append),
@@ -337,7 +336,7 @@ def test_a_cluster_without_workers_is_waited_for_and_the_wait_can_be_stopped(cap
 
 
 def test_errors_of_tasks_are_told_and_a_result_that_does_not_arrive_is_computed_again(address, monkeypatch):
-    done: dict[int, Any] = {}
+    done = {}
     with open_cluster(address, lambda: False, silent) as cluster:
         finish_series(submit(cluster, invert, [0, 1, 2], stopped=never), done.__setitem__, done.__setitem__)
         assert done == {0: "ZeroDivisionError: division by zero", 1: 1.0, 2: 0.5}
@@ -347,7 +346,7 @@ def test_errors_of_tasks_are_told_and_a_result_that_does_not_arrive_is_computed_
     assert SlowToSend.sent > 1
 
 
-def invert(number: int) -> float:
+def invert(number):
     return 1 / number
 
 
@@ -361,7 +360,7 @@ class SlowToSend:
         return SlowToSend, ()
 
 
-def give_slowly(number: int) -> Any:
+def give_slowly(number):
     return SlowToSend()
 
 
@@ -377,7 +376,7 @@ def test_a_scheduler_that_is_gone_ends_a_series_in_one_line(monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("address", "why"),
+    "address, why",
     [
         ("foo", "missing port number"), ("", "missing port number"),
         ("http://127.0.0.1:8786", "unknown address scheme 'http'"),
@@ -390,7 +389,7 @@ def test_a_bad_address_is_refused_in_one_line(address, why, refused):
 
 
 @pytest.mark.parametrize(
-    ("address", "host"),
+    "address, host",
     [
         ("tcp://127.0.0.1:8786", ""), ("tcp://localhost:8786", ""), ("tcp://[::1]:8786", ""),
         ("tls://10.0.0.1:8786", ""), ("10.0.0.1:8786", "10.0.0.1"), ("tcp://[fe80::1]:8786", "fe80::1"),

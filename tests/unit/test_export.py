@@ -5,7 +5,6 @@ import os
 import struct
 import subprocess
 import zipfile
-from pathlib import Path
 
 import lib3mf
 import meshio
@@ -16,9 +15,9 @@ from digiclay.core.base.errors import OutputError, ParameterError
 from digiclay.core.files import run_folder
 from digiclay.core.mesh_io import mesh_reader, mesh_writer
 from digiclay.core.mesh_io.export_model import KINDS, Model, make_bodies
-from digiclay.core.model.layout import Layout, make_grid
+from digiclay.core.model.layout import ARRANGEMENTS, Layout, make_grid
 from digiclay.core.surface.features import Finding
-from digiclay.core.surface.formed import NO_PIN, PIECE, Body, Formed, make_formed
+from digiclay.core.surface.formed import NO_PIN, PIECE, Formed, make_formed
 
 from benchmarks.__main__ import main
 from benchmarks.bed_size import export
@@ -44,11 +43,11 @@ def solid(formed):
     return make_bodies(formed, Model())
 
 
-def path_for(folder: Path, kind: str) -> Path:
+def path_for(folder, kind):
     return folder / f"surface{mesh_writer.find_suffix(kind)}"
 
 
-def mesh(body: Body) -> trimesh.Trimesh:
+def mesh(body):
     return trimesh.Trimesh(body.vertices, body.faces, process=False)
 
 
@@ -146,7 +145,7 @@ KNOWN = rf"known are {', '.join(mesh_writer.FORMATS)}\.$"
 
 
 @pytest.mark.parametrize(
-    ("count", "name", "unit", "said"),
+    "count, name, unit, said",
     [
         (1, "surface.step", "mm", rf"^Unknown mesh format 'step': {KNOWN}"),
         (1, "surface", "mm", rf"^Unknown mesh format '': {KNOWN}"),
@@ -198,10 +197,7 @@ def test_a_full_disk_keeps_the_older_file_and_leaves_no_other(tmp_path, kind):
         subprocess.run(["umount", disk], check=True, timeout=TIMEOUT)
 
 
-ARRANGEMENTS = ("aligned", "staggered", "hexagonal")
-
-
-def uneven(arrangement: str = "aligned") -> Formed:
+def uneven(arrangement="aligned"):
     """A boss, a crease, level ground between them; every pin with a force and a mode of its own."""
     place = make_grid(Layout(rows=12, columns=14, arrangement=arrangement)).positions
     x, y = place.T * 1e3
@@ -216,7 +212,7 @@ KINDS_AND_SKINS = [("pins", "bilinear")] + [
 ]
 
 
-def touching(arrangement: str, seed: int) -> Formed:
+def touching(arrangement, seed):
     """Ridges with mounds on them, up and down, turned and beside the middle."""
     place = make_grid(Layout(rows=26, columns=25, arrangement=arrangement)).positions
     random = np.random.default_rng(seed)
@@ -232,7 +228,7 @@ def touching(arrangement: str, seed: int) -> Formed:
 
 
 @pytest.mark.parametrize("arrangement", ARRANGEMENTS)
-@pytest.mark.parametrize(("kind", "skin"), KINDS_AND_SKINS)
+@pytest.mark.parametrize("kind, skin", KINDS_AND_SKINS)
 def test_every_kind_is_consistent_and_all_but_the_skin_are_watertight_after_welding_too(
     tmp_path, kind, skin, arrangement
 ):
@@ -281,7 +277,7 @@ def test_all_of_a_pins_top_has_its_values_and_a_skin_of_too_many_points_is_refus
         make_bodies(bed, Model(resolution=40))
 
 
-@pytest.mark.parametrize(("kind", "parts"), [("surface", 1), ("solid", 3), ("pins", 1)])
+@pytest.mark.parametrize("kind, parts", [("surface", 1), ("solid", 3), ("pins", 1)])
 def test_each_feature_is_a_group_of_faces_over_its_pins(kind, parts):
     bed = uneven()
     (body,) = make_bodies(bed, Model(kind=kind, resolution=parts), Finding())
@@ -295,7 +291,7 @@ def test_each_feature_is_a_group_of_faces_over_its_pins(kind, parts):
 
 
 @pytest.mark.parametrize(
-    ("told", "said"),
+    "told, said",
     [
         ({"kind": "cloud"}, "kind must be one of solid, surface, pins, features"),
         ({"skin": "silk"}, "skin must be one of bilinear, smooth, membrane"),
@@ -311,7 +307,7 @@ def test_a_model_that_makes_no_sense_is_refused(told, said):
         Model(**told)
 
 
-def history() -> dict[str, np.ndarray]:
+def history():
     bed = uneven()
     rows = {"height": [np.full(168, 0.04), bed.height], "force": [bed.force] * 2, "mode": [bed.mode] * 2}
     return {"position": bed.position} | {name: np.stack(both) for name, both in rows.items()}
@@ -327,7 +323,7 @@ def test_the_former_surface_is_a_row_or_one_height_that_the_history_has():
             make_formed(history(), row, former)
 
 
-@pytest.mark.parametrize(("name", "bad"), [("height", np.nan), ("former", np.inf), ("force", np.nan)])
+@pytest.mark.parametrize("name, bad", [("height", np.nan), ("former", np.inf), ("force", np.nan)])
 def test_values_that_are_not_finite_are_refused_by_cell(name, bad):
     known = {"height": np.full(168, 0.04), "former": 0.04, "force": 0.0, "mode": 0}
     known[name] = np.where(np.arange(168) == 7, bad, 0.04)

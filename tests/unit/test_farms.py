@@ -5,7 +5,6 @@ import re
 import shlex
 import sys
 from pathlib import Path
-from typing import Any
 
 import pytest
 import quickjs
@@ -49,13 +48,13 @@ def here(tmp_path, monkeypatch):
     return folder
 
 
-def submit(form: str, said: str = JOBS + FILMS, *options: str) -> int:
+def submit(form, said=JOBS + FILMS, *options):
     Path("two.toml").write_text(said, encoding="utf-8")
     out = ["--out", str(Path("below/../out")), "--submit", form, "--chunk", "5", "--quiet"]
     return main(["batch", "two.toml", *out, *options])
 
 
-def planned() -> dict[str, tuple[list[str], set[str]]]:
+def planned():
     """Return the arguments of each task and the names of those it needs, frames split."""
     tasks = split_frames(plan_series(read_jobs(Path("two.toml")), 5))
     return {task.name: (task.list_arguments("S"), set(task.needs)) for task in tasks}
@@ -146,7 +145,7 @@ function compile(text) {
 """
 
 
-def compiled(job: str) -> list[dict[str, Any]]:
+def compiled(job):
     """Return what Flamenco's Manager would be told of a job by the script, in strict mode as there."""
     context = quickjs.Context()
     context.eval(f'"use strict";\n{STUB}{SCRIPT.read_text(encoding="utf-8")}\nglobalThis.compile = compile;')
@@ -223,7 +222,7 @@ def test_a_line_for_windows_protects_what_its_shell_would_read():
 
 OPENJD = ["--submit", "openjd"]
 NARROW = 'layout.pitch = "1 mm"'
-REFUSED: list[tuple[str, list[str], int, str]] = [
+REFUSED = [
     (JOBS, ["--program", "p"], 2, "--program must be given with --submit only."),
     (JOBS, ["--chunk", "5"], 2, "--chunk must be given with --submit only."),
     (JOBS, [*OPENJD, "--prepare"], 2, "not allowed with argument"),
@@ -236,7 +235,7 @@ REFUSED: list[tuple[str, list[str], int, str]] = [
 ]
 
 
-@pytest.mark.parametrize(("said", "options", "code", "told"), REFUSED)
+@pytest.mark.parametrize("said, options, code, told", REFUSED)
 def test_what_cannot_be_submitted_is_refused_in_one_line(said, options, code, told, capsys):
     Path("two.toml").write_text(said, encoding="utf-8")
     assert main(["batch", "two.toml", "--quiet", *options]) == code

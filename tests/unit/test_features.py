@@ -8,34 +8,31 @@ import numpy as np
 import pytest
 import trimesh
 from digiclay.core.mesh_io.export_model import make_feature_solid
-from digiclay.core.model.layout import Layout, make_grid
-from digiclay.core.surface.features import Feature, Finding, find, make_table, summarize
+from digiclay.core.model.layout import ARRANGEMENTS, Layout, make_grid
+from digiclay.core.surface.features import Finding, find, make_table, summarize
 from digiclay.core.surface.formed import Formed
 from digiclay.core.surface.skins import fit_skin
 
-ARRANGEMENTS = ("aligned", "staggered", "hexagonal")
 LEVEL = 0.04
 
 
-def formed(
-    raised, arrangement: str = "aligned", rows: int = 41, columns: int = 41, pitch: float = 1e-3
-) -> Formed:
+def formed(raised, arrangement="aligned", rows=41, columns=41, pitch=1e-3):
     """A bed formed from level to a function of x and y, mm in and mm out."""
     place = make_grid(Layout(rows=rows, columns=columns, pitch=pitch, arrangement=arrangement)).positions
     height = LEVEL + 1e-3 * np.asarray(raised(*(place.T * 1e3)), float)
     return Formed.of(place, height, LEVEL, 0.0, 0)
 
 
-def features(bed, finding: Finding | None = None, skin: str = "bilinear", parts: int = 1) -> list[Feature]:
+def features(bed, finding=None, skin="bilinear", parts=1):
     return find(fit_skin(bed, skin, parts, 1e-3), finding)
 
 
-def mesh_of(one: Feature) -> trimesh.Trimesh:
+def mesh_of(one):
     body = make_feature_solid(one)
     return trimesh.Trimesh(body.vertices, body.faces, process=False)
 
 
-def ridge(x, y, height: float = 6.0):
+def ridge(x, y, height=6.0):
     """A round ridge 2 x 4 mm wide about a line of 24 mm along x, with round ends."""
     away = np.hypot(np.clip(np.abs(x) - 12.0, 0.0, None), y)
     return height * np.clip(1.0 - (away / 4.0) ** 2, 0.0, None)
@@ -94,7 +91,7 @@ def test_features_are_measured_from_the_surface_as_it_was_and_put_it_right():
     assert boss.volume - crease.volume == pytest.approx(bed.raised.sum() * 1e-6, rel=5e-3)
 
 
-@pytest.mark.parametrize(("smallest", "count"), [(1, 2), (2, 1), (9, 1), (10, 0)])
+@pytest.mark.parametrize("smallest, count", [(1, 2), (2, 1), (9, 1), (10, 0)])
 def test_a_feature_of_too_few_pins_is_none(smallest, count):
     def bumps(x, y):
         return 2.0 * ((np.maximum(np.abs(x), np.abs(y)) < 1.5) | (np.hypot(x - 9, y) < 0.5))
@@ -154,16 +151,16 @@ LENGTH = 0.05
 Heights = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
 
-def round_top(away: np.ndarray, half: float) -> np.ndarray:
+def round_top(away, half):
     """A parabola 1 high, as wide as `half` to either side."""
     return np.clip(1.0 - (away / half) ** 2, 0.0, None)
 
 
-def along(points: np.ndarray) -> Heights:
+def along(points):
     """How far it is to a line of straight pieces through points, (n, 2)."""
     ends = np.array([*itertools.pairwise(points)])[..., None]
 
-    def away(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    def away(x, y):
         (ax, ay), (dx, dy) = ends[:, 0].swapaxes(0, 1), (ends[:, 1] - ends[:, 0]).swapaxes(0, 1)
         u, v = np.ravel(x) - ax, np.ravel(y) - ay
         t = np.clip((u * dx + v * dy) / (dx * dx + dy * dy), 0.0, 1.0)
@@ -172,42 +169,42 @@ def along(points: np.ndarray) -> Heights:
     return away
 
 
-def line(points: str) -> Heights:
+def line(points):
     """How far it is to a line of straight pieces; its points in mm, as in SVG: "x,y x,y"."""
     return along(np.array([point.split(",") for point in points.split()], float))
 
 
-def arc(y: float, start: float, end: float) -> Heights:
+def arc(y, start, end):
     """How far it is to an arc of 14 mm radius about a point of the y axis; angles in half turns."""
     turn = np.pi * np.linspace(start, end, 40)
     return along(np.column_stack([14 * np.cos(turn), y + 14 * np.sin(turn)]))
 
 
-def circle(at: float, radius: float) -> Heights:
+def circle(at, radius):
     """How far it is to a circle about a point of the x axis."""
     return lambda x, y: np.abs(np.hypot(x - at, y) - radius)
 
 
-def ridges(height: float, half: float, *lines: str | Heights) -> Heights:
+def ridges(height, half, *lines):
     """Round ridges along lines."""
     distances = [line(one) if isinstance(one, str) else one for one in lines]
     return lambda x, y: height * round_top(np.min([away(x, y) for away in distances], axis=0), half)
 
 
-def mound(height: float, at: float, half: float) -> Heights:
+def mound(height, at, half):
     """A round mound about a point of the x axis."""
     return lambda x, y: height * round_top(np.hypot(x - at, y), half)
 
 
-def noise(seed: int, spread: float) -> Heights:
+def noise(seed, spread):
     return lambda x, y: np.random.default_rng(seed).normal(0.0, spread, np.shape(x))
 
 
-def total(*parts: Heights) -> Heights:
+def total(*parts):
     return lambda x, y: np.sum([part(x, y) for part in parts], axis=0)
 
 
-def highest(*parts: Heights) -> Heights:
+def highest(*parts):
     return lambda x, y: np.max([part(x, y) for part in parts], axis=0)
 
 
@@ -218,7 +215,7 @@ EIGHT = along(np.column_stack([ACROSS, 1.6 * ACROSS * np.sin(AROUND)]))
 CRATER = ridges(10, 7, circle(0, 16))
 SLANTED = "-25,-6 25,8", "-4,-25 4,25"
 #: Shapes: heights in mm over x and y in mm, and the forms to be found, with the lengths of crests in plan.
-SHAPES: dict[str, tuple[Heights, str]] = {
+SHAPES = {
     "ridge": (ridges(12, 7, "-18,-10 20,9"), "ridge 42.5"),
     "cross": (ridges(12, 7, "-25,0 25,0", "0,-25 0,25"), "2 ridges 50 50"),
     "slanted cross": (ridges(12, 7, *SLANTED), "2 ridges 51.9 50.6"),
@@ -254,9 +251,7 @@ SHAPES: dict[str, tuple[Heights, str]] = {
 }  # fmt: skip
 
 
-def form_shape(
-    name: str, arrangement: str, pitch: float, turn: float = 0.0, at: tuple[float, float] = (0.0, 0.0)
-) -> Formed:
+def form_shape(name, arrangement, pitch, turn=0.0, at=(0.0, 0.0)):
     """A bed of 84 mm x 84 mm; for a turned shape, which may be 90 mm long, of 108 mm x 108 mm."""
     size = 108 if turn else 84
     spacing = pitch * (np.sqrt(0.75) if arrangement == "hexagonal" else 1.0)
@@ -267,7 +262,7 @@ def form_shape(
     return Formed.of(place, 0.04 + 1e-3 * raised, 0.04, 0.0, 0)
 
 
-def parse_forms(words: str) -> list[tuple[str, str, list[float]]]:
+def parse_forms(words):
     """Return kind, form and lengths of crests of each feature."""
     forms = []
     for form, lengths in re.findall(r"((?:\d )?[a-z]+)([\d. ]*)", words):
@@ -276,7 +271,7 @@ def parse_forms(words: str) -> list[tuple[str, str, list[float]]]:
     return forms
 
 
-def find_faults(name: str, found: list[Feature], slack: float = 0.0) -> list[str]:
+def find_faults(name, found, slack=0.0):
     wanted = parse_forms(SHAPES[name][1])
     forms = sorted((one.kind, one.form) for one in found)
     if forms != sorted((kind, form) for kind, form, _ in wanted):
@@ -291,7 +286,7 @@ def find_faults(name: str, found: list[Feature], slack: float = 0.0) -> list[str
     return faults
 
 
-@pytest.mark.parametrize(("arrangement", "pitch"), BEDS[::4])
+@pytest.mark.parametrize("arrangement, pitch", BEDS[::4])
 @pytest.mark.parametrize("name", SHAPES)
 def test_a_shape_is_found_as_what_it_is(name, arrangement, pitch):
     found = features(form_shape(name, arrangement, pitch))
@@ -311,7 +306,7 @@ def test_of_the_shapes_turned_and_beside_the_middle_95_in_100_are_found_as_what_
     assert len(faults) <= 0.05 * count, faults
 
 
-@pytest.mark.parametrize(("arrangement", "pitch"), BEDS)
+@pytest.mark.parametrize("arrangement, pitch", BEDS)
 def test_the_crests_of_a_cross_keep_to_its_lines(arrangement, pitch):
     (boss,) = features(form_shape("slanted cross", arrangement, pitch))
     for crest in boss.crests:
@@ -322,7 +317,7 @@ def test_the_crests_of_a_cross_keep_to_its_lines(arrangement, pitch):
 
 
 @pytest.mark.parametrize(
-    ("name", "bed"),
+    "name, bed",
     [("ridge with a mound at its end", BEDS[1]), ("two mounds on a ridge", BEDS[2]), ("two domes", BEDS[3])],
 )
 def test_the_parts_of_a_boss_share_its_pins_area_and_volume(name, bed):

@@ -4,9 +4,6 @@ import io
 import re
 import tracemalloc
 import zipfile
-from collections.abc import Callable
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -30,7 +27,7 @@ from digiclay.core.shapes.request import Shape
 LITTLE = 4_000_000
 
 
-def refused(work: Callable[[], Any]) -> str:
+def refused(work):
     """Return what is said where something is refused; it is one line, and took little memory."""
     tracemalloc.start()
     try:
@@ -95,7 +92,7 @@ def test_a_scene_or_array_beyond_all_sizes_or_for_another_bed_is_not_read(tmp_pa
     assert "2 x 2 cells" in refused(lambda: read_values("shape", path, bed, 0.0, 1.0, "m"))
 
 
-def history(folder: Path, **arrays: np.ndarray) -> Path:
+def history(folder, **arrays):
     """Leave what a run of four cells and ten periods leaves, with some arrays in place of its own."""
     scene = resolve({"layout": {"rows": 2, "columns": 2}, "simulation": {"duration": 0.05}, "blister": SMALL})
     (folder / "scene.toml").write_text(format_scene(scene), encoding="utf-8")
@@ -108,7 +105,7 @@ SMALL = {"radius": 2e-3, "edge_radius": 2.5e-3, "flat_radius": 1e-3}
 
 
 @pytest.mark.parametrize(
-    ("arrays", "said"),
+    "arrays, said",
     [
         ({"time": np.zeros(5_000_000)}, "the 11 rows of its scene's 10 control periods (got 5,000,000)"),
         ({"time": np.zeros(0)}, "(got 0)"),
@@ -140,14 +137,14 @@ def test_a_history_that_does_not_fit_into_memory_is_not_unpacked(tmp_path):
     assert measure_available_memory() < 1.6e12
 
 
-def npy(array: np.ndarray) -> bytes:
+def npy(array):
     """Return an array as a file of numpy's."""
     file = io.BytesIO()
     np.save(file, array)
     return file.getvalue()
 
 
-def head(shape: tuple[int, ...]) -> bytes:
+def head(shape):
     """Return the head of a file of numpy's, without the numbers."""
     file = io.BytesIO()
     np.lib.format.write_array_header_1_0(file, {"shape": shape, "fortran_order": False, "descr": "<f8"})
@@ -155,7 +152,7 @@ def head(shape: tuple[int, ...]) -> bytes:
 
 
 @pytest.mark.parametrize(
-    ("old", "new"),
+    "old, new",
     [(b"(?s)(.{700}).*", rb"\1"), (b"(?s).*", b""), (b"'descr': '<f8'", b"'descr': '|O8'"),
      (b"NUMPY", b"NIMPY"),
      (rb"\(11, 4\)", b"(99, 4)"), (rb"\(11, 4\)", b"(-1, 4)"), (rb"\(11, 4\)", b"((((4))")],
@@ -169,7 +166,7 @@ def test_a_damaged_history_is_refused(tmp_path, old, new):
     assert "cannot be read as a run's history" in refused(lambda: read_run(folder, "height"))
 
 
-def take() -> bytes:
+def take():
     """Return a take of one period."""
     scene = resolve({"layout": {"rows": 2, "columns": 2}, "blister": SMALL})
     state = snapshot.dump(assemble(scene), begin(assemble(scene)))
@@ -177,7 +174,7 @@ def take() -> bytes:
 
 
 @pytest.mark.parametrize(
-    ("save", "name", "value", "said"),
+    "save, name, value, said",
     [
         (np.savez_compressed, "poses", np.zeros((1_000_000, 1, 7)), r"unpack to at most its own .*got 56,"),
         (np.savez, "scene", np.frombuffer(f"{BOMB} = 1".encode(), np.uint8), "must have at most 16 names"),

@@ -16,12 +16,11 @@ from digiclay.core.model.trajectory import Path as FingerPath
 from digiclay.core.model.trajectory import Waypoint
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.scene_source import Setting, load
-from digiclay.core.scene.schema import Scene
 from digiclay.core.scene.toml_table import format_scene, resolve
 from digiclay.core.session import snapshot
 from digiclay.core.session.live_session import simulate_path
 from digiclay.core.session.recent_trace import exceeds_law
-from digiclay.core.session.run_scene import Result, run
+from digiclay.core.session.run_scene import run
 from digiclay.core.session.snapshot import START
 from digiclay.core.studies.axes import find_value
 from digiclay.overlay.sections import force_message
@@ -45,7 +44,7 @@ waypoints = [{ time = 0.0, position = [0.004, 0.0, 0.042] }, { time = 0.7, posit
 ONE = TWO[: TWO.rindex("[[finger]]")]
 
 
-def scene(words: str) -> Scene:
+def scene(words):
     return resolve(parse_tables(BED + words), "bed")
 
 
@@ -75,7 +74,7 @@ def test_a_setting_names_the_only_finger_of_a_list_as_any_other(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("key", "value", "lengths"),
+    "key, value, lengths",
     [
         ("fingertip.length", "0.009", (9e-3, 9e-3)),  # of all
         ("finger.2.fingertip.length", "0.009", (14e-3, 9e-3)),
@@ -107,7 +106,7 @@ def test_a_setting_is_of_all_fingers_or_of_the_one_it_names(key, value, lengths,
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    "words, said",
     [
         ("[[finger]]\nlength = 1\n", r"finger #1.length must be a known key"),
         ("[[finger]]\n[[finger]]\nfingertip = 3\n", r"finger #2.fingertip must be a section"),
@@ -141,12 +140,12 @@ def test_a_kept_state_of_two_fingers_is_refused():
         snapshot.load(system, two)
 
 
-def pressed(depth: float, tilt: float = 0.0, x: float = 0.0, **parts: object) -> Result:
+def pressed(depth, tilt=0.0, x=0.0, **parts):
     """Return a run whose finger, tilted, rad, comes down at x to `depth` below the tops within 0.1 s, m."""
     points = ((0.0, 41e-3), (0.1, 40e-3 - depth), (0.15, 40e-3 - depth))
     turn = (np.cos(tilt / 2), 0.0, np.sin(tilt / 2), 0.0)
     way = FingerPath("linear", tuple(Waypoint(time, (x, 0.0, z), turn) for time, z in points))
-    known: Scene = sample("tap", "simulation.duration=0.15")
+    known = sample("tap", "simulation.duration=0.15")
     return run(known.with_sections(trajectory=way, **{"control": None, "blister": None, **parts}))
 
 
@@ -170,7 +169,7 @@ def test_a_finger_driven_through_the_bed_is_remarked_in_the_summary_line_and_no_
 
 
 @pytest.mark.parametrize(
-    ("depth", "tilt", "x", "stiffness"),
+    "depth, tilt, x, stiffness",
     [
         (1.5e-3, 0, 0, 250), (3.5e-3, 0, 0, 250),
         # By depth alone: above a pin, between pins, and tilted.

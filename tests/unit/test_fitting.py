@@ -3,16 +3,15 @@
 import re
 import struct
 import zlib
-from typing import Any
 
 import numpy as np
 import pytest
 import trimesh
 from digiclay.core.base.errors import ParameterError
 from digiclay.core.model.actuator import Actuator
-from digiclay.core.model.layout import Layout, make_grid
+from digiclay.core.model.layout import ARRANGEMENTS, Layout, make_grid
 from digiclay.core.shapes import heightmap
-from digiclay.core.shapes.fitting import Fitted, fit_given, fit_relief, pack, unpack
+from digiclay.core.shapes.fitting import fit_given, fit_relief, pack, unpack
 from digiclay.core.shapes.heightmap import average_blocks, make_height_map, read_grid, read_head, read_pixels
 from digiclay.core.shapes.mesh_relief import make_shape_mesh
 from digiclay.core.shapes.request import Placement, Shape
@@ -28,27 +27,27 @@ BED = make_grid(Layout(13, 25, 3e-3))
 ROUNDING = 1e-12
 
 
-def mesh(solid: trimesh.Trimesh) -> Any:
+def mesh(solid):
     return make_shape_mesh("solid.stl", solid.vertices, solid.faces, "z", 1e-3)
 
 
-def laid(what: Any, bed: Any = BED, **known: Any) -> Fitted:
+def laid(what, bed=BED, **known):
     return fit_relief(Shape(**known), what, bed, Actuator())
 
 
-def box(wide: float, deep: float, high: float) -> Any:
+def box(wide, deep, high):
     solid = trimesh.creation.box((wide, deep, high))
     solid.apply_translation((70.0, -30.0, high / 2))  # wherever it stands, it is centered
     return mesh(solid)
 
 
-def table(cells: Fitted) -> np.ndarray:
+def table(cells):
     """Return heights above rest, mm, row by row."""
     return np.round((cells.heights.reshape(13, 25) - REST) * 1e3, 9)
 
 
 @pytest.mark.parametrize(
-    ("size", "known", "rows", "columns"),
+    "size, known, rows, columns",
     [
         # 39 mm are the shorter side; a square box takes 13 x 13 cells.
         pytest.param((10, 10, 5), {}, range(13), range(6, 19), id="contained it keeps its proportions"),
@@ -70,7 +69,7 @@ SLOPE = make_height_map("x.npy", np.linspace(0.0, 7e-3, 12).reshape(3, 4), 1.0)
 
 
 @pytest.mark.parametrize(
-    ("what", "known", "low", "high"),
+    "what, known, low, high",
     [
         (mesh(BALL), {"rise": 15e-3, "foot": 2e-3}, 42e-3, 57e-3),
         (mesh(BALL), {"rise": 4e-3, "foot": 2e-3}, 42e-3, 46e-3),
@@ -126,7 +125,7 @@ def test_what_leaves_the_stroke_is_clipped_and_counted_and_overhangs_are_told():
 
 
 @pytest.mark.parametrize("fit", ["stretch", "cover"])
-@pytest.mark.parametrize("arrangement", ["aligned", "staggered", "hexagonal"])
+@pytest.mark.parametrize("arrangement", ARRANGEMENTS)
 def test_a_bed_is_covered_by_a_stretched_picture(arrangement, fit):
     bed = make_grid(Layout(7, 9, 3e-3, arrangement))
     cells = laid(make_height_map("gray.png", np.full((4, 4), 99)), bed, fit=fit)
@@ -144,7 +143,7 @@ BESIDE = (
 
 
 @pytest.mark.parametrize(
-    ("what", "known", "said"),
+    "what, known, said",
     [
         (box(10, 10, 5), {"fit": "actual", "x": 1.0}, BESIDE),
         (box(10, 10, 5), {"fit": "placed"}, BESIDE),
@@ -160,7 +159,7 @@ def test_what_cannot_be_laid_onto_the_bed_is_refused(what, known, said):
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    "text, said",
     [
         ("rubbish!", "must be heights packed as text (got 'rubbish!')"),
         ("AAAA", "must be heights packed as text (got 'AAAA')"),
@@ -178,7 +177,7 @@ def test_a_text_that_holds_other_heights_is_refused(text, said):
 PITCH = 3e-3
 
 
-def middle(rows: int, columns: int, factor: float) -> Placement:
+def middle(rows, columns, factor):
     """Return where a map lies whose middle is the bed's."""
     return Placement(factor, factor, -columns / 2 * factor, -rows / 2 * factor)
 
@@ -188,7 +187,7 @@ PIXELS = np.random.default_rng(2).uniform(0.0, 1.0, (5, 7))
 
 
 @pytest.mark.parametrize(
-    ("values", "rows", "columns", "pixel", "wanted"),
+    "values, rows, columns, pixel, wanted",
     [
         pytest.param(PIXELS, 5, 7, PITCH, lambda x, y: PIXELS.ravel(), id="a pixel for every pin is its own"),
         pytest.param(
@@ -232,7 +231,7 @@ def test_means_keep_the_sum(rows, columns, block, chunk, seed):
 
 
 @pytest.mark.parametrize(
-    ("values", "said"),
+    "values, said",
     [
         (np.zeros((1, 1)), "at least 2 x 2 heights (got odd.npy: 1 x 1)"),
         (np.zeros((1, 9)), "at least 2 x 2 heights (got odd.npy: 1 x 9)"),
@@ -257,7 +256,7 @@ def test_what_is_no_map_is_refused(values, said):
         make_height_map("odd.npy", values)
 
 
-@pytest.mark.parametrize(("bits", "kind"), [(8, np.uint8), (16, np.uint16)])
+@pytest.mark.parametrize("bits, kind", [(8, np.uint8), (16, np.uint16)])
 @pytest.mark.parametrize("ending", ["png", "tif"])
 def test_a_picture_is_read_as_it_was_written(tmp_path, bits, kind, ending):
     values = np.random.default_rng(bits).integers(0, 2**bits, (11, 7)).astype(kind)
@@ -285,7 +284,7 @@ def test_a_color_that_is_clear_by_itself_is_black_and_nothing_is_warned_of(tmp_p
 
 
 @pytest.mark.parametrize(
-    ("name", "said"),
+    "name, said",
     [
         ("rgb16_planes.tif", "if they are of more than 8 bits (got {}: separate planes)"),
         ("gray16_white_is_zero.tif", "if they are of more than 8 bits (got {}: 0 is white)"),
@@ -310,7 +309,7 @@ def test_a_picture_stands_as_its_exif_data_say(tmp_path, ending, orientation):
 
 
 @pytest.mark.parametrize("big", [False, True])
-@pytest.mark.parametrize(("kind", "absent"), pictures.NO_DATA)
+@pytest.mark.parametrize("kind, absent", pictures.NO_DATA)
 def test_what_a_geotiff_has_no_data_of_is_no_part_of_the_shape(tmp_path, kind, absent, big):
     known = pictures.write_geotiff(tmp_path / "dem.tif", kind, absent, big=big)
     read = read_pixels(tmp_path / "dem.tif")
@@ -324,7 +323,7 @@ KNOWN = np.ma.masked_equal([[9, 10, 11, 12], [5, -9999, 7, 8], [1, 2, 3, 4]], -9
 
 
 @pytest.mark.parametrize(
-    ("name", "text", "known"),
+    "name, text, known",
     [
         ("a.asc", ESRI + NORTH_UP, KNOWN),
         ("a.asc", "\ufeff" + (ESRI + NORTH_UP).replace("\n", "\r\n").replace(" ", "\t"), KNOWN),
@@ -346,7 +345,7 @@ def test_a_grid_of_numbers_is_read_as_its_program_writes_it(tmp_path, name, text
 
 
 @pytest.mark.parametrize(
-    ("name", "text", "said"),
+    "name, text, said",
     [
         ("a.asc", NORTH_UP, "(got a.asc: no 'nrows' in its head, as an Esri ASCII grid has it)"),
         ("a.asc", ESRI + NORTH_UP[8:], "(got a.asc: cannot reshape array of size 8 into shape (3,4))"),
@@ -410,12 +409,12 @@ def test_a_picture_of_a_hundred_megapixels_is_taken_and_one_of_more_refused_befo
         read_pixels(path)
 
 
-def exr(width: int, height: int) -> bytes:
+def exr(width, height):
     window = struct.pack("<4i", -5, 3, width - 6, height + 2)
     return b"\x76\x2f\x31\x01\x02\0\0\0dataWindow\0box2i\0" + struct.pack("<I", 16) + window
 
 
-def hdr(width: int, height: int) -> bytes:
+def hdr(width, height):
     return f"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y {height} +X {width}\n".encode()
 
 
@@ -435,7 +434,7 @@ PNG = b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR\0\0\0\x63\0\0\0\x63\x08\0\0\0\0"
 
 
 @pytest.mark.parametrize(
-    ("name", "content", "said"),
+    "name, content, said",
     [
         ("half.png", PNG, r"must be a picture that can be read \(got .*half\.png: "),
         ("absent.exr", b"", "Blender itself reads EXR"),

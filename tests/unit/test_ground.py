@@ -4,13 +4,12 @@ import tomllib
 
 import numpy as np
 import pytest
-from digiclay.core.base.arrays import Floats
 from digiclay.core.base.modes import Mode
 from digiclay.core.control.blister import Blister
 from digiclay.core.control.ground import GROUNDS
 from digiclay.core.control.travel import Heading, update_heading
-from digiclay.core.control.virtual_master import Master, VirtualMaster
-from digiclay.core.model.control_interface import Commands, Measurement
+from digiclay.core.control.virtual_master import VirtualMaster
+from digiclay.core.model.control_interface import Measurement
 from digiclay.core.model.layout import Layout, make_grid
 from digiclay.core.scene.toml_table import format_scene, resolve
 
@@ -22,7 +21,7 @@ EAST = (1.0, 0.0)
 RIDGE = np.where(np.abs(BED.x) < 4e-3, 44e-3, 40e-3)
 
 
-def seen(target: Floats, mode: Mode, own: Floats | None = None) -> Measurement:
+def seen(target, mode, own=None):
     """Return a measurement of a whole bed at its commanded heights that nobody touches."""
     cells, modes = np.arange(BED.count), np.full(BED.count, mode, np.int8)
     rows = np.zeros((1, BED.count)) if own is None else own[None].copy()
@@ -30,13 +29,13 @@ def seen(target: Floats, mode: Mode, own: Floats | None = None) -> Measurement:
     return Measurement(BED.compute_basis(cells), target.copy(), free, target.copy(), modes, rows, cells)
 
 
-def command(memory: Master, measured: Measurement, ground: str = "cell") -> Commands:
+def command(memory, measured, ground="cell"):
     control = VirtualMaster(ground=ground)
-    orders: Commands = make_system(Layout(15, 15), control=control).controller.command(memory, measured)[1]
+    orders = make_system(Layout(15, 15), control=control).controller.command(memory, measured)[1]
     return orders
 
 
-def at(x: float, y: float) -> int:
+def at(x, y):
     return int(np.hypot(BED.x - x * 1e-3, BED.y - y * 1e-3).argmin())
 
 
@@ -46,7 +45,7 @@ RISEN = seen(np.full(BED.count, 47e-3), Mode.BLISTER, own=np.full(BED.count, 40e
 
 
 @pytest.mark.parametrize(
-    ("measured", "place", "height"),
+    "measured, place, height",
     [
         pytest.param(seen(RIDGE, Mode.HOLD), (0, 15), 44e-3, id="at the rim it stays where it is formed"),
         pytest.param(seen(RIDGE, Mode.HOLD), (15, 0), 40e-3, id="also beside the ridge"),
@@ -73,7 +72,7 @@ def test_a_cell_takes_its_commanded_height_for_its_ground_and_what_was_raised_st
 
 
 @pytest.mark.parametrize(
-    ("target", "ground", "top", "kept"),
+    "target, ground, top, kept",
     [
         (44e-3, 40e-3, 46e-3, True),  # raised farther than the blister raises it there
         (41e-3, 40e-3, 46e-3, False),  # a higher blister takes it along
@@ -100,13 +99,13 @@ def test_a_scene_is_read_with_its_ground_and_the_papers_as_older_versions_read_i
 SLOPE = 40e-3 + BED.x
 
 
-def touch(measured: Measurement, x: float, about: float = 3.0) -> Measurement:
+def touch(measured, x, about=3.0):
     """Return the measurement with forces in three cells on the x axis, mm: their grounds differ."""
     measured.force[[at(x - about, 0.0), at(x, 0.0), at(x + about, 0.0)]] = 0.05, 0.3, 0.05
     return measured
 
 
-def pressed(x: float, top: float, mode: Mode = Mode.BLISTER, ground: Floats = SLOPE) -> Commands:
+def pressed(x, top, mode=Mode.BLISTER, ground=SLOPE):
     """Return the commands to a blister that the finger touches at x, mm."""
     return command(master(*EAST, height=top), touch(seen(ground, mode, own=ground), x))
 
@@ -128,7 +127,7 @@ EVEN = 40e-3 + 0.03 * BED.x
 
 
 @pytest.mark.parametrize(
-    ("ground", "top", "left", "ahead"),
+    "ground, top, left, ahead",
     [
         (SLOPE, 36e-3, Mode.FROZEN, Mode.BLISTER),
         (SLOPE, 45e-3, Mode.BLISTER, Mode.FROZEN),
@@ -144,7 +143,7 @@ def test_on_uneven_ground_that_a_blister_sinks_into_cells_freeze_sooner_and_are_
 
 
 @pytest.mark.parametrize(
-    ("change", "x", "height", "touched", "cells"),
+    "change, x, height, touched, cells",
     [
         # Those far behind, where the slope is below the top, and the one 1 mm behind, within what freezes.
         pytest.param(-3e-3, 1e-3, 38e-3, 6.0, (-9.0, -6.0, 0.0), id="pressed by one that climbs"),

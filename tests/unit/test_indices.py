@@ -1,8 +1,6 @@
 """Sobol indices against the analytic ones of Ishigami's function, and runs without a value."""
 
 from argparse import Namespace
-from collections.abc import Callable, Sequence
-from typing import Any
 
 import numpy as np
 import pytest
@@ -10,13 +8,11 @@ from digiclay.commands.evaluation_pool import Evaluation
 from digiclay.commands.stop import Stop
 from digiclay.core.base.errors import DigiclayError, OutputError
 from digiclay.core.scene.scene_source import find, load
-from digiclay.core.studies.axes import Point, Record
-from digiclay.core.studies.sweep_plan import Folder
+from digiclay.core.studies.axes import Point
 
 pytest.importorskip("SALib", reason="digiclay[study] is not installed")
 
 from digiclay_study.indices import (
-    Indices,
     compute_indices,
     count_points,
     find_excess_losses,
@@ -35,9 +31,7 @@ TOTAL = np.array([BY_FIRST + BY_PAIR, BY_SECOND, BY_PAIR]) / VARIANCE
 ANGLES = tuple(Range(f"x.{name}", -np.pi, np.pi) for name in "abc")
 
 
-def evaluate_with(
-    task: Callable[[Sequence[Point]], list[Record | None]], folder: Folder, bundles: Sequence[Sequence[Point]]
-) -> Evaluation:
+def evaluate_with(task, folder, bundles):
     """Evaluate bundles in this process with a task in place of sessions."""
     here = Namespace(quiet=True, scheduler=None, workers=1)
     with pytest.MonkeyPatch.context() as monkeypatch:
@@ -49,7 +43,7 @@ def evaluate_with(
     return evaluation
 
 
-def analyze_ishigami(samples: int, seed: int, *, second: bool) -> Indices:
+def analyze_ishigami(samples, seed, *, second):
     """Have Ishigami's function sampled and analyzed."""
     x, y, z = np.pi * (2.0 * sample_shares(samples, 3, seed, second=second) - 1.0).T
     values = np.sin(x) + A * np.sin(y) ** 2 + B * z**4 * np.sin(x)
@@ -57,7 +51,7 @@ def analyze_ishigami(samples: int, seed: int, *, second: bool) -> Indices:
     return indices
 
 
-def is_within(found: Indices, order: str, wanted: Any, part: Any = slice(None)) -> bool:
+def is_within(found, order, wanted, part=slice(None)):
     """Return whether indices are within their intervals, which are narrow enough to exclude something."""
     index, interval = (values[part] for values in found[order])
     return bool(np.all(np.abs(index - wanted) <= interval) and interval.max() < 0.45)
@@ -80,10 +74,10 @@ def test_the_indices_of_ishigami_are_within_their_intervals():
 
 
 def test_points_that_no_worker_survives_are_told_and_tried_again(tmp_path):
-    def work(bundle: Sequence[Point]) -> list[Record | None]:
+    def work(bundle):
         return [{"figures": {"rfd": 1.0}} for _ in bundle]
 
-    def die(bundle: Sequence[Point]) -> list[Record | None]:
+    def die(bundle):
         if bundle[0].index == 1:
             raise DigiclayError("A worker died twice of this.")
         return work(bundle)
@@ -111,7 +105,7 @@ def test_a_design_has_a_block_of_points_a_sample_and_depends_on_its_seed_alone()
     assert intervals[0] == intervals[1] != intervals[2]
 
 
-def record(rfd: float | None, loss: float | None = 0.0) -> Record:
+def record(rfd, loss=0.0):
     return {"figures": {"rfd": rfd, "contact_loss_share": loss}}
 
 
@@ -120,7 +114,7 @@ RUNS = [record(0.2), record(0.5, 0.04), {"error": "no memory"}, record(None, Non
 
 
 @pytest.mark.parametrize(
-    ("name", "usual", "values", "counts"),
+    "name, usual, values, counts",
     [
         ("rfd", 0.0, [0.2, 0.5, 0.5, 0.5, 0.5], (2, 1)),
         ("rfd", 0.26, [0.2, 0.5, 0.5, 0.5, 0.01], (2, 0)),  # what the unchanged scene loses is no loss

@@ -3,22 +3,18 @@
 from dataclasses import replace
 from functools import partial
 from itertools import cycle, islice
-from typing import Any
 
 import numpy as np
 import pytest
-from digiclay.core.base.arrays import Floats
 from digiclay.core.base.modes import Mode
 from digiclay.core.control.orders import Orders, Verb, place, repeat_order
 from digiclay.core.engine.simulation import begin, periods
-from digiclay.core.engine.state import State
 from digiclay.core.model.control_interface import SetPoint
 from digiclay.core.model.fingertip import LEVEL
 from digiclay.core.scene.assembly import assemble
-from digiclay.core.scene.schema import Scene
 from digiclay.core.scene.toml_table import resolve
 from digiclay.core.session import accuracy, recent_trace, snapshot
-from digiclay.core.session.accuracy import PAUSE, SHARE, SPREAD, STRETCH, Errors
+from digiclay.core.session.accuracy import PAUSE, SHARE, SPREAD, STRETCH
 from digiclay.core.session.live_session import (
     LEAST,
     RELEASED,
@@ -34,7 +30,6 @@ from digiclay.core.session.live_session import (
 )
 from digiclay.core.session.recent_trace import ROWS
 from digiclay.sessions import sculpting
-from digiclay.sessions.running import Running
 from digiclay.sessions.sculpting import change_stroke, queue_stroke
 from digiclay.strokes.stroke import draw
 
@@ -46,7 +41,7 @@ SCENE = resolve({"layout": {"rows": 11, "columns": 11}})
 SYSTEM = assemble(SCENE)
 
 
-def looked(times: list[float], most: int = 100, clock: Clock | None = None) -> tuple[list[int], Clock]:
+def looked(times, most=100, clock=None):
     """Look at the clock at some times; return the periods due each time."""
     clock, counts = clock or Clock(), []
     for time in times:
@@ -99,7 +94,7 @@ def test_a_machine_too_slow_slows_down_instead_of_stalling():
 
 
 @pytest.mark.parametrize(
-    ("drawing", "least", "spent", "between"),
+    "drawing, least, spent, between",
     [
         pytest.param(
             1e-3, LEAST, 23e-3, 33e-3, id="a graphics card: all of the time but a share for the person"
@@ -134,7 +129,7 @@ def test_a_queue_that_waits_for_the_hand_does_not_count():
     assert looked([60.012], clock=waited)[0] == [2]
 
 
-def pose(x: float = 0.0, z: float = 0.05) -> Floats:
+def pose(x=0.0, z=0.05):
     """Return a level finger's pose, m, as that of the only one."""
     return np.array([[x, 0.0, z, *LEVEL]])
 
@@ -207,7 +202,7 @@ def test_a_trace_knows_force_set_point_and_heights_of_picked_pins_one_that_stays
     assert other.heights[0, 1] == trace.heights[0, 1]
 
 
-def watched(scene: Scene, finger: Floats) -> tuple[State, list[Errors]]:
+def watched(scene, finger):
     """Follow a path with a monitor; return the last state and the errors it finds."""
     system, monitor, found = assemble(scene), accuracy.start(scene), []
     start = begin(system)
@@ -219,16 +214,16 @@ def watched(scene: Scene, finger: Floats) -> tuple[State, list[Errors]]:
     return state, found
 
 
-def stepped(step: str) -> Scene:
+def stepped(step):
     return resolve({"layout": {"rows": 11, "columns": 11}, "simulation": {"physics_step": step}})
 
 
 @pytest.mark.parametrize("ticks", [(3, 3, 4), (1,), (2, 1), (9,)])
 def test_no_tick_has_more_of_the_reference_than_a_share_of_its_periods(ticks, monkeypatch):
-    done: list[int] = []
+    done = []
     repeat = accuracy.repeat_period
 
-    def counted(*arguments: Any) -> State:
+    def counted(*arguments):
         done.append(tick)
         return repeat(*arguments)
 
@@ -237,7 +232,7 @@ def test_no_tick_has_more_of_the_reference_than_a_share_of_its_periods(ticks, mo
     finger = interpolate_path(pose(), pose(z=0.038), STRETCH + PAUSE)
     monitor, counts = accuracy.begin_stretch(monitor, start), cycle(ticks)
     states = enumerate(simulate_path(SYSTEM, start, finger))
-    sizes: list[int] = []
+    sizes = []
     while (period := sum(sizes)) < STRETCH + PAUSE - max(ticks):
         tick = len(sizes)
         sizes.append(next(counts))
@@ -273,7 +268,7 @@ def test_the_monitor_finds_the_error_of_a_stretch_and_a_finer_step_has_smaller_o
     assert fine.force < found.force / 8
 
 
-def test_what_a_stretch_left_wrong_stays_in_the_errors_of_the_session() -> None:
+def test_what_a_stretch_left_wrong_stays_in_the_errors_of_the_session():
     # A tap within the first stretch, then a rest: the pins keep what was wrong when they were left.
     scene = resolve({"layout": {"rows": 11, "columns": 11}, "simulation": {"stepper": "heun"}})
     down, up = (
@@ -312,13 +307,13 @@ def test_a_monitor_follows_for_a_stretch_now_and_then_and_leaves_the_session_alo
 PRESSED, TICKS = 37.0, 20
 
 
-def pressed() -> tuple[Running, hand.Hand]:
+def pressed():
     """Return a session whose finger presses, and the hand that holds it."""
     mover = hand.Hand()
     return mover.move(hand.started(), [(0.0, z) for z in np.linspace(46.0, PRESSED, TICKS)]), mover
 
 
-def forked(session: Running) -> Running:
+def forked(session):
     """Return the same session with a state of its own: a tick uses it up."""
     return replace(session, state=session.state.copy())
 
@@ -366,10 +361,10 @@ def test_a_tick_ends_with_a_stroke_since_each_has_an_undo_step():
 
 @pytest.mark.usefixtures("quick_machine")
 def test_a_tick_packs_the_state_once_however_many_periods_it_has(monkeypatch):
-    packed: list[int] = []
+    packed = []
     dump = snapshot.dump
 
-    def counted(*arguments: Any) -> bytes:
+    def counted(*arguments):
         packed.append(1)
         return dump(*arguments)
 

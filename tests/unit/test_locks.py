@@ -6,11 +6,9 @@ import shutil
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import pytest
 from digiclay.cli import main
@@ -40,7 +38,7 @@ pytestmark = pytest.mark.usefixtures("here")
 
 
 @contextmanager
-def running(*arguments: str, sign: str) -> Iterator[Any]:
+def running(*arguments, sign):
     process = start(PROGRAM, *arguments)
     try:
         wait_until(lambda: process.poll() is not None or list(Path().glob(sign)))
@@ -51,7 +49,7 @@ def running(*arguments: str, sign: str) -> Iterator[Any]:
         process.communicate(timeout=TIMEOUT)
 
 
-def names(folder: Path = Path()) -> list[str]:
+def names(folder=Path()):
     return sorted(path.name for path in folder.iterdir())
 
 
@@ -120,7 +118,7 @@ def test_an_older_run_that_was_moved_aside_when_its_process_was_killed_is_put_ba
 
 
 def test_what_comes_in_between_is_not_replaced_at_the_end():
-    def interfere() -> None:
+    def interfere():
         with write_folder(Path("o"), overwrite=False):
             Path("o").mkdir()
             Path("o/thesis.doc").touch()

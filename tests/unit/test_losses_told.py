@@ -1,8 +1,5 @@
 """Wherever an RFD stands, losses and time without contact stand beside it, where there are any."""
 
-from pathlib import Path
-from typing import Any
-
 import pytest
 from digiclay.cli import main
 
@@ -11,7 +8,7 @@ from tests.scene_files import rows, scene_text
 #: A lift at 24 mm/s, just as fast as a pin rises, and one at 5 mm/s, that Method I follows.
 LIFTS = {"lost once": 24e-3, "": 5e-3}
 FOUR = ["--vary", "control.force_gain=2,2.1,2.2,2.3", "--workers", "1"]
-COMMANDS: dict[str, tuple[list[str], str]] = {
+COMMANDS = {
     "run": (["run", "my.toml"], ""),
     "batch": (["batch", "jobs.toml"], "index.html"),
     "sweep of a batch": (["sweep", "my.toml", *FOUR], "sweep.csv"),
@@ -19,8 +16,8 @@ COMMANDS: dict[str, tuple[list[str], str]] = {
 }
 
 
-@pytest.mark.parametrize(("name", "said"), [*((name, "lost once") for name in COMMANDS), ("run", "")])
-def test_losses_are_told_where_there_are_any(name: str, said: str, here: Path, capsys: Any) -> None:
+@pytest.mark.parametrize("name, said", [*((name, "lost once") for name in COMMANDS), ("run", "")])
+def test_losses_are_told_where_there_are_any(name, said, here, capsys):
     words, table = COMMANDS[name]
     points = [(0.0, 0.041), (0.2, 0.037), (0.5, 0.037), (1.5, 0.037 + LIFTS[said])]
     text = scene_text(13, 13, *points) + 'interpolation = "linear"\n[control]\nmethod = "virtual_master"\n'

@@ -6,9 +6,6 @@ import os
 import re
 import struct
 import time
-from collections.abc import Callable
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -23,7 +20,7 @@ PROMISE = bytes(80) + struct.pack("<I", 4_000_000)
 BINARY = "ply\nformat binary_little_endian 1.0\nelement vertex 9000000000\n"
 
 
-def written(folder: Path, kind: str) -> Path:
+def written(folder, kind):
     """Write a ball of 320 triangles, 20 mm across, in a format; 3MF by the program itself."""
     ball = trimesh.creation.icosphere(subdivisions=2, radius=10.0)
     path = folder / f"ball.{kind.split('_')[0]}"
@@ -42,7 +39,7 @@ def written(folder: Path, kind: str) -> Path:
     return path
 
 
-def obj(folder: Path, text: str) -> Path:
+def obj(folder, text):
     (folder / "odd.obj").write_bytes(text.encode())
     return folder / "odd.obj"
 
@@ -69,7 +66,7 @@ THREE = "v 0 0 0\nv 1 0 0\nv 0 1 0\n"
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    "text, said",
     [
         (f"{THREE}f 1 2 9\n", "vertex 9 of 3"),
         (f"{THREE}f -1 -2 -9\n", "line 4: there is no vertex -9"),
@@ -136,7 +133,7 @@ def test_a_byte_order_mark_and_many_blocks_change_nothing(tmp_path, kind, monkey
 
 
 @pytest.mark.parametrize(
-    ("name", "content", "said"),
+    "name, content, said",
     [
         ("many.stl", PROMISE + bytes(50), "1 of its 4,000,000 triangles"),
         ("many.ply", BINARY + "property float x\nend_header\n",
@@ -167,15 +164,15 @@ PLACES = np.array([[0.0, 0, 0], [5, 0, 0], [0, 7, 0], [0, 0, 11]])
 FACES = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
 
 
-def inline(data: bytes) -> dict[str, Any]:
+def inline(data):
     """Return a buffer that has its bytes as text."""
     return {"byteLength": len(data), "uri": "data:;base64," + base64.b64encode(data).decode()}
 
 
-def gltf(folder: Path, change: Callable[[dict[str, Any]], None] = lambda tree: None) -> Path:
+def gltf(folder, change=lambda tree: None):
     """Write a tetrahedron as glTF with its bytes inside, after changing what it says."""
     places, corners = PLACES.astype("<f4").tobytes(), FACES.astype("<u2").tobytes()
-    tree: dict[str, Any] = {
+    tree = {
         "asset": {"version": "2.0"},
         "scenes": [{"nodes": [0]}],
         "nodes": [{"mesh": 0}],
@@ -194,7 +191,7 @@ def gltf(folder: Path, change: Callable[[dict[str, Any]], None] = lambda tree: N
     return path
 
 
-def with_uri(uri: str) -> Callable[[dict[str, Any]], None]:
+def with_uri(uri):
     """Return a change that takes the bytes from elsewhere."""
     return lambda tree: tree["buffers"][0].update(uri=uri)
 
@@ -212,9 +209,9 @@ def test_nodes_are_turned_shifted_and_stretched_as_trimesh_has_them(tmp_path):
     assert volume == pytest.approx(24 * 5 * 7 * 11 / 6, rel=1e-6)
 
 
-@pytest.mark.parametrize(("mode", "corners"), [(5, [0, 1, 2, 3, 0]), (6, [0, 1, 2, 3])])
+@pytest.mark.parametrize("mode, corners", [(5, [0, 1, 2, 3, 0]), (6, [0, 1, 2, 3])])
 def test_strips_and_fans_are_cut_into_triangles(tmp_path, mode, corners):
-    def change(tree: dict[str, Any]) -> None:
+    def change(tree):
         data = PLACES.astype("<f4").tobytes() + np.array(corners, "<u2").tobytes()
         tree["buffers"] = [inline(data)]
         tree["bufferViews"][1]["byteLength"] = 2 * len(corners)
@@ -229,7 +226,7 @@ def test_strips_and_fans_are_cut_into_triangles(tmp_path, mode, corners):
 def test_vertices_that_are_quantized_are_read_and_extensions_of_materials_do_not_matter(tmp_path, normalized):
     whole = np.round(PLACES * 1000.0).astype("<i2")
 
-    def change(tree: dict[str, Any]) -> None:
+    def change(tree):
         tree["extensionsRequired"] = ["KHR_mesh_quantization", "KHR_materials_unlit", "KHR_texture_basisu"]
         tree["accessors"][0].update(componentType=5122, normalized=normalized)
         tree["bufferViews"][0].update(byteLength=32, byteStride=8)
@@ -258,7 +255,7 @@ def test_bytes_from_elsewhere_are_refused(tmp_path, uri):
 
 
 def test_a_pipe_beside_the_gltf_is_not_opened_nor_its_pictures_and_endless_nesting_is_refused(tmp_path):
-    def change(tree: dict[str, Any]) -> None:
+    def change(tree):
         tree["images"], tree["textures"] = [{"uri": "pipe.bin"}, {"uri": "../../dev/zero"}], [{"source": 0}]
         tree["materials"] = [{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}]
         tree["meshes"][0]["primitives"][0]["material"] = 0
@@ -273,7 +270,7 @@ def test_a_pipe_beside_the_gltf_is_not_opened_nor_its_pictures_and_endless_nesti
         read(path)
 
 
-def many_nodes(tree: dict[str, Any]) -> None:
+def many_nodes(tree):
     """Place a mesh of 30 000 corners, three bytes and their repetition, three thousand times."""
     tree["nodes"], tree["scenes"] = [{"mesh": 0}] * 3003, [{"nodes": list(range(3003))}]
     tree["bufferViews"][1] = {"buffer": 1, "byteLength": 60_000}
@@ -282,7 +279,7 @@ def many_nodes(tree: dict[str, Any]) -> None:
 
 
 @pytest.mark.parametrize(
-    ("change", "said"),
+    "change, said",
     [
         (many_nodes, "must have at most 20 million triangles (got one.gltf: 30,030,000)"),
         (lambda tree: tree["nodes"].append({"children": [0, 0]}) or tree["scenes"][0].update(nodes=[1]),

@@ -7,10 +7,10 @@ import pytest
 import trimesh
 from digiclay.core.base.errors import ParameterError
 from digiclay.core.model.actuator import Actuator
-from digiclay.core.model.layout import Layout, make_grid
+from digiclay.core.model.layout import ARRANGEMENTS, Layout, make_grid
 from digiclay.core.shapes.fitting import fit_shape
-from digiclay.core.shapes.mesh_relief import SMALL, ShapeMesh, fill_holes, make_shape_mesh
-from digiclay.core.shapes.request import Placement, Shape, Tops
+from digiclay.core.shapes.mesh_relief import SMALL, fill_holes, make_shape_mesh
+from digiclay.core.shapes.request import Placement, Shape
 from digiclay.core.surface.formed import take_corners
 from scipy.interpolate import LinearNDInterpolator
 from scipy.spatial import Delaunay
@@ -21,16 +21,16 @@ IN_PLACE = Placement(1e-3, 1e-3, 0.0, 0.0)
 ROUNDING = 1e-12
 
 
-def shape(mesh: trimesh.Trimesh, up: str = "z") -> ShapeMesh:
+def shape(mesh, up="z"):
     return make_shape_mesh("test.stl", mesh.vertices, mesh.faces, up, 1e-3)
 
 
-def tops(mesh: trimesh.Trimesh, arrangement: str = "aligned", side: int = 21) -> Tops:
+def tops(mesh, arrangement="aligned", side=21):
     """Return a mesh's tops on a bed 2 mm apart."""
     return shape(mesh).tops(make_grid(Layout(side, side, 2e-3, arrangement)), IN_PLACE)
 
 
-@pytest.mark.parametrize("arrangement", ["aligned", "staggered", "hexagonal"])
+@pytest.mark.parametrize("arrangement", ARRANGEMENTS)
 @pytest.mark.parametrize("seed", range(2))
 def test_the_top_of_a_terrain_is_what_scipy_interpolates(arrangement, seed):
     chance = np.random.default_rng(seed)
@@ -92,7 +92,7 @@ def test_every_direction_of_a_mesh_can_be_up(up):
 
 
 @pytest.mark.parametrize(
-    ("mesh", "closed"),
+    "mesh, closed",
     [
         (trimesh.creation.box(), True),
         (trimesh.creation.icosphere(), True),
@@ -121,7 +121,7 @@ TRIANGLE = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
 
 
 @pytest.mark.parametrize(
-    ("vertices", "faces", "said"),
+    "vertices, faces, said",
     [
         (np.zeros((0, 3)), np.zeros((0, 3), int), "surface made of faces (got odd.stl: no face)"),
         (TRIANGLE, np.zeros((0, 3), int), "surface made of faces (got odd.stl: no face)"),
@@ -135,15 +135,12 @@ def test_what_is_no_surface_is_refused(vertices, faces, said):
         make_shape_mesh("odd.stl", vertices, np.array(faces), "z", 1e-3)
 
 
-ARRANGEMENTS = ("aligned", "staggered", "hexagonal")
-
-
-def ground(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+def ground(x, y):
     """Return the height of a hilly ground 20 mm up, mm."""
     return 20.0 + 0.1 * x + 3.0 * np.sin(x / 20.0) * np.cos(y / 25.0)
 
 
-def scan(*holes: tuple[float, float, float], size: float = 40.0) -> trimesh.Trimesh:
+def scan(*holes, size=40.0):
     """Return the ground as triangles 1 mm wide, without those in holes: x, y and radius, mm."""
     side = np.arange(-size, size + 1.0)
     x, y = (axis.ravel() for axis in np.meshgrid(side, side, indexing="ij"))
@@ -179,7 +176,7 @@ def test_a_hole_in_the_top_of_a_solid_is_filled_though_its_inside_is_seen_throug
     assert np.abs(found.value - ground(bed.x * 1e3, bed.y * 1e3)).max() < 0.1
 
 
-def turned(share: float) -> trimesh.Trimesh:
+def turned(share):
     mesh = scan()
     some = np.random.default_rng(2).random(len(mesh.faces)) < share
     mesh.faces[some] = mesh.faces[some][:, ::-1]
@@ -187,7 +184,7 @@ def turned(share: float) -> trimesh.Trimesh:
 
 
 @pytest.mark.parametrize(
-    ("mesh", "bare"),
+    "mesh, bare",
     [
         (scan((0.0, 0.0, 12.0)), lambda x, y: np.hypot(x, y) < 11.0),  # more than a twentieth of the pins
         (trimesh.creation.annulus(3.0, 30.0, 10.0), lambda x, y: np.hypot(x, y) < 2.5),

@@ -1,18 +1,15 @@
 """Method III finds a fingertip from its undersides, and brings loaded pins to their heights in time."""
 
 import math
-from typing import Any
 
 import numpy as np
 import pytest
-from digiclay.core.base.arrays import Floats
-from digiclay.core.control.finger_estimate import Estimate, FingerFilter, Spread, invert_six
+from digiclay.core.control.finger_estimate import FingerFilter, Spread, invert_six
 from digiclay.core.control.finger_sections import Sections
-from digiclay.core.control.flow_servo import FlowServo, make_flow_servo
+from digiclay.core.control.flow_servo import make_flow_servo
 from digiclay.core.control.servo import Tracking, lock_overloaded
 from digiclay.core.model.control_interface import Measurement
 from digiclay.core.model.fingertip import Fingertip, compute_forms, compute_underside
-from digiclay.core.model.physics import Cell
 from digiclay.core.model.valve import Valve
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.toml_table import resolve
@@ -26,21 +23,19 @@ LONG = (100.0 - 64.0) / (100.0 + 64.0)
 X, Y = (grid.ravel() * 3e-3 for grid in np.meshgrid(np.arange(-6.0, 7.0), np.arange(-6.0, 7.0)))
 
 
-def filter_of(tip: Fingertip) -> FingerFilter:
+def filter_of(tip):
     """Return a filter of a fingertip, with the spread that Method III has."""
     return FingerFilter(tip, Spread(1.0, 0.5, 0.05, 30e-6), PERIOD)
 
 
-def underside(tip: Fingertip, x: float, y: float, z: float, turn: float) -> Floats:
+def underside(tip, x, y, z, turn):
     """Return the underside that the physics has over all cells, m."""
     pose = np.array([[x, y, z, math.cos(turn / 2), 0.0, 0.0, math.sin(turn / 2)]])
-    under: Floats = compute_underside(*compute_forms(tip.outline(pose)), make_basis(X, Y))[0]
+    under = compute_underside(*compute_forms(tip.outline(pose)), make_basis(X, Y))[0]
     return under
 
 
-def follow(
-    known: FingerFilter, tip: Fingertip, speed: float = 0.0, turn: float = 0.0, count: int = 200
-) -> Estimate:
+def follow(known, tip, speed=0.0, turn=0.0, count=200):
     """Return what a filter makes of a fingertip that moves along x, by the cells less than 2 mm above it."""
     found = known.begin(-9e-3, 0.0, 40.5e-3)
     for number in range(count):
@@ -53,7 +48,7 @@ def follow(
 
 
 @pytest.mark.parametrize(
-    ("size", "speed", "turn"),
+    "size, speed, turn",
     [(1.0, 0.0, 0.0), (1.0, 20e-3, 0.0), (1.0, 10e-3, 0.5 * math.pi), (1.0, 10e-3, 2.5), (0.75, 5e-3, 0.6),
      (1.3, 5e-3, 0.0)],
     ids=["at rest", "dragged", "across", "turned far", "smaller than known, turned", "larger"],
@@ -103,11 +98,11 @@ def test_the_inverse_is_that_of_numpy_also_where_pivots_vanish(order):
     assert np.isnan(invert_six(np.zeros((6, 6)))).any()
 
 
-def cell_of(**parts: Any) -> Cell:
+def cell_of(**parts):
     return make_system(**parts).cell
 
 
-def servo_of(cell: Cell, dead_time: float = 1e-3) -> FlowServo:
+def servo_of(cell, dead_time=1e-3):
     return make_flow_servo(cell, PERIOD, dead_time, BAND)
 
 
@@ -176,7 +171,7 @@ def test_the_command_is_proportional_to_the_height_error_and_an_overloaded_cell_
 
 
 @pytest.mark.parametrize("wanted", [[True] * 4, [True, False, True, True], [False] * 4])
-def test_of_cells_picked_for_some_fingers_each_finger_has_its_own(wanted: list[bool]) -> None:
+def test_of_cells_picked_for_some_fingers_each_finger_has_its_own(wanted):
     sections, values = Sections([4, 3, 2, 3]), np.arange(12.0)
     every = {0: [1.0, 3.0], 1: [5.0], 3: [9.0, 11.0]}  # none of the third finger's
     cells, fingers, picked = sections.pick(np.array([1, 3, 5, 9, 11]), wanted)
@@ -187,9 +182,7 @@ def test_of_cells_picked_for_some_fingers_each_finger_has_its_own(wanted: list[b
     assert spread == [[1] * 4 + [3] * 3 + [5] * 2 + [7] * 3, [2] * 4 + [4] * 3 + [6] * 2 + [8] * 3]
 
 
-@pytest.mark.parametrize(
-    ("asked", "force", "yields"), [(0.4, 0.17, False), (0.4, 0.19, True), (0.6, 0.19, False)]
-)
+@pytest.mark.parametrize("asked, force, yields", [(0.4, 0.17, False), (0.4, 0.19, True), (0.6, 0.19, False)])
 def test_a_single_pin_gives_way_that_carries_nearly_half_of_the_set_point(asked, force, yields):
     system = assemble(resolve({"control": {"method": "hybrid", "force_setpoint": asked}}))
     controller, count, pin = system.controller, system.grid.count, 312
