@@ -45,7 +45,7 @@ def assert_near(found, wanted, apart):
 
 
 @contextmanager
-def refused_in_a_line(error, words):
+def refused_in_a_line(error, words=None):
     """Assert that what is done here is refused, in one line that has some words (a pattern)."""
     with pytest.raises(error, match=words) as caught:
         yield caught

@@ -19,6 +19,11 @@ flat_radius = 0.002
 TOUCH = (0.0, 0.041), (0.05, 0.038), (0.1, 0.05)
 
 
+def command(line):
+    """Return the words of a command line."""
+    return line.split()
+
+
 def read_text(path):
     """Return a text file's content."""
     return path.read_text(encoding="utf-8")

@@ -27,6 +27,7 @@ DARK, LIGHT = (0.09, 0.09, 0.09), (0.93, 0.93, 0.93)
 CHANNEL = st.floats(0.0, 1.0)
 COLOR = st.tuples(CHANNEL, CHANNEL, CHANNEL)
 ROOM = (0.0, 0.0, 900.0, 700.0)
+COLORED = choose_colors(DARK, LIGHT)
 
 
 def session(**changes):
@@ -55,7 +56,7 @@ def test_letters_and_curves_stand_out_from_any_theme(back, ink):
 
 
 def draw(told):
-    return lay_out(told, choose_colors(DARK, LIGHT), ROOM, 1.0)
+    return lay_out(told, COLORED, ROOM, 1.0)
 
 
 EMPTY = np.empty(0)
@@ -106,7 +107,7 @@ def test_it_tells(case):
 
 @pytest.mark.parametrize("scale", [0.5, 1.0, 2.0])
 def test_every_mark_lies_on_the_box_behind_it_at_every_ui_scale(scale):
-    picture = lay_out(session(), choose_colors(DARK, LIGHT), (0.0, 0.0, 2000.0, 2000.0), scale)
+    picture = lay_out(session(), COLORED, (0.0, 0.0, 2000.0, 2000.0), scale)
     (box,) = picture.boxes
     assert box.width == 290.0 * scale
     points = [line.points for line in picture.lines]
@@ -146,7 +147,7 @@ def test_a_row_too_long_for_its_box_has_smaller_letters():
 
 def test_a_low_view_leaves_sections_away_and_a_narrow_one_all():
     def fit(width, height):
-        return lay_out(session(), choose_colors(DARK, LIGHT), (0.0, 0.0, width, height), 1.0)
+        return lay_out(session(), COLORED, (0.0, 0.0, width, height), 1.0)
 
     sections = ("Total force", "Heights", "Pins by mode")
     for height, there in ((700.0, sections), (320.0, sections[::2]), (240.0, sections[:1])):
@@ -161,7 +162,7 @@ def test_a_low_view_leaves_sections_away_and_a_narrow_one_all():
 def test_it_stands_in_the_chosen_corner_of_the_room_that_panels_leave(corner, content):
     room = find_room(900.0, 700.0, [("LEFT", 50.0), ("RIGHT", 200.0), ("TOP", 26.0), ("TOP", 26.0)])
     assert room == (50.0, 0.0, 700.0, 648.0)
-    picture = lay_out(session(), choose_colors(DARK, LIGHT), room, 1.0, content, corner)
+    picture = lay_out(session(), COLORED, room, 1.0, content, corner)
     box, (left, bottom, right, top) = picture.boxes[0], room
     gap = box.x - left if corner.endswith("left") else right - box.x - box.width
     assert gap == 12.0
@@ -179,7 +180,7 @@ def test_it_stands_in_the_chosen_corner_of_the_room_that_panels_leave(corner, co
     ],
 )
 def test_in_short_it_has_two_rows(changes, rows):
-    picture = lay_out(session(**changes), choose_colors(DARK, LIGHT), ROOM, 1.0, COMPACT, "top_left")
+    picture = lay_out(session(**changes), COLORED, ROOM, 1.0, COMPACT, "top_left")
     assert said(picture) == rows
     assert picture.boxes[0].height < 60.0
 
@@ -188,7 +189,7 @@ def test_in_short_several_fingertips_stand_two_in_a_row_below_and_none_over_anot
     told = session(
         fingers=tuple((number, LIGHT) for number in (1, 2, 31)), finger_force=np.full((1001, 3), 0.4)
     )
-    picture = lay_out(told, choose_colors(DARK, LIGHT), ROOM, 1.0, COMPACT, "top_left")
+    picture = lay_out(told, COLORED, ROOM, 1.0, COMPACT, "top_left")
     assert said(picture).endswith("1: 0.40 N | 2: 0.40 N | 31: 0.40 N")
     assert 80.0 < picture.boxes[0].height < 100.0
     one, two, three = [(words.x, words.y) for words in picture.words[-3:]]

@@ -24,7 +24,7 @@ from numpy.testing import assert_array_equal
 
 from tests.assemble import assert_near
 from tests.own_methods import COPY, HEAD, PAD, forgotten, refused, small, write_method
-from tests.scene_files import read_text, write_text
+from tests.scene_files import command, read_text, write_text
 from tests.timeouts import TIMEOUT
 
 
@@ -164,7 +164,7 @@ def jobs(here):
 
 
 def prepare():
-    code = main(["batch", "jobs.toml", "--method", "pad.py:SoftPad", "--prepare", "--quiet"])
+    code = main(command("batch jobs.toml --method pad.py:SoftPad --prepare --quiet"))
     remove_method("soft_pad")
     return code
 
@@ -176,7 +176,7 @@ def test_a_job_has_its_code_beside_it_and_is_done_again_after_a_change_of_it(job
     assert read_text(JOB / "method.py") == PAD
     assert "--method path/to/mine.py:Mine" in refused(capsys, "job", str(JOB), "--quiet")
     assert judge_run(JOB, RUN) is RunState.ABSENT
-    own = ["--method", "method.py:SoftPad", "--quiet"]
+    own = command("--method method.py:SoftPad --quiet")
     assert main(["job", str(JOB), *own]) == 0
     assert judge_run(JOB, RUN) is RunState.WHOLE
     found = json.loads(read_text(RUN / "metrics.json"))
@@ -187,7 +187,7 @@ def test_a_job_has_its_code_beside_it_and_is_done_again_after_a_change_of_it(job
     assert judge_run(JOB, RUN) is RunState.CHANGED
     assert main(["job", str(JOB), *own]) == 0
     assert judge_run(JOB, RUN) is RunState.WHOLE
-    assert main(["batch", "jobs.toml", "--method", "pad.py:SoftPad", "--submit", "cuecmd", "--quiet"]) == 0
+    assert main(command("batch jobs.toml --method pad.py:SoftPad --submit cuecmd --quiet")) == 0
     lists = "".join(read_text(path) for path in sorted(jobs.glob("jobs/cuecmd/*.txt")))
     assert "--method method.py:SoftPad" in lists  # farms are told the code
 
@@ -197,12 +197,12 @@ CODE = re.findall(r"```python\n(.*?)```", read_text(PAGE), re.DOTALL)
 
 
 def test_the_template_runs_as_it_is_and_its_run_needs_no_code_any_more(here, capsys):
-    assert main(["new-method", "soft_pad", "--out", "own"]) == 0
+    assert main(command("new-method soft_pad --out own")) == 0
     assert "--method own/soft_pad.py:SoftPad" in capsys.readouterr().out
-    assert main(["describe", "tap", "--set", "control.method=own/soft_pad.py:SoftPad"]) == 0
+    assert main(command("describe tap --set control.method=own/soft_pad.py:SoftPad")) == 0
     assert "soft_pad: " in capsys.readouterr().out
-    size = ["--set", "layout.rows=11", "--set", "layout.columns=11", "--set", "simulation.duration=0.25"]
-    own = ["--method", "own/soft_pad.py:SoftPad", "--quiet", "--no-errors"]
+    size = command("--set layout.rows=11 --set layout.columns=11 --set simulation.duration=0.25")
+    own = command("--method own/soft_pad.py:SoftPad --quiet --no-errors")
     assert main(["run", "tap", *own, *size, "--out", "r"]) == 0
     text = read_text(here / "own" / "soft_pad.py")
     assert read_text(here / "r" / "method.py") == text
@@ -211,10 +211,10 @@ def test_the_template_runs_as_it_is_and_its_run_needs_no_code_any_more(here, cap
     assert pressed.scene.method == "soft_pad"
     remove_method("soft_pad")
     assert read_run(here / "r", "height").scene.control is None
-    assert main(["export", "r", "--format", "stl", "--quiet"]) == 0
-    assert main(["run", "r", "--out", "again"]) == 2
+    assert main(command("export r --format stl --quiet")) == 0
+    assert main(command("run r --out again")) == 2
     assert "--method path/to/mine.py:Mine" in capsys.readouterr().err
-    assert main(["run", "r", "--method", "r/method.py:SoftPad", "--out", "again", "--quiet"]) == 0
+    assert main(command("run r --method r/method.py:SoftPad --out again --quiet")) == 0
     again = read_run(here / "again", "height").history["height"]
     assert again.tobytes() == pressed.history["height"].tobytes()
 
@@ -226,7 +226,7 @@ def test_the_template_runs_as_it_is_and_its_run_needs_no_code_any_more(here, cap
         (["Mine"], "must be small letters and digits"),
         (["a/b"], "must be small letters and digits"),
         (["elastic"], "must not be that of a built-in method"),
-        (["pad", "--out", "mine.py"], "mine.py is a file"),
+        (command("pad --out mine.py"), "mine.py is a file"),
     ],
 )
 def test_a_name_that_cannot_be_is_refused_in_a_line(here, arguments, said, capsys):
@@ -236,9 +236,9 @@ def test_a_name_that_cannot_be_is_refused_in_a_line(here, arguments, said, capsy
 
 
 def test_a_sweep_varies_methods_and_goes_on_with_the_same_code_only(here, capsys):
-    assert main(["new-method", "mine", "--quiet"]) == 0
-    size = ["--set", "layout.rows=11", "--set", "layout.columns=11", "--set", "simulation.duration=0.05"]
-    varied = ["--vary", "control.method=elastic,mine.py:Mine", "--workers", "1", "--out", "s", "--quiet"]
+    assert main(command("new-method mine --quiet")) == 0
+    size = command("--set layout.rows=11 --set layout.columns=11 --set simulation.duration=0.05")
+    varied = command("--vary control.method=elastic,mine.py:Mine --workers 1 --out s --quiet")
     assert main(["sweep", "tap", *varied, *size]) == 0
     assert read_text(here / "s" / "sweep.csv").split()[-2:][0].startswith("elastic,")
     assert main(["sweep", "tap", *varied, *size]) == 0

@@ -144,7 +144,6 @@ def test_a_pace_that_is_too_fast_is_seen_to_fail(raised, height):
 
 def test_what_is_made_for_hands_is_led_at_100_mm_a_second_and_a_method_of_one_s_own_carefully():
     tracking = find_tracking(DESIGN, assemble(DESIGN))
-    assert tracking is not None
     assert min(tracking.drag, tracking.push) >= 0.1
     assert tracking.limit_drag(50e-3, pressed=False) == tracking.drag  # the skirt is there at any height
     assert ControlParameters().pace == Pace()

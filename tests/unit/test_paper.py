@@ -36,13 +36,18 @@ from digiclay_paper.results import AS_IT_IS, SESSION, WAYS, Dragged, Located, Re
 from digiclay_paper.scenes import METHODS
 from digiclay_paper.simulations import GAUSSIAN, NO_RISE, STAGGERED, WINDOWS, located, sessions
 
+FIRST, SECOND = METHODS
 GOOD = Follows(speed=15e-3, losses=0, loss_share=0.0, lag=1e-3, rfd=0.02)
 
 
+def session_of(scene, history=()):
+    """Return a session of which nothing but its history is known."""
+    return Session(scene, dict(history), {}, {}, [], 0.0, {})
+
+
 def results(*swings, **bad):
-    simple = {(method, name): bad.get(method, GOOD) for method in scenes.METHODS for name in WAYS}
-    session = Session(resolve({}), {}, {}, {}, [], 0.0, {})
-    return Results(simple=simple, swings=list(swings), printed={scenes.METHODS[0]: session})
+    simple = {(method, name): bad.get(method, GOOD) for method in METHODS for name in WAYS}
+    return Results(simple=simple, swings=list(swings), printed={FIRST: session_of(resolve({}))})
 
 
 def swing(gain, amplitude, settling, position_gain=500.0):
@@ -77,17 +82,17 @@ def test_the_oscillation_is_all_of_the_papers_only_at_the_gain_of_its_session():
     assert "at 50 1/N (amplitude 0.200 N, 10 Hz)" in beyond.measured
     assert "are below the onset, 10 times this K_f" in beyond.why  # the scene's own K_f is 5 1/N
     scene = resolve({"control": {"method": "virtual_master", "force_gain": 60.0}})
-    swings.printed[scenes.METHODS[0]] = swings.printed[scenes.METHODS[0]]._replace(scene=scene)
+    swings.printed[FIRST] = swings.printed[FIRST]._replace(scene=scene)
     assert onset(swings).verdict == "holds"
 
 
 @pytest.mark.parametrize("height, said", [(1.6, "holds"), (1.4, "holds in part"), (None, "holds in part")])
 def test_deviations_count_in_each_of_the_papers_windows(height, said):
     once, twice = (dict.fromkeys((*DEVIATIONS, *WINDOWED, "set_point"), value) for value in (1.0, 2.0))
-    known = results().printed[scenes.METHODS[0]]
+    known = results().printed[FIRST]
     one, two = (known._replace(metrics=each, windows=dict.fromkeys(WINDOWS, each)) for each in (once, twice))
     two.windows["valley alone"] = twice | {"height_deviation": height}
-    found = dict(zip(scenes.METHODS, (one, two), strict=True))
+    found = dict(zip(METHODS, (one, two), strict=True))
     assert deviations(replace(results(), printed=found, session=found)).verdict == said
 
 
@@ -129,10 +134,10 @@ def lost(tmp_path_factory):
 
 
 def test_a_session_a_method_loses_the_finger_in_is_run_again_slowly_enough(lost):
-    assert [bool(lost.printed[method].lost) for method in scenes.METHODS] == [False, True]
+    assert [bool(lost.printed[method].lost) for method in METHODS] == [False, True]
     # 10 mm/s over four fifths of 6 mm/s is 2.08; in steps of a tenth.
     assert lost.slow == pytest.approx(2.1)
-    assert [lost.session[method].lost for method in scenes.METHODS] == [[], []]
+    assert [lost.session[method].lost for method in METHODS] == [[], []]
     claim = carried_out(lost)
     assert claim.verdict == "holds in part"
     assert f"Method II: finger lost at {lost.printed['cell_states'].lost[0]:.2f} s" in claim.measured
@@ -154,21 +159,26 @@ BAD = EASY._replace(follows=replace(GOOD, lag=5e-3))
 def dragged(**found):
     variants = {"it": AS_IT_IS, "rise": NO_RISE, "staggered": STAGGERED, "gaussian": GAUSSIAN}
     keys = (name.split("_") for name in found)
-    known = [(variants[what], scenes.METHODS[len(which) - 1], SURFACE) for what, which in keys]
+    known = [(variants[what], METHODS[len(which) - 1], SURFACE) for what, which in keys]
     return dict(zip(known, found.values(), strict=True))
+
+
+def drags(**found):
+    """Return results that are drags alone."""
+    return Results(dragged=dragged(**found))
 
 
 def limits(third, lift=20e-3):
     """Return results of both methods with the speed of the second in a valley, and at a lift, m/s."""
-    found, (one, two) = results(), scenes.METHODS
+    found, (one, two) = results(), METHODS
     found.printed[two], found.lifting = found.printed[one], {one: 20e-3, two: lift}
-    speeds = {(method, way): 20e-3 for method in scenes.METHODS for way in WAYS}
+    speeds = {(method, way): 20e-3 for method in METHODS for way in WAYS}
     return replace(found, fastest=speeds | {(two, "a valley"): third})
 
 
 LOUDER = HARD._replace(force=0.4)
 STAYS = EASY._replace(ahead=-0.4e-3)  # less than a tenth of 4.5 mm
-SHALLOW = {(AS_IT_IS, scenes.METHODS[0], "less deep"): EASY._replace(ahead=0.0)}
+SHALLOW = {(AS_IT_IS, FIRST, "less deep"): EASY._replace(ahead=0.0)}
 SLOWER = (swing(2.0, 0.001, 0.2), swing(5.0, 0.001, 0.3), swing(50.0, 0.2, None))
 
 
@@ -176,13 +186,13 @@ SLOWER = (swing(2.0, 0.001, 0.2), swing(5.0, 0.001, 0.3), swing(50.0, 0.2, None)
     "claim, found, verdict, words",
     [
         # A rise that raises force and RFD causes them.
-        (rise, lambda: Results(dragged=dragged(it_II=HARD, rise_II=EASY)), "holds", "0.80 N with the rise a"),
-        (rise, lambda: Results(dragged=dragged(it_II=HARD, rise_II=HARD)), "differs", ""),
-        (rise, lambda: Results(dragged=dragged(it_II=LOUDER, rise_II=EASY)), "holds in part", ""),
+        (rise, lambda: drags(it_II=HARD, rise_II=EASY), "holds", "0.80 N with the rise a"),
+        (rise, lambda: drags(it_II=HARD, rise_II=HARD), "differs", ""),
+        (rise, lambda: drags(it_II=LOUDER, rise_II=EASY), "holds in part", ""),
         # Cells ahead that stay up are not lowered.
-        (ahead, lambda: Results(dragged=dragged(it_I=EASY)), "holds", ""),
-        (ahead, lambda: Results(dragged=dragged(it_I=STAYS, it_II=EASY)), "differs", ""),
-        (ahead, lambda: Results(dragged=dragged(it_I=EASY._replace(ahead=None))), "differs", ""),
+        (ahead, lambda: drags(it_I=EASY), "holds", ""),
+        (ahead, lambda: drags(it_I=STAYS, it_II=EASY), "differs", ""),
+        (ahead, lambda: drags(it_I=EASY._replace(ahead=None)), "differs", ""),
         (ahead, lambda: Results(dragged=dragged(it_I=EASY) | SHALLOW), "holds in part", ""),
         # A method that swings at some gain has not escaped.
         (escape, lambda: escaped(swing(50.0, 0.002, None)), "holds", ""),
@@ -204,8 +214,8 @@ def test_a_claim_has_the_verdict_of_its_evidence(claim, found, verdict, words):
 
 
 def escaped(point):
-    known = {method: resolve({"control": {"method": method}}) for method in scenes.METHODS}
-    printed = {method: Session(scene, {}, {}, {}, [], 0.0, {}) for method, scene in known.items()}
+    known = {method: resolve({"control": {"method": method}}) for method in METHODS}
+    printed = {method: session_of(scene) for method, scene in known.items()}
     return Results(cell_swings=[swing(15.0, 0.001, None), point], printed=printed)
 
 
@@ -236,15 +246,12 @@ def test_a_search_radius_lowers_the_scatter_of_noisy_sensors_and_thresholds_do_a
 
 @pytest.mark.parametrize("variant", [STAGGERED, GAUSSIAN])
 def test_a_variant_holds_where_it_is_followed_as_the_scene_is(variant):
-    def judge(**drags):
-        return varied(variant, Results(dragged=dragged(**drags)))
-
     same = {"it_I": EASY, "it_II": BAD, f"{variant}_I": EASY, f"{variant}_II": BAD}
-    assert judge(**same).verdict == "holds"  # what fails anyway says nothing of the variant
-    worse = judge(**{**same, "it_II": EASY})
+    assert varied(variant, drags(**same)).verdict == "holds"  # what fails anyway says nothing of the variant
+    worse = varied(variant, drags(**same | {"it_II": EASY}))
     assert worse.verdict == "holds in part"
     assert "Not so: Method II, in the surface." in worse.why
-    assert judge(**{"it_I": BAD, f"{variant}_I": BAD}).verdict == "differs"
+    assert varied(variant, drags(**{"it_I": BAD, f"{variant}_I": BAD})).verdict == "differs"
 
 
 def test_panels_are_lettered_and_their_named_curves_are_the_data():
@@ -283,14 +290,14 @@ def session(method, followers):
         "total_force": np.full(97, 0.4), "set_point": np.full(97, 0.4), "following": np.full(97, followers),
         "fingertip": tip, "position": place, "height": np.full((1, len(place)), REST),
     }  # fmt: skip
-    return Session(scene, history, {}, {}, [], 0.0, {})
+    return session_of(scene, history)
 
 
 def formed(bare, over):
     return bare._replace(history={**bare.history, "height": (REST + over)[None]})
 
 
-@pytest.fixture(scope="module", params=[(METHODS[0], 8), (METHODS[1], 16)], ids=METHODS)
+@pytest.fixture(scope="module", params=[(FIRST, 8), (SECOND, 16)], ids=METHODS)
 def bare(request):
     return session(*request.param)
 
@@ -305,16 +312,16 @@ def test_the_flank_asked_for_is_that_of_the_profile_and_the_claim_names_the_sect
     # 12 mm beside the ridge. Method I: flat to 6, down at 15 mm. Method II: flat to 3, down at 12 mm
     # from the outermost cell under the finger; a disc of 16 cells reaches 3 (sqrt(16/pi) - 0.5) mm.
     reach = 3.0 * (np.sqrt(16.0 / np.pi) - 0.5)
-    for method, count, share in ((METHODS[0], 8, 3.0 / 9.0), (METHODS[1], 16, reach / 9.0)):
+    for method, count, share in ((FIRST, 8, 3.0 / 9.0), (SECOND, 16, reach / 9.0)):
         one = session(method, count)
         assert asked_for(one)[at(one, 0, -9)][0] == pytest.approx(RIDGE * share, rel=1e-9)
-    one, two = session(METHODS[0], 8), session(METHODS[1], 16)
+    one, two = session(FIRST, 8), session(SECOND, 16)
     over = asked_for(two)
     over[at(two, 12, 21)] = -4e-3
-    claim = relief(Results(session={METHODS[0]: formed(one, asked_for(one)), METHODS[1]: formed(two, over)}))
+    claim = relief(Results(session={FIRST: formed(one, asked_for(one)), SECOND: formed(two, over)}))
     assert claim.verdict == "holds in part"
     assert "Method II misses along the valley:" in claim.why
-    both = {METHODS[0]: formed(one, asked_for(one)), METHODS[1]: formed(two, asked_for(two))}
+    both = {FIRST: formed(one, asked_for(one)), SECOND: formed(two, asked_for(two))}
     assert relief(Results(session=both)).verdict == "holds"
 
 

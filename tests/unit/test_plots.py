@@ -44,6 +44,11 @@ def drag(rows=12, columns=14, arrangement="aligned"):
     return {name: array.copy() for name, array in _drag(rows, columns, arrangement).items()}
 
 
+def words(part):
+    """Return the texts of a legend."""
+    return [text.get_text() for text in part.get_legend().get_texts()]
+
+
 def axes(figure, label):
     return next(part for part in figure.axes if part.get_label() == label)
 
@@ -73,8 +78,7 @@ def test_every_axis_has_its_unit_and_every_curve_its_name(session, surface):
         "heights": ("", "height (mm)"), "force": ("time (s)", "force (N)"), "map": plan,
         "scale": ("", "height (mm)"),
     }  # fmt: skip
-    legends = [axes(session, label).get_legend().get_texts() for label in ("heights", "force")]
-    names = [text.get_text() for texts in legends for text in texts]
+    names = words(axes(session, "heights")) + words(axes(session, "force"))
     assert names == [*"ABCDEF", "total force", "set point 0.37 N", "in contact"]
 
 
@@ -108,14 +112,12 @@ def test_a_set_point_is_drawn_of_each_cell_and_without_one_neither_it_nor_a_devi
     force = axes(plots.session_figure(case, SetPoint(0.04, per_cell=True)), "force")
     expected = np.repeat([np.nan, 0.2, 0.12], [50, 50, 101])
     assert_allclose(force.get_lines()[1].get_ydata(), expected, rtol=1e-12)  # rounding
-    assert "set point 0.04 N a cell" in [text.get_text() for text in force.get_legend().get_texts()]
+    assert "set point 0.04 N a cell" in words(force)
     figure = plots.session_figure(drag(), None)
     force, told = axes(figure, "force"), axes(figure, "figures")
     assert [line.get_label() for line in force.get_lines()] == ["total force"]
-    words = " ".join(text.get_text() for text in (*force.get_legend().get_texts(), *told.texts))
-    assert "largest force" in words
-    assert "set point" not in words
-    assert "RFD" not in words
+    said = " ".join([*words(force), *(text.get_text() for text in told.texts)])
+    assert [part in said for part in ("largest force", "set point", "RFD")] == [True, False, False]
 
 
 def test_the_surface_is_to_scale_and_shows_the_final_heights_and_the_path(surface):
@@ -250,8 +252,7 @@ def test_a_figure_of_several_fingertips_has_force_cell_and_path_of_each():
         assert_array_equal(line.get_ydata(), own)
     assert len({(line.get_color(), line.get_linestyle()) for line in lines}) == 3
     assert (force.get_xlabel(), force.get_ylabel()) == ("time (s)", "force (N)")
-    legends = [[text.get_text() for text in part.get_legend().get_texts()] for part in (heights, force)]
-    assert legends == [["1", "2"], ["set point 0.2 N", "in contact"]]
+    assert (words(heights), words(force)) == (["1", "2"], ["set point 0.2 N", "in contact"])
     # The color of a cell is that of its fingertip, which is over it in the middle of its contact.
     assert [line.get_color() for line in heights.get_lines()] == [line.get_color() for line in lines[:2]]
     reached = case["position"][plots.session_cells(case)]

@@ -83,7 +83,6 @@ def test_a_session_takes_no_more_memory_the_longer_it_lasts():
     hand, session = Hand(), started()
     circle = [(5.0 * np.cos(turn), 38.0) for turn in np.linspace(0.0, 6.0, 30)]
     session = hand.move(session, [*circle * 11])  # longer than the trace's ten seconds, so that it is full
-    assert session.errors is not None
     assert 0.0 < session.errors.height < 1e-4
     tracemalloc.start()
     try:
@@ -120,7 +119,6 @@ class Bed:
 def plays(session):
     """Return whether the recording of a session gives its state again bit for bit."""
     keep = session.recording
-    assert keep is not None
     *_, again = simulate_path(session.system, snapshot.load(session.system, keep.start), keep.path)
     return snapshot.dump(session.system, again) == session.snapshot
 
@@ -154,7 +152,6 @@ def test_redo_to_what_a_recording_did_not_lead_to_ends_it():
 def test_a_long_recording_copies_itself_seldom():
     session = sculpting.set_recording(started(), True)
     keep, arrays = session.recording, set()
-    assert keep is not None
     for moment in range(5000):
         keep = keep.extend(np.zeros((7, 7)), moment)
         arrays.add(id(keep.rows))

@@ -185,6 +185,11 @@ def scene(waypoints=PRESS, **sections):
     return resolve({**table, "trajectory": {"waypoints": list(waypoints)}, **sections})
 
 
+def sensed_by(waypoints=PRESS, **inexact):
+    """Return a scene whose observer reads inexact heights."""
+    return scene(waypoints, sensors={"observer": "valve", **inexact})
+
+
 def watched(known, command_in, count=120):
     """Simulate; return the true forces of the pin and what the sensors read, N, shape (count + 1,)."""
     played = scripted(lambda time, x, y: command_in(round(time / PERIOD)))
@@ -267,9 +272,8 @@ def test_the_force_is_found_where_the_flow_is_turbulent():
     [({}, 5e-5), ({"height_noise": 1e-6}, 0.0), ({"height_step": 5e-6}, 0.0)],
 )
 def test_an_unloaded_pin_reads_no_force_and_no_reading_is_below_zero(inexact, most):
-    sensors = {"observer": "valve", **inexact}
-    assert watched(scene(AWAY, sensors=sensors), down_and_up)[1].max() <= most
-    read = watched(scene(sensors=sensors), down_and_up)[1]
+    assert watched(sensed_by(AWAY, **inexact), down_and_up)[1].max() <= most
+    read = watched(sensed_by(**inexact), down_and_up)[1]
     assert read.min() == 0.0 < read.max()
 
 
@@ -298,24 +302,21 @@ def loading(flow, opening):
 
 def test_coarse_late_or_noisy_heights_cost_the_observer_what_the_flow_says():
     def read(**inexact):
-        return watched(scene(sensors={"observer": "valve", **inexact}), down_and_up)[1]
+        return watched(sensed_by(**inexact), down_and_up)[1]
 
     exact, known = read(), well_open(down_and_up, least=0.4)
     # Two heights, each half a step off, in one period.
     error = np.abs(read(height_step=1e-6) - exact)[known]
     assert 0.05 * loading(1e-6, 0.4) < error.max() <= loading(1e-6, 0.4)
     assert_array_equal(read(delay=3)[3:], exact[:-3])
-    exact, noisy = (
-        watched(scene(sensors={"observer": "valve", "height_noise": noise}), lambda period: 0.4)[1]
-        for noise in (0.0, 1e-7)
-    )
+    exact, noisy = (watched(sensed_by(height_noise=noise), lambda period: 0.4)[1] for noise in (0.0, 1e-7))
     # Some hundred readings: their standard deviation is known to 7 %, and neighbors share a height.
     assert abs(np.std((noisy - exact)[10:]) / (math.sqrt(2.0) * loading(1e-7, 0.4)) - 1.0) < 0.3
 
 
 @pytest.mark.parametrize("gap", [(13,), (13, 14, 15, 16, 17)])
 def test_a_cell_that_took_no_part_while_its_valve_was_shut_is_observed_as_if_it_had(gap):
-    sensors = assemble(scene(sensors={"observer": "valve", "height_noise": 1e-6, "delay": 2})).sensors
+    sensors = assemble(sensed_by(height_noise=1e-6, delay=2)).sensors
     # Ten periods are 25 time constants of the valve: less than 1e-9 open, it counts as shut.
     command, results = [0.0, 0.5, 0.5, *[0.0] * 15, -0.5, -0.5, -0.5, 0.0, 0.0], []
     for skipped in ((), gap):

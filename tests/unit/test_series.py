@@ -21,7 +21,7 @@ from hypothesis import strategies as st
 
 from tests.assemble import refused_in_a_line
 from tests.other_process import dead
-from tests.scene_files import SCENE, folder_with, left, read_text, write_text
+from tests.scene_files import SCENE, command, folder_with, left, read_text, write_text
 
 QUICK = 'errors = false\nexport = ["stl"]\n'
 
@@ -118,12 +118,12 @@ def test_a_link_that_leads_out_of_the_batchs_folder_is_refused(folder, here, ref
     link = here / "o" / folder
     shutil.rmtree(link, ignore_errors=True)
     link.symlink_to(here / "away")
-    refused(["batch", "jobs.toml", "--out", "o", "--quiet"], f"{Path('o', folder)} leads out of o, to ")
+    refused(command("batch jobs.toml --out o --quiet"), f"{Path('o', folder)} leads out of o, to ")
     assert list((here / "away").iterdir()) == []
 
 
 def test_a_link_in_a_sweeps_folder_is_refused_and_a_link_to_the_folder_is_not(here, refused):
-    sweep = ["sweep", "my.toml", "--vary", "layout.rows=3,4", "--workers", "1", "--out", "o", "--quiet"]
+    sweep = command("sweep my.toml --vary layout.rows=3,4 --workers 1 --out o --quiet")
     (here / "away").mkdir()
     (here / "o").symlink_to(here / "away")
     assert main(sweep) == 0
@@ -138,8 +138,8 @@ def test_a_link_in_a_sweeps_folder_is_refused_and_a_link_to_the_folder_is_not(he
 def test_a_run_of_which_something_is_missing_or_cut_off_is_not_done():
     made = read_jobs(jobs_file(f'scenes = ["my.toml"]\n{QUICK}'))
     (job,) = made.jobs
-    assert main(["batch", "jobs.toml", "--out", "o", "--prepare", "--quiet"]) == 0
-    assert main(["job", "o/jobs/my", "--quiet"]) == 0
+    assert main(command("batch jobs.toml --out o --prepare --quiet")) == 0
+    assert main(command("job o/jobs/my --quiet")) == 0
     with open_batch(Path("o"), made) as folder:
         for harm in ("surface.stl", "history.npz", "metrics.json", "thumbnail.png", "timing.json"):
             assert folder.is_done(job)
@@ -166,8 +166,8 @@ def test_a_run_of_a_folder_by_an_odd_path_has_the_folders_name(word):
     assert not os.path.lexists("metrics.json")
 
 
-SWEEP = ["sweep", "my.toml", "--vary", "layout.rows=3,4", "--workers", "1", "--out", "o", "--quiet"]
-BATCH = ["batch", "jobs.toml", "--prepare", "--out", "o", "--quiet"]
+SWEEP = command("sweep my.toml --vary layout.rows=3,4 --workers 1 --out o --quiet")
+BATCH = command("batch jobs.toml --prepare --out o --quiet")
 COMMANDS = {"sweep": SWEEP, "batch": BATCH}
 KIND = Kind("series", "series.json", ("parts",))
 

@@ -18,7 +18,7 @@ from digiclay_serve.hts import Hands
 from digiclay_serve.osc_door import read_osc, read_request
 from digiclay_serve.protocol import Bed, Poses, check_fingers, read_json
 from digiclay_serve.tuio import Pad
-from tests.assemble import assert_near, refused_in_a_line
+from tests.assemble import assert_near, refused_in_a_line, table
 
 LEVEL = (1.0, 0.0, 0.0, 0.0)
 PLACE = (0.01, -0.02, 0.05)
@@ -50,19 +50,19 @@ def test_poses_are_the_same_in_all_formats():
     assert read_request(*read_osc(osc("/digiclay/poses", "token", 9, 3))[1:]) == Poses((), (3,), 9)
 
 
-BAD = [
-    ("NaN in one", [(2, [0.0, 0.0, math.nan])], "Finger 2: pose must be finite numbers"),
-    ("two numbers", [(2, [0.0, 0.0])], "Finger 2: pose must be 3 numbers"),
-    ("text", [(2, ["a", 0.0, 0.0])], "Finger 2: pose must be numbers"),
-    ("a turn of length 0", [(2, [0.0] * 7)], "Finger 2: pose must have a quaternion of length 1"),
-    ("two with one identity", [(2, [*PLACE]), (2, [*PLACE])], "Finger 2: pose must be the only one"),
-    ("no identity", [(None, [*PLACE])], "Finger None: pose.identity must be a whole number"),
-    ("a negative identity", [(-1, [*PLACE])], "Finger -1: pose.identity must be a whole number"),
-    ("two are wrong", [(2, [math.inf] * 3), (-1, [*PLACE])], "And 1 more."),
-]
+BAD = {
+    "NaN in one": ([(2, [0.0, 0.0, math.nan])], "Finger 2: pose must be finite numbers"),
+    "two numbers": ([(2, [0.0, 0.0])], "Finger 2: pose must be 3 numbers"),
+    "text": ([(2, ["a", 0.0, 0.0])], "Finger 2: pose must be numbers"),
+    "a turn of length 0": ([(2, [0.0] * 7)], "Finger 2: pose must have a quaternion of length 1"),
+    "two with one identity": ([(2, [*PLACE]), (2, [*PLACE])], "Finger 2: pose must be the only one"),
+    "no identity": ([(None, [*PLACE])], "Finger None: pose.identity must be a whole number"),
+    "a negative identity": ([(-1, [*PLACE])], "Finger -1: pose.identity must be a whole number"),
+    "two are wrong": ([(2, [math.inf] * 3), (-1, [*PLACE])], "And 1 more."),
+}
 
 
-@pytest.mark.parametrize("wrong, message", [row[1:] for row in BAD], ids=[row[0] for row in BAD])
+@table("wrong, message", BAD)
 def test_a_wrong_finger_is_told_and_the_others_go_on(wrong, message):
     read = check_fingers([(1, [*PLACE]), *wrong, (3, [*PLACE])], None, 5)
     assert [identity for identity, _ in read.fingers] == [1, 3]

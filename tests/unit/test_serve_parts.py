@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from digiclay.core.base.errors import OutputError
 from digiclay.core.model.fingertip import LEVEL
-from digiclay.core.scene.scene_source import Setting, find, load
 from digiclay.core.scene.toml_table import resolve
 from digiclay.core.session import snapshot
 from digiclay.core.session.take import from_bytes, make_take, replay
@@ -39,6 +38,7 @@ from digiclay_serve.served_session import (
     reset,
 )
 from digiclay_serve.tracked_fingers import PARKED
+from tests.assemble import sample
 from tests.scene_files import left
 from tests.timeouts import wait_until
 
@@ -49,7 +49,14 @@ SMALL = {
 }
 WAIT = {"waypoints": [{"time": time, "position": [0, 0, 0.05]} for time in (0.0, 1.0)]}
 STILL = resolve({**SMALL, "trajectory": WAIT})
-DOWN = np.array([[0.0, 0.0, 0.038, 1.0, 0.0, 0.0, 0.0]])
+
+
+def pose(height):
+    """Return the poses of one level fingertip over the middle."""
+    return np.array([[0.0, 0.0, height, *LEVEL]])
+
+
+DOWN = pose(0.038)
 
 
 def test_a_period_is_due_from_its_beginning_once_and_the_oldest_late_ones_are_left_out():
@@ -140,14 +147,13 @@ def test_each_take_has_its_simulated_time_and_errors_or_why_there_are_none(clock
 
 
 def test_frames_and_report_have_the_errors_since_the_last_reset():
-    session = begin_session(resolve({**SMALL, "trajectory": WAIT}))
+    session = begin_session(STILL)
     told = [make_frame(session).errors]
     for number in range(1, 120):
-        targets = np.array([[0.0, 0.0, max(0.036, 0.041 - number * 2e-4), *LEVEL]])
+        targets = pose(max(0.036, 0.041 - number * 2e-4))
         session = follow(session, targets, number, 1)
         told.append(make_frame(session).errors)
     assert told[0] is None
-    assert told[-1] is not None
     assert 1e-9 < told[-1][0] < 1e-4
     assert unpack_frame(pack_frame(make_frame(session))).errors == told[-1]
     fresh = reset(session)
@@ -184,7 +190,7 @@ def pressed(session, count=20):
 def test_no_frame_has_more_force_than_the_ceiling(most, height, flags):
     session, seen = begin_session(STILL, replace(LIMITS, force=most)), 0
     for _ in range(30):
-        session = follow(session, np.array([[0.0, 0.0, height, 1.0, 0.0, 0.0, 0.0]]), 3, 1)
+        session = follow(session, pose(height), 3, 1)
         frame = make_frame(session)
         seen |= frame.flags
         assert frame.total_force == pytest.approx(frame.forces.sum(), rel=1e-5)  # 32 bits
@@ -229,8 +235,8 @@ def test_the_ceiling_is_each_fingers():
 @pytest.mark.parametrize(
     "place, turn, way, count",
     [
-        ([0.0, 0.0, 0.062], [1.0, 0.0, 0.0, 0.0], 0.012, 1),
-        ([0.003, 0.004, 0.05], [1.0, 0.0, 0.0, 0.0], 0.005, 1),
+        ([0.0, 0.0, 0.062], [*LEVEL], 0.012, 1),
+        ([0.003, 0.004, 0.05], [*LEVEL], 0.005, 1),
         ([0.0, 0.0, 0.05], [0.0, 0.0, 0.0, 1.0], 0.02 * np.pi, 3),  # by 180°, of points 20 mm apart
     ],
 )
@@ -244,35 +250,36 @@ def test_the_fingertip_has_a_largest_speed(place, turn, way, count):
 
 
 def test_a_session_that_diverges_goes_back_and_does_not_go_there_again():
-    words = {"simulation.stepper": "euler", "simulation.control_period": "0.05", "layout.rows": "11"}
-    words |= {"simulation.physics_step": "0.05", "layout.columns": "11"}
-    scene = load(find("slow_press"), [Setting(key, word) for key, word in words.items()])
+    words = "simulation.stepper=euler simulation.control_period=0.05 simulation.physics_step=0.05"
+    scene = sample("slow_press", *words.split(), "layout.rows=11", "layout.columns=11")
     session = record(begin_session(scene), 1000)
     high = session.poses
     for _ in range(15):  # a state is kept in between
         session = follow(session, high, 1, 1)
-    deep = np.array([[0.0, 0.0, 0.03, 1.0, 0.0, 0.0, 0.0]])
+    deep = pose(0.03)
     for _ in range(100):
         session = session if session.diverged else follow(session, deep, 2, 1)
     assert session.diverged == 1
     assert session.state.period == session.kept.period == 10
-    assert session.recording is not None
     assert session.recording.count == 11
     after = follow(session, deep, 2, 1)
     assert (after.diverged, after.poses.tolist(), after.state.period) == (1, high.tolist(), 11)
     assert follow(after, high + DOWN / 1e3, 3, 1).poses.tolist() != high.tolist()
 
 
+def recorded():
+    """Return a session that is recorded."""
+    return record(begin_session(STILL), 10)
+
+
 def taken(session):
     """Return what a session has recorded."""
-    assert session.recording is not None
     take = make_take(session.scene, session.recording, snapshot.dump(session.system, session.state))
-    assert take is not None
     return take
 
 
 def test_parts_of_a_take_are_joined_to_what_is_replayed_bit_for_bit(tmp_path):
-    session = record(begin_session(STILL), 10)
+    session = recorded()
     with PartWriter(tmp_path / "out") as writer:
         for _ in range(3):
             session = pressed(session, 10)
@@ -284,7 +291,7 @@ def test_parts_of_a_take_are_joined_to_what_is_replayed_bit_for_bit(tmp_path):
         writer.put(part)
         written = writer.finish()
     assert [path.name for path in written] == ["take_001.npz", "take_002.npz"]
-    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["take_001.npz", "take_002.npz"]
+    assert left(tmp_path / "out") == ["take_001.npz", "take_002.npz"]
     take = from_bytes(written[0].read_bytes())
     assert (take.periods, take.end, take.poses.shape) == (30, end, (31, 1, 7))
     *_, last = replay(take)
@@ -294,7 +301,7 @@ def test_parts_of_a_take_are_joined_to_what_is_replayed_bit_for_bit(tmp_path):
 
 
 def test_a_disk_that_fails_ends_the_take_and_keeps_what_it_has(tmp_path):
-    take, blocked = taken(pressed(record(begin_session(STILL), 10), 3)), tmp_path / "take_001_part_00002.npz"
+    take, blocked = taken(pressed(recorded(), 3)), tmp_path / "take_001_part_00002.npz"
     with PartWriter(tmp_path) as writer:
         writer.put(take)
         wait_until(lambda: list(tmp_path.glob("*_part_00001.npz")))
@@ -314,13 +321,13 @@ def test_the_first_part_replaces_the_takes_in_a_folder_and_nothing_else(tmp_path
         (tmp_path / name).write_text("old", encoding="utf-8")
     with pytest.raises(OutputError, match="replace the take in it with --overwrite"), PartWriter(tmp_path):
         pass
-    for part in (None, taken(pressed(record(begin_session(STILL), 10), 3))):
-        assert sorted(path.name for path in tmp_path.iterdir()) == held
+    for part in (None, taken(pressed(recorded(), 3))):
+        assert left(tmp_path) == held
         with PartWriter(tmp_path, overwrite=True) as writer:
             if part:
                 writer.put(part)
             assert len(writer.finish()) == bool(part)
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["mine.npz", "take_001.npz"]
+    assert left(tmp_path) == ["mine.npz", "take_001.npz"]
 
 
 def test_a_slot_gives_the_newest_value_once_and_none_that_is_being_written():

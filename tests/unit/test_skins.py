@@ -85,23 +85,24 @@ def test_a_base_that_is_not_below_every_pin_is_refused(thickness):
         find_base_level(np.array([0.05, 0.04]), thickness)
 
 
+def over(place, height):
+    """Return a bed at rest at 40 mm whose pins stand at heights, m."""
+    return Formed.of(place, height, 0.04, 0.0, 0)
+
+
 def formed(heights_mm, rows, columns, arrangement="aligned"):
-    place = make_grid(Layout(rows=rows, columns=columns, arrangement=arrangement)).positions
-    return Formed.of(place, np.asarray(heights_mm, float) * 1e-3, 0.04, 0.0, 0)
+    return over(pins(rows, columns, arrangement), np.asarray(heights_mm, float) * 1e-3)
 
 
 @st.composite
 def beds(draw):
-    layout = Layout(
-        rows=draw(st.integers(2, 9)),
-        columns=draw(st.integers(2, 9)),
-        arrangement=draw(st.sampled_from(ARRANGEMENTS)),
-    )
+    rows, columns = draw(st.integers(2, 9)), draw(st.integers(2, 9))
+    place = pins(rows, columns, draw(st.sampled_from(ARRANGEMENTS)))
     random = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
     levels = draw(st.sampled_from([1, 2, 3, 5, 1000]))
-    height = 0.03 + 1e-3 * random.integers(0, levels, layout.rows * layout.columns)
+    height = 0.03 + 1e-3 * random.integers(0, levels, len(place))
     turned = draw(st.sampled_from([(1.0, 1.0), (-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)]))
-    return Formed.of(make_grid(layout).positions * turned, height, 0.04, 0.0, 0)
+    return over(place * turned, height)
 
 
 @given(beds())
@@ -156,12 +157,19 @@ ROUNDING = 1e-15
 
 
 def bed(arrangement="aligned", rows=7, columns=9, seed=1):
-    place = make_grid(Layout(rows=rows, columns=columns, arrangement=arrangement)).positions
-    return Formed.of(place, np.random.default_rng(seed).uniform(0.02, 0.08, len(place)), 0.04, 0.0, 0)
+    place = pins(rows, columns, arrangement)
+    return over(place, np.random.default_rng(seed).uniform(0.02, 0.08, len(place)))
 
 
 def covered(formed, skin, parts):
     return fit_skin(formed, skin, parts, CAP)
+
+
+def covered_rows(arrangement, skin, parts):
+    """Return the skin of a bed, and its pins' x and heights, (7, 9), and rows' y, (7,), m."""
+    known = bed(arrangement)
+    x, y = known.position[:, 0].reshape(7, 9), known.position[::9, 1]
+    return covered(known, skin, parts), x, y, known.height.reshape(7, 9)
 
 
 def test_the_bilinear_skin_of_an_aligned_bed_is_scipys():
@@ -179,7 +187,7 @@ def test_the_bilinear_skin_of_an_aligned_bed_is_scipys():
 def test_the_bilinear_skin_of_a_shifted_bed_is_flat_on_the_triangles_of_delaunay(arrangement, mirrored):
     formed = bed(arrangement)
     place = formed.position * (-1.0 if mirrored else 1.0, 1.0)
-    sheet = covered(Formed.of(place, formed.height, 0.04, 0.0, 0), "bilinear", 4)
+    sheet = covered(over(place, formed.height), "bilinear", 4)
     # In mm, because of Delaunay's own tolerances.
     known = LinearNDInterpolator(Delaunay(place * 1e3), formed.height)(sheet.position * 1e3)
     compared = np.isfinite(known)
@@ -190,10 +198,7 @@ def test_the_bilinear_skin_of_a_shifted_bed_is_flat_on_the_triangles_of_delaunay
 
 @pytest.mark.parametrize("arrangement", ARRANGEMENTS)
 def test_the_smooth_skin_is_scipys_monotone_splines_along_and_then_across_the_rows(arrangement):
-    formed = bed(arrangement)
-    sheet = covered(formed, "smooth", 3)
-    x, y = formed.position[:, 0].reshape(7, 9), formed.position[::9, 1]
-    height = formed.height.reshape(7, 9)
+    sheet, x, y, height = covered_rows(arrangement, "smooth", 3)
     # Beside the zig-zag ends of a shifted bed the skin is held between the pins, which SciPy's is not.
     within = (sheet.position[:, 0] >= x[:, 0].max()) & (sheet.position[:, 0] <= x[:, -1].min())
     points = np.flatnonzero(within)[::7]
@@ -233,10 +238,7 @@ def test_a_skin_is_nowhere_above_or_below_the_pins_about_it(skin, arrangement):
 
 @pytest.mark.parametrize("arrangement", ARRANGEMENTS)
 def test_the_membrane_is_along_the_rows_then_across_them_what_numpy_makes_of_flat_ends(arrangement):
-    formed = bed(arrangement)
-    sheet = covered(formed, "membrane", 6)
-    x, y = formed.position[:, 0].reshape(7, 9), formed.position[::9, 1]
-    height = formed.height.reshape(7, 9)
+    sheet, x, y, height = covered_rows(arrangement, "membrane", 6)
 
     def ends(knots):
         return np.column_stack([knots - CAP, knots + CAP]).ravel()
@@ -283,7 +285,7 @@ def test_inside_the_bed_it_is_the_skin_of_the_exports(kind):
     height = rough(instant)
     shape = 8 * parts + 1 + 2 * margin, 7 * parts + 1 + 2 * margin
     live = interpolate(make_lattice(instant, parts), height, kind)[: shape[0] * shape[1]].reshape(shape)
-    formed = Formed.of(instant.position, height, 0.04, 0.0, 0)
+    formed = over(instant.position, height)
     exported = skins.interpolate_skin(formed, height, kind, parts, 1e-3)
     inside = live[margin:-margin, margin:-margin]
     # The two end the slopes at the outermost pins differently, which the next pin inside feels no more.

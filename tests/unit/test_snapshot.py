@@ -24,8 +24,12 @@ SIZES = {"rows": 9, "columns": 11}
 PRESS = path((0.0, -6, 0, 42), (0.2, -6, 0, 36), (0.6, 6, 2, 36), (0.8, 6, 2, 46))
 
 
+def bed(**tables):
+    return assemble(resolve({"layout": SIZES, **tables}))
+
+
 def system_of(method="virtual_master", **tables):
-    return assemble(resolve({"layout": SIZES, "control": {"method": method}, **tables}))
+    return bed(**{"control": {"method": method}, **tables})
 
 
 def run(system, state, count):
@@ -87,7 +91,7 @@ def kept():
 def test_a_state_of_another_bed_is_refused(tables, said):
     _, data = kept()
     with pytest.raises(StateError, match=said):
-        snapshot.load(assemble(resolve({"layout": SIZES, **tables})), data)
+        snapshot.load(bed(**tables), data)
 
 
 def header_replaced(data, old, new):
@@ -197,13 +201,13 @@ def test_heights_are_carried_over_to_other_parts_within_the_stroke():
         {"control": {"method": "plastic"}}, {"relaxation": "absent"},
         {"simulation": {"control_period": "10 ms"}}
     ):  # fmt: skip
-        other = assemble(resolve({"layout": SIZES, **tables}))
+        other = bed(**tables)
         state = snapshot.transfer_heights(other, data)
         assert np.array_equal(state.row(0), before)
         # Nothing calls the pins back: without a finger they stay where they are.
         *_, later = periods(other, [path((0.0, 0, 0, 500))], state, 40)
         assert np.array_equal(later.row(0), before)
-    low = assemble(resolve({"layout": SIZES, "actuator": {"stroke": "38 mm", "rest_height": "20 mm"}}))
+    low = bed(actuator={"stroke": "38 mm", "rest_height": "20 mm"})
     assert snapshot.transfer_heights(low, data).row(0).max() == 38e-3
     with pytest.raises(StateError, match="number of cells"):
         snapshot.transfer_heights(assemble(resolve({})), data)

@@ -51,9 +51,19 @@ def line(end=0.02, moves=20, images=ALONE):
     return stroke
 
 
+def begin(stroke, bed=HEIGHT, at=AT):
+    """Return a stroke that begins with the finger at a pose, without a blister."""
+    return motion.begin(stroke, bed, at[3:], None)
+
+
+def waiting(fingers):
+    """Return the poses of fingers that begin in one place."""
+    return np.repeat(AT[None], fingers, axis=0)
+
+
 def path(stroke, at=AT, chunk=4000, bed=HEIGHT):
     """Let the finger go on as far as it is drawn, a chunk of periods at a time, without a blister."""
-    stroke, poses = lead(motion.begin(stroke, bed, at[3:], None), at[None], chunk, bed)
+    stroke, poses = lead(begin(stroke, bed, at), at[None], chunk, bed)
     return stroke, poses[:, 0]
 
 
@@ -103,9 +113,9 @@ def test_the_finger_goes_along_the_whole_path_however_quick_the_hand(moves):
 def test_the_way_follows_from_the_path_alone_and_is_never_ahead_of_the_hand(away, fingers, chunk, shown):
     whole, at = (
         release(line(images=make_images("X", center=(-away, 0.0)))),
-        np.repeat(AT[None], fingers, axis=0),
+        waiting(fingers),
     )
-    part = motion.begin(replace(whole, samples=whole.samples[:shown], held=True), HEIGHT, AT[3:], None)
+    part = begin(replace(whole, samples=whole.samples[:shown], held=True))
     part, first = lead(part, at, chunk)
     assert not part.done
     # Each goes along its image no further than the hand has drawn; with one finger the second one waits.
@@ -115,7 +125,7 @@ def test_the_way_follows_from_the_path_alone_and_is_never_ahead_of_the_hand(away
     poses, stroke = [*first], replace(part, samples=whole.samples, held=False)
     done, more = lead(stroke, poses[-1], chunk)
     assert done.done
-    assert_array_equal(np.array([*poses, *more[1:]]), lead(motion.begin(whole, HEIGHT, AT[3:], None), at)[1])
+    assert_array_equal(np.array([*poses, *more[1:]]), lead(begin(whole), at)[1])
 
 
 @table(
@@ -133,9 +143,9 @@ def test_the_way_follows_from_the_path_alone_and_is_never_ahead_of_the_hand(away
 )
 def test_of_images_that_are_near_one_gives_way(drawn, images, pressing, longer, nearest):
     places = 1e-3 * np.linspace(*np.array(drawn, float), 57)
-    stroke = motion.begin(lay_path(start(1, 0.0, 0.0, 4e-3, images), places), HEIGHT, AT[3:], None)
+    stroke = begin(lay_path(start(1, 0.0, 0.0, 4e-3, images), places))
     alone = len(path(lay_path(start(1, 0.0, 0.0, 4e-3), places))[1])
-    done, poses = lead(stroke, np.repeat(AT[None], len(images), axis=0))
+    done, poses = lead(stroke, waiting(len(images)))
     assert done.done
     assert len(poses) - alone <= longer
     down = poses[..., 2] < 40e-3
@@ -154,8 +164,8 @@ def test_of_images_that_are_near_one_gives_way(drawn, images, pressing, longer, 
 def test_one_that_waits_comes_down_although_pins_creep_up():
     places = 1e-3 * np.linspace([4.0, -28.0], [4.0, 28.0], 57)
     stroke = lay_path(start(1, 0.0, 0.0, 4e-3, make_images("X")), places)
-    stroke = motion.begin(stroke, HEIGHT, AT[3:], None)
-    assert lead(stroke, np.repeat(AT[None], 2, axis=0), 1, creep=5e-9)[0].done
+    stroke = begin(stroke)
+    assert lead(stroke, waiting(2), 1, creep=5e-9)[0].done
 
 
 @pytest.mark.parametrize("bed, lowest, end", [(HEIGHT, 36e-3, 59e-3), (HEIGHT * 0 + 1e-3, 0.0, None)])

@@ -11,11 +11,11 @@ from digiclay.core.scene.scene_source import Setting, find, load
 from digiclay.core.session.run_scene import run
 
 from digiclay_study.point_series import Range, fit_ranges, read_range
-from tests.scene_files import SCENE, read_text, rows, timeless, write_text
+from tests.scene_files import SCENE, command, read_text, rows, timeless, write_text
 
 pytest.importorskip("SALib", reason="digiclay[study] is not installed")
 
-GAINS = ["--vary", "control.position_gain=100:1000:log", "--vary", "control.force_gain=1:10"]
+GAINS = command("--vary control.position_gain=100:1000:log --vary control.force_gain=1:10")
 STUDY = ["study", "my.toml", *GAINS, "--samples", "8", "--workers", "1", "--metric", "rfd,lag,max_cell_force"]
 QUIET = [*STUDY, "--quiet", "--out", "out"]
 
@@ -85,7 +85,7 @@ def test_the_command_of_the_page_runs_points_that_are_missing_and_all_is_as_befo
 
 def test_runs_that_fail_are_counted_and_leave_no_hole_in_the_indices(here):
     # A bed of 3 x 4 has no room for a recording of a million seconds.
-    durations = ["--vary", "simulation.duration=0.08,0.1,1e6", "--vary", "control.position_gain=100:1000"]
+    durations = command("--vary simulation.duration=0.08,0.1,1e6 --vary control.position_gain=100:1000")
     options = "--samples 4 --workers 1 --metric rfd --quiet --out out"
     assert main(["study", "my.toml", *durations, *options.split()]) == 0
     found = rows(here / "out" / "points.csv")
@@ -100,8 +100,8 @@ def test_the_time_a_study_takes_is_less_in_batches_where_there_are_some(fingers,
     bed, _, path = SCENE.partition("[trajectory]")
     fingers_of = "".join(f"[[finger]]\n[finger.trajectory]{path}" for _ in range(fingers))
     write_text(here / "my.toml", bed + fingers_of)
-    ranges = ["--vary", "control.position_gain=100:1000", "--vary", "contact.stiffness=200:300"]
-    options = ["--samples", "4", "--workers", "1", "--metric", "rfd", "--out", "out"]
+    ranges = command("--vary control.position_gain=100:1000 --vary contact.stiffness=200:300")
+    options = command("--samples 4 --workers 1 --metric rfd --out out")
     assert main(["study", "my.toml", *ranges, *options]) == 0
     said = capsys.readouterr().out
     assert "16 runs: about" in said
@@ -145,7 +145,7 @@ def test_a_folder_of_another_study_is_refused(whole, here, refused):
     shutil.copytree(whole, here / "out")
     before = files(here / "out")
     for change, said in (
-        (["--second", "--samples", "4"], "samples 8"), (["--second", "--seed", "2"], "seed 1"),
+        (command("--second --samples 4"), "samples 8"), (command("--second --seed 2"), "seed 1"),
         (["--second", "--set", "layout.pitch=2.9 mm"], "with another scene"), ([], "orders first, second")
     ):  # fmt: skip
         refused([*QUIET, *change], f"out holds another study ({said}): choose another folder with --out.\n")

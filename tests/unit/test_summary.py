@@ -35,6 +35,11 @@ def history(total, time=TIME):
             "fingertip": fingertip, "total_force": total, "position": position}  # fmt: skip
 
 
+def measure(*given):
+    """Return the metrics of such a history, for a force asked of all cells."""
+    return summary.compute_metrics(history(*given), WHOLE)
+
+
 @table(
     "total, wanted",
     {
@@ -62,14 +67,14 @@ def test_the_rfd_weighs_rows_by_their_time_and_by_session_and_shaping():
     uneven = np.array([0.0, 0.1, 0.5, 2.0, 2.5])
     assert summary.compute_weights(uneven).sum() == pytest.approx(2.5, rel=ROUNDING)
     # 4 s of 0 and 6 s of 0.4; the trapezium rule smears each of the two jumps over half a row of 2001.
-    found = summary.compute_metrics(history(np.where((TIME > 2.0) & (TIME < 6.0), 0.0, 0.4)), WHOLE)
+    found = measure(np.where((TIME > 2.0) & (TIME < 6.0), 0.0, 0.4))
     assert (found["rfd"], found["rfd_session"]) == (0.0, pytest.approx(0.4 * np.sqrt(0.4), rel=1e-3))
     case = history(np.where(TIME < 5.0, 0.2, 0.4))
     case["mode"][TIME < 5.0] = Mode.SPRING  # touching down is no shaping
     found = summary.compute_metrics(case, WHOLE)
     assert found["rfd_shaping"] == 0.0 < 0.1 < found["rfd"]
     # The deviation from the mean leaves out a constant offset.
-    found = summary.compute_metrics(history(0.5 + 0.1 * np.sin(2.0 * np.pi * TIME)), WHOLE)
+    found = measure(0.5 + 0.1 * np.sin(2.0 * np.pi * TIME))
     assert found["force_deviation"] == pytest.approx(0.1 / np.sqrt(2.0), rel=1e-6)
 
 
@@ -128,9 +133,9 @@ FOUND = {
 
 
 def test_the_summary_has_lag_extremes_volumes_and_share_of_contact():
-    found = summary.compute_metrics(history(np.linspace(0.0, 0.5, 2001)), WHOLE)
+    found = measure(np.linspace(0.0, 0.5, 2001))
     assert {name: found[name] for name in FOUND} == pytest.approx(FOUND, rel=1e-9)
-    found = summary.compute_metrics(history(np.where(TIME < 2.5, 0.4, 0.0)), WHOLE)
+    found = measure(np.where(TIME < 2.5, 0.4, 0.0))
     assert found["contact_share"] == pytest.approx(0.25, abs=5e-4)  # one row of 2001
     assert found["contact_loss_share"] == 0.0  # lifted at the end
 
@@ -152,7 +157,7 @@ def test_a_cell_stands_for_pitch_times_row_spacing(layout, square_millimeters):
 
 
 def test_a_session_without_contact_has_no_rfd_lag_or_loss():
-    found = summary.compute_metrics(history(np.zeros(2001)), WHOLE)
+    found = measure(np.zeros(2001))
     nothing = {name for name, value in found.items() if value is None}
     assert nothing == {
         "rfd", "rfd_shaping", "contact_loss_share", "lag_mean", "lag_max", "force_deviation",
@@ -169,7 +174,7 @@ def test_the_first_touch_overshoots_by_its_peak_and_settles_within_a_tenth_of_th
         None,
     )
     total = np.where(TIME < 1.0, 0.0, 0.4 + 0.1 * np.exp(-(TIME - 1.0)))
-    found = summary.compute_metrics(history(total), WHOLE)
+    found = measure(total)
     assert found["force_overshoot"] == pytest.approx(0.25, rel=1e-6)
     # 0.1 exp(-t) falls below 0.04 at ln 2.5 = 0.916 s; a row is 5 ms, and the row before counts as well.
     assert found["settling_time"] == pytest.approx(np.log(2.5), abs=0.011)
@@ -186,7 +191,7 @@ def test_the_summary_is_json_and_has_every_key_at_extremes_as_well():
     found = summary.compute_metrics(case, WHOLE)
     assert json.loads(json.dumps(found, allow_nan=False)) == found
     assert found.keys() == METRICS.keys()
-    one = summary.compute_metrics(history(np.array([0.5]), np.array([0.0])), WHOLE)
+    one = measure(np.array([0.5]), np.array([0.0]))
     assert (one["rfd"], one["duration"]) == (pytest.approx(0.1, rel=1e-10), 0.0)
     # A single pin has no area to form a volume over.
     single = {name: value[:, :1] if value.shape[1:] == (9,) else value for name, value in case.items()}

@@ -26,12 +26,12 @@ from digiclay.core.studies.series import finish
 
 from tests.other_process import PROGRAM, start
 from tests.other_process import finish as finish_process
-from tests.scene_files import interrupt_after, read_text, scene_text, timeless, write_text
+from tests.scene_files import command, interrupt_after, read_text, scene_text, timeless, write_text
 from tests.scene_files import rows as read_table
 from tests.timeouts import TIMEOUT, wait_until
 
-GAINS = ["sweep", "my.toml", "--vary", "control.force_gain=2,5", "--metric", "rfd"]
-GAINS += ["--workers", "1", "--quiet", "--out", "out"]
+GAINS = command("sweep my.toml --vary control.force_gain=2,5 --metric rfd")
+GAINS += command("--workers 1 --quiet --out out")
 SCENE = scene_text(11, 11, (0.0, 0.041), (0.05, 0.037), (0.1, 0.05))
 
 
@@ -121,14 +121,14 @@ def test_the_table_names_axes_and_metrics_with_their_si_units():
 
 
 def test_a_point_that_fails_or_is_no_scene_is_recorded_and_the_others_go_on(capsys):
-    vary = ["sweep", "my.toml", "--vary"]
+    vary = command("sweep my.toml --vary")
     assert main([*vary, "simulation.duration=0.1,1e6,0.05", "--out", "out"]) == 0
     assert [bool(line["rfd (N)"]) for line in rows("out")] == [True, False, True]
     assert rows("out")[1]["error"].startswith("recorder.every must be at least")
     assert "1 of them failed" in capsys.readouterr().out
     assert main([*vary, "simulation.duration=1e6,9e5", "--out", "none"]) == 2
     assert capsys.readouterr().err.startswith("Every point failed; the first one: recorder.every must be")
-    triggers = ["--vary", "control.blister_trigger=0.01,0.03", "--vary", "control.spring_trigger=0.02,0.06"]
+    triggers = command("--vary control.blister_trigger=0.01,0.03 --vary control.spring_trigger=0.02,0.06")
     assert main(["sweep", "my.toml", "--quiet", "--method", "cell_states", *triggers, "--out", "mixed"]) == 0
     assert [line["error"] for line in rows("mixed")][:2] == ["", ""]
     assert "must be below spring_trigger, 0.02 N (got 0.03 N)" in rows("mixed")[2]["error"]
@@ -167,7 +167,6 @@ def test_errors_are_estimated_where_they_are_asked_for_and_then_stay():
     assert main([*GAINS, *ERRORS]) == 0
     scene = load(find("my.toml"), [Setting("control.force_gain", "5")])
     expected = estimate_errors(scene, run(scene).history)
-    assert expected is not None
     found = rows("out")[1]["height_error (m)"], rows("out")[1]["total_force_error (N)"]
     assert found == (repr(expected.height), repr(expected.total_force))
     judged = kept("out")
@@ -180,7 +179,7 @@ def test_errors_are_estimated_where_they_are_asked_for_and_then_stay():
 
 
 def test_a_sweep_estimates_errors_at_the_ends_of_what_varies_and_says_where(capsys):
-    grid = ["--vary", "control.force_gain=1:5:3", "--vary", "control.dead_band=1e-5,2e-5,3e-5"]
+    grid = command("--vary control.force_gain=1:5:3 --vary control.dead_band=1e-5,2e-5,3e-5")
     sweep = ["sweep", "my.toml", *grid, "--metric", "rfd", "--workers", "1", "--out", "grid"]
     assert main(sweep) == 0
     said = capsys.readouterr().out
@@ -255,7 +254,7 @@ def test_a_point_is_the_scene_with_its_values_in_the_same_batch_whatever_is_know
 
 
 #: Beds of different sizes, which run one at a time.
-MANY = ["sweep", "slow_press", "--vary", "layout.rows=20:25:6", "--workers", "2", "--quiet"]
+MANY = command("sweep slow_press --vary layout.rows=20:25:6 --workers 2 --quiet")
 QUICK = [*MANY, "--set", "simulation.duration=0.3"]
 
 
@@ -275,7 +274,6 @@ def finished(executor, task, todo, **known):
 
 def test_a_point_that_fails_is_recorded_and_a_stopped_one_is_not(monkeypatch):
     scene = some()[0].scene
-    assert scene is not None
     assert evaluate(scene, stopped=lambda: True) is None
 
     def faulty(*given, **known):
@@ -328,7 +326,7 @@ def test_a_sweep_stopped_half_way_keeps_what_is_done_and_goes_on_from_there(
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no process groups to signal")
 def test_ctrl_c_on_a_terminal_ends_sessions_of_hours_without_a_word(here):
-    hours = ["--set", "simulation.duration=1e4", "--set", "recorder.every=1000"]
+    hours = command("--set simulation.duration=1e4 --set recorder.every=1000")
     process = start(PROGRAM, *MANY, *hours, "--out", "out", start_new_session=True)
     wait_until((here / "out" / "sweep.json").exists)
     time.sleep(3.0)  # the workers run or are being started; a terminal sends Ctrl-C to them as well
@@ -357,7 +355,6 @@ def test_a_sweep_whose_worker_is_killed_comes_to_the_same_table(here, whole):
 def test_a_worker_is_out_of_reach_of_ctrl_c_and_ends_when_it_cannot_read_its_bundle():
     with idle() as processes:
         worker = processes.start(Evaluator)
-        assert worker is not None
         if os.name != "nt":
             assert os.getpgid(worker.process.pid) != os.getpgid(0)
         worker.input.write(b"cdigiclay.no_such_module\nPoint\n.")  # as another version may send it

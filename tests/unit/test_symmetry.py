@@ -38,9 +38,9 @@ def queue(session, path, images, brush=Brush.LOWER, held=False):
     return sculpting.change_stroke(session, number, lambda stroke: replace(stroke, held=held))
 
 
-def line(start, end):
+def line(x, y, end_x, end_y):
     """Return a path that a hand has drawn, mm."""
-    return np.linspace(start, end, 30)
+    return np.linspace((x, y), (end_x, end_y), 30)
 
 
 def go_on(session, periods):
@@ -53,9 +53,7 @@ def go_on(session, periods):
 
 def keep(session):
     """Return what a session has recorded, read from bytes."""
-    assert session.recording is not None
     take = make_take(session.scene, session.recording, session.snapshot)
-    assert take is not None
     return from_bytes(to_bytes(take))
 
 
@@ -66,7 +64,7 @@ def is_replayed(take):
 
 
 #: A path that stays apart from its images, and from the pins' rows, mm.
-APART = line((20.0, 8.5), (23.0, 9.5))
+APART = line(20.0, 8.5, 23.0, 9.5)
 #: Images on whole pins, how they turn a table of pins, and the pins by which their center is off the middle.
 TURNED = {
     "four turns": (make_images("RADIAL", 4), np.rot90, (0, 0)),
@@ -115,7 +113,7 @@ def test_images_form_alike_in_the_time_of_one_and_are_replayed_bit_for_bit(metho
 
 ONE, LOWER, RAISE = "virtual_master", Brush.LOWER, Brush.RAISE
 X, TURNED_X = make_images("X"), make_images("X", center=(0.7e-3, -0.4e-3), angle=0.4)
-STEEP = line((-7.7, -6.4), (7.7, 6.4))
+STEEP = line(-7.7, -6.4, 7.7, 6.4)
 RAYS = make_images("RADIAL", 8, (1.1e-3, -0.7e-3))
 #: As a hand draws along an axis: up to 1.4 mm beside it.
 WAVE = np.column_stack([0.9 + 0.5 * np.sin(np.linspace(0, 9, 30)), np.linspace(-9, 9, 30)])
@@ -138,37 +136,37 @@ def follow_to_the_end(session, periods=8):
 #: Images that are near each other, or meet: method, brush, path, mm, images, and greatest time, as a multiple
 #: of that of one.
 MEETING = {
-    "on the axis one presses": ("hybrid", RAISE, line((0, -9), (0, 9)), X, 1.1),
-    "a click in the middle is one": (ONE, LOWER, line((0, 0), (0, 0)), make_images("RADIAL", 6), 1.05),
-    "side by side, as near as two are told apart": (ONE, RAISE, line((2.6, -6), (2.6, 6)), X, 1.05),
-    "the same with Method III": ("hybrid", LOWER, line((2.6, -6), (2.6, 6)), X, 1.05),
-    "Method II, at forces at which others wait": ("cell_states", LOWER, line((4, -6), (4, 6)), X, 1.05),
-    "nearer, one follows": (ONE, LOWER, line((1.6, -6), (1.6, 6)), X, 1.6),
+    "on the axis one presses": ("hybrid", RAISE, line(0, -9, 0, 9), X, 1.1),
+    "a click in the middle is one": (ONE, LOWER, line(0, 0, 0, 0), make_images("RADIAL", 6), 1.05),
+    "side by side, as near as two are told apart": (ONE, RAISE, line(2.6, -6, 2.6, 6), X, 1.05),
+    "the same with Method III": ("hybrid", LOWER, line(2.6, -6, 2.6, 6), X, 1.05),
+    "Method II, at forces at which others wait": ("cell_states", LOWER, line(4, -6, 4, 6), X, 1.05),
+    "nearer, one follows": (ONE, LOWER, line(1.6, -6, 1.6, 6), X, 1.6),
     "by hand along the axis, one presses": (ONE, LOWER, WAVE, X, 1.15),
     "the same, raised": ("hybrid", RAISE, WAVE, X, 1.05),
     "a click in a small ring, every other one": (
         ONE,
         LOWER,
-        line((8, 0), (8, 0)),
+        line(8, 0, 8, 0),
         make_images("RADIAL", 24),
         2.0,
     ),
-    "towards the axis, nearer than one may come down": (ONE, LOWER, line((11, -9), (1, 9)), X, 1.1),
-    "from another axis, turned": (ONE, LOWER, line((9, 6), (1, -8)), TURNED_X, 1.4),
-    "across the axis both go on": (ONE, LOWER, line((-18, -9), (18, 9)), X, 1.15),
+    "towards the axis, nearer than one may come down": (ONE, LOWER, line(11, -9, 1, 9), X, 1.1),
+    "from another axis, turned": (ONE, LOWER, line(9, 6, 1, -8), TURNED_X, 1.4),
+    "across the axis both go on": (ONE, LOWER, line(-18, -9, 18, 9), X, 1.15),
     "across the axis, raised": (ONE, RAISE, STEEP, X, 1.15),
-    "from the axis one begins at its end": ("hybrid", RAISE, line((0, -9), (18, 9)), X, 1.15),
+    "from the axis one begins at its end": ("hybrid", RAISE, line(0, -9, 18, 9), X, 1.15),
     "all rays from the middle but one do": (
         "hybrid",
         RAISE,
-        line((0, 0), (18, 4)),
+        line(0, 0, 18, 4),
         make_images("RADIAL", 4),
         1.15,
     ),
-    "so with Method I, about another place": (ONE, LOWER, line((2, 1), (18, -6)), RAYS, 1.15),
-    "rays towards the middle": (ONE, LOWER, line((12, 1), (1, 0)), make_images("RADIAL", 6), 1.2),
-    "lines that pass each other": (ONE, LOWER, line((-10, 1), (10, 1)), make_images("RADIAL", 3), 1.3),
-    "many": ("hybrid", RAISE, line((24, 0), (24, 1)), make_images("RADIAL", 24), 1.1),
+    "so with Method I, about another place": (ONE, LOWER, line(2, 1, 18, -6), RAYS, 1.15),
+    "rays towards the middle": (ONE, LOWER, line(12, 1, 1, 0), make_images("RADIAL", 6), 1.2),
+    "lines that pass each other": (ONE, LOWER, line(-10, 1, 10, 1), make_images("RADIAL", 3), 1.3),
+    "many": ("hybrid", RAISE, line(24, 0, 24, 1), make_images("RADIAL", 24), 1.1),
 }
 
 
@@ -206,18 +204,16 @@ def test_a_take_in_which_images_give_way_is_replayed_bit_for_bit(name):
 
 def test_images_begin_no_error_estimate_of_their_own():
     session = begin()
-    assert session.monitor is not None
     session = replace(session, monitor=session.monitor._replace(age=100))
     session = go_on(queue(session, APART, make_images("X")), 1)
     assert session.system.fingers == 2
-    assert session.monitor is not None
     # One of several fingertips takes a tenth of the stroke's time.
     assert (session.monitor.age, session.monitor.state) == (101, None)
 
 
 def test_no_fingertip_lifts_again_for_another_one_that_is_down():
     images = make_images("RADIAL", 12, (1.1e-3, -0.7e-3), 0.4)
-    session, pressing, lifted = queue(begin(), line((3.7, 0.9), (11.6, 5.4)), images, RAISE), set[int](), 0
+    session, pressing, lifted = queue(begin(), line(3.7, 0.9, 11.6, 5.4), images, RAISE), set[int](), 0
     while session.strokes:
         session = sculpting.follow_finger(session, session.poses, 1)
         parts, forces = session.strokes[0].parts if session.strokes else (), session.state.finger_forces()
@@ -236,7 +232,7 @@ def test_what_near_images_leave_does_not_depend_on_the_periods_of_a_tick(name):
 
 @pytest.mark.parametrize("drawn", [0, 12, 29])
 def test_rays_leave_their_nominal_surface_whenever_the_hand_lets_go(drawn):
-    path = line((2, 1), (18, -6))
+    path = line(2, 1, 18, -6)
     session = queue(begin("hybrid"), path[: drawn + 1], RAYS, RAISE, held=True)
     for _ in range(40):  # as far as the hand has drawn
         session = sculpting.follow_finger(session, session.poses, 8)
@@ -251,7 +247,7 @@ def test_rays_leave_their_nominal_surface_whenever_the_hand_lets_go(drawn):
 def test_there_are_no_more_fingertips_than_a_bed_can_have_and_the_others_stay():
     session = begin(fingers=10)
     stood, most = session.poses.copy(), 0
-    session = queue(session, line((24, 0), (24, 0)), make_images("RADIAL", 24))
+    session = queue(session, line(24, 0, 24, 0), make_images("RADIAL", 24))
     while session.strokes:
         session = sculpting.follow_finger(session, session.poses, 8)
         most = max(most, session.system.fingers)
@@ -265,7 +261,7 @@ def test_there_are_no_more_fingertips_than_a_bed_can_have_and_the_others_stay():
 
 @pytest.mark.parametrize("brush", [Brush.SMOOTH, Brush.LOCK])
 def test_what_the_valves_do_alone_takes_no_further_fingertips(brush):
-    session = queue(begin("hybrid"), line((8, 8), (9, 8)), make_images("XY"), brush)
+    session = queue(begin("hybrid"), line(8, 8, 9, 8), make_images("XY"), brush)
     while session.strokes:
         session = sculpting.follow_finger(session, session.poses, 16)
         assert session.system.fingers == 1

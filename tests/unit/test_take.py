@@ -85,7 +85,6 @@ def test_bytes_bring_a_take_and_its_orders_back_and_damaged_ones_are_refused_in_
     assert [int(np.load(io.BytesIO(one))["version"]) for one in (data, plain)] == [4, 2]
     assert "orders" not in np.load(io.BytesIO(plain))  # older versions read it
     back = from_bytes(data)
-    assert back.orders is not None
     assert_array_equal(back.orders.rows, ORDERS.rows)
     assert_array_equal(back.orders.surfaces, (SURFACE,))
     assert (replayed(back), replayed(from_bytes(plain))) == (True, False)
@@ -215,5 +214,4 @@ def test_a_take_with_smooth_strokes_is_no_scene_file_and_a_bake_shows_what_was_s
     take = ordered_take()
     *_, last = replay(take)
     *_, frames = simulate_frames(take, 1.0 / take.duration)
-    assert not isinstance(frames, float)
     assert_array_equal(frames.height[-1], last.row(0).astype(np.float32))

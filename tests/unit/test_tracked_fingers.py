@@ -16,6 +16,7 @@ from digiclay_serve.tracked_fingers import (
     give_way,
     name_fingers,
 )
+from tests.assemble import table
 
 LEVEL = (1.0, 0.0, 0.0, 0.0)
 PLACE = (0.01, -0.02, 0.05)
@@ -48,18 +49,18 @@ def test_a_finger_that_is_not_named_lifts_after_100_ms_and_its_fingertip_is_free
     assert tracks.identities.tolist() == [9, -1]
 
 
-EXCHANGED = [
-    ("two change places", (0.0, 0.04), (0.04, 0.0), (2, 1)),
-    ("neighbors change places", (0.0, 0.018), (0.017, 0.001), (2, 1)),
-    ("all go on as they were", (0.0, 0.018), (0.004, 0.022), (1, 2)),
-    ("they meet and part", (0.0, 0.018), (0.008, 0.010), (1, 2)),
-    ("they pass each other quickly", (0.0, 0.020), (0.0105, 0.0095), (1, 2)),
-    ("three go around", (0.0, 0.018, 0.036), (0.018, 0.036, 0.0), (3, 1, 2)),
-    ("two hands change places", (0.0, 0.018, 0.1, 0.118), (0.1, 0.118, 0.0, 0.018), (3, 4, 1, 2)),
-]
+EXCHANGED = {
+    "two change places": ((0.0, 0.04), (0.04, 0.0), (2, 1)),
+    "neighbors change places": ((0.0, 0.018), (0.017, 0.001), (2, 1)),
+    "all go on as they were": ((0.0, 0.018), (0.004, 0.022), (1, 2)),
+    "they meet and part": ((0.0, 0.018), (0.008, 0.010), (1, 2)),
+    "they pass each other quickly": ((0.0, 0.020), (0.0105, 0.0095), (1, 2)),
+    "three go around": ((0.0, 0.018, 0.036), (0.018, 0.036, 0.0), (3, 1, 2)),
+    "two hands change places": ((0.0, 0.018, 0.1, 0.118), (0.1, 0.118, 0.0, 0.018), (3, 4, 1, 2)),
+}
 
 
-@pytest.mark.parametrize("before, after, held", [r[1:] for r in EXCHANGED], ids=[r[0] for r in EXCHANGED])
+@table("before, after, held", EXCHANGED)
 @pytest.mark.parametrize("turn", [0.0, 2.0])
 def test_exchanged_identities_do_not_move_a_fingertip_through_the_clay(before, after, held, turn):
     way = np.array([math.cos(turn), math.sin(turn), 0.0])
@@ -73,19 +74,19 @@ def test_exchanged_identities_do_not_move_a_fingertip_through_the_clay(before, a
 
 
 #: Fingers before and after a time, s, by identity: x and, where it is not that of all, z, mm; who is held.
-RENAMED = [
-    ("one has another identity", {1: (0,), 2: (40,)}, 0.016, {1: (0,), 7: (42,)}, (1, 7, -1)),
-    ("both", {1: (0,), 2: (18,)}, 0.016, {8: (19,), 7: (1,)}, (7, 8, -1)),
-    ("after 80 ms farther off", {1: (0,)}, 0.08, {7: (14,)}, (7, -1, -1)),
-    ("a new one beside one that is lifted", {1: (0,), 2: (18,)}, 0.016, {2: (18,), 7: (-14,)}, (1, 2, 7)),
-    ("at another time", {1: (0,)}, 0.08, {7: (16,)}, (1, 7, -1)),
-    ("a new one below one that was raised", {1: (0, 60)}, 0.016, {7: (3, 40)}, (1, 7, -1)),
-    ("nearer to one that stays", {1: (0,), 2: (15,)}, 0.03, {1: (0,), 7: (7,)}, (1, 2, 7)),
-    ("two new ones near one that is gone", {1: (0,)}, 0.03, {7: (6,), 8: (-3,)}, (8, 7, -1)),
-]
+RENAMED = {
+    "one has another identity": ({1: (0,), 2: (40,)}, 0.016, {1: (0,), 7: (42,)}, (1, 7, -1)),
+    "both": ({1: (0,), 2: (18,)}, 0.016, {8: (19,), 7: (1,)}, (7, 8, -1)),
+    "after 80 ms farther off": ({1: (0,)}, 0.08, {7: (14,)}, (7, -1, -1)),
+    "a new one beside one that is lifted": ({1: (0,), 2: (18,)}, 0.016, {2: (18,), 7: (-14,)}, (1, 2, 7)),
+    "at another time": ({1: (0,)}, 0.08, {7: (16,)}, (1, 7, -1)),
+    "a new one below one that was raised": ({1: (0, 60)}, 0.016, {7: (3, 40)}, (1, 7, -1)),
+    "nearer to one that stays": ({1: (0,), 2: (15,)}, 0.03, {1: (0,), 7: (7,)}, (1, 2, 7)),
+    "two new ones near one that is gone": ({1: (0,)}, 0.03, {7: (6,), 8: (-3,)}, (8, 7, -1)),
+}
 
 
-@pytest.mark.parametrize("before, time, after, held", [r[1:] for r in RENAMED], ids=[r[0] for r in RENAMED])
+@table("before, time, after, held", RENAMED)
 @pytest.mark.parametrize("turn", [0.0, 2.0])
 def test_a_finger_that_goes_on_under_another_identity_keeps_its_fingertip(before, time, after, held, turn):
     def tell(fingers):

@@ -11,7 +11,7 @@ from digiclay.core.scene.toml_table import format_scene
 from digiclay.core.session.run_scene import run
 
 from digiclay_study.tune_command import find_front, find_knee
-from tests.scene_files import SMALL_BLISTER, interrupt_after, read_text, rows, timeless, write_text
+from tests.scene_files import SMALL_BLISTER, command, interrupt_after, read_text, rows, timeless, write_text
 
 pytest.importorskip("optuna", reason="digiclay[study] is not installed")
 
@@ -28,8 +28,8 @@ waypoints = [
   {{ time = 0.1, position = [0.002, 0, 0.038] }},
 ]
 """
-VARIED = ["--vary", "control.position_gain=100:1000:log", "--vary", "control.force_gain=1:10"]
-SMALL = ["--population", "8", "--workers", "1"]
+VARIED = command("--vary control.position_gain=100:1000:log --vary control.force_gain=1:10")
+SMALL = command("--population 8 --workers 1")
 TUNE = ["tune", "my.toml", *VARIED, *SMALL, "--out", "out", "--quiet"]
 #: Four generations after the unchanged scene.
 ALL = 1 + 4 * 8
