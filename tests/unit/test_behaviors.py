@@ -13,7 +13,7 @@ from digiclay.core.model.layout import ARRANGEMENTS, Layout, make_grid
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.toml_table import resolve
 
-from tests.assemble import master
+from tests.assemble import master, table
 
 BEHAVIORS = ("elastic", "plastic", "viscous", "push_pull", "force_display", "shape_display")
 REST = 40e-3
@@ -118,20 +118,23 @@ def test_a_cell_moves_by_its_law(method, known, given, speed):
     assert np.sign(command) * command**2 * behavior.drive.up[-1] == pytest.approx(speed, abs=TABLE)
 
 
-@pytest.mark.parametrize(
+@table(
     "method, known, given, target, mode",
-    [
-        pytest.param("plastic", {}, {"height": -2.0, "force": 50.0}, -2e-3, None, id="yields"),
-        pytest.param("plastic", {}, {"height": -1.0, "force": 50.0, "target": -2.0}, -2e-3, None, id="low"),
-        pytest.param("elastic", {}, {"force": 2.0, "mode": Mode.REST}, 0.0, Mode.REST, id="less than felt"),
-        pytest.param("elastic", {}, {"force": 2.0, "mode": Mode.SPRING}, 0.0, Mode.SPRING, id="touched"),
+    {
+        "yields": ("plastic", {}, {"height": -2.0, "force": 50.0}, -2e-3, None),
+        "low": ("plastic", {}, {"height": -1.0, "force": 50.0, "target": -2.0}, -2e-3, None),
+        "less than felt": ("elastic", {}, {"force": 2.0, "mode": Mode.REST}, 0.0, Mode.REST),
+        "touched": ("elastic", {}, {"force": 2.0, "mode": Mode.SPRING}, 0.0, Mode.SPRING),
         # u' = -F/c - u/τ from -4 mm: equilibrium -F τ/c = -2.5 mm, reached with exp(-T/τ), exactly.
-        pytest.param(
-            "viscous", {"diffusivity": 0.0, "damping": 10.0, "recovery_time": 0.5},
-            {"force": 50.0, "target": -4.0}, -2.5e-3 - 1.5e-3 * np.exp(-0.01), None, id="relaxes",
+        "relaxes": (
+            "viscous",
+            {"diffusivity": 0.0, "damping": 10.0, "recovery_time": 0.5},
+            {"force": 50.0, "target": -4.0},
+            -2.5e-3 - 1.5e-3 * np.exp(-0.01),
+            None,
         ),
-    ],
-)  # fmt: skip
+    },
+)
 def test_a_cell_remembers_its_height_and_its_touch(method, known, given, target, mode):
     behavior = control(method, **known)
     found = orders(behavior, seen(behavior, **given))
@@ -150,9 +153,7 @@ def test_a_cell_of_the_force_display_is_kept_for_its_release_time_after_the_fing
     assert follows == [True] * 4 + [False] * 2
 
 
-@pytest.mark.parametrize(
-    "diffusivity, sunk", [(10e-6, [7, 11, 12, 13, 17]), (0.0, [12])], ids=["with neighbors", "alone"]
-)
+@table("diffusivity, sunk", {"with neighbors": (10e-6, [7, 11, 12, 13, 17]), "alone": (0.0, [12])})
 def test_a_dent_draws_its_neighbors_along_and_the_cells_asked_for_hold_them(diffusivity, sunk):
     behavior = control("viscous", diffusivity=diffusivity)
     dent = seen(behavior, target=middle(-5.0), force=middle(20.0))

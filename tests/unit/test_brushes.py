@@ -21,7 +21,7 @@ from digiclay.settings.devices import BEDS, make_scene
 from digiclay.strokes.nominal import find_nominal, find_radius
 from digiclay.strokes.stroke import Brush, draw, make_images
 
-from tests.assemble import replayed
+from tests.assemble import replayed, table
 from tests.hand import TICK, go_on, heights, let_go, pin, pose, risen, started
 from tests.reliefs import heighten
 from tests.strokes import begin_bed, finish, form, measure_spikes, queue, relief
@@ -314,7 +314,7 @@ def shaped(bed):
     return session
 
 
-@pytest.mark.parametrize("goal", [(5.0, 0.0, 90.0), (5.0, 60.0, 47.0)], ids=["upwards", "sideways"])
+@table("goal", {"upwards": (5.0, 0.0, 90.0), "sideways": (5.0, 60.0, 47.0)})
 @pytest.mark.parametrize("bed", ["paper", "design", "fine"])
 def test_no_pin_is_left_above_what_the_finger_has_shaped(bed, goal):
     before = shaped(bed)

@@ -19,7 +19,7 @@ from digiclay.core.model.valve import Fluid, Valve
 from digiclay.core.steppers.explicit import RungeKutta4
 from scipy.integrate import quad
 
-from tests.assemble import AWAY, Motion, make_system, one_cell, path, record, scripted, under
+from tests.assemble import AWAY, Motion, make_system, one_cell, path, record, scripted, table, under
 
 RAISE, LOWER = scripted(lambda t, x, y: 1.0), scripted(lambda t, x, y: -1.0)
 STEPPERS = pytest.mark.parametrize("stepper, step", [("bernoulli", 1e-3), ("runge_kutta_4", 0.5e-3)])
@@ -263,13 +263,12 @@ def test_a_constant_and_a_linear_tension_are_filtered_exactly(step, count, slope
 @pytest.mark.parametrize(
     "stepper, step, tolerance", [("bernoulli", 1e-4, 1e-4), ("runge_kutta_4", 5e-4, 1e-6)]
 )
-@pytest.mark.parametrize(
+@table(
     "depth, speed",
-    [
-        (lambda t: 20e-3 * t, lambda t: 20e-3),
-        (lambda t: 1e-3 * (1.0 - math.cos(40.0 * t)), lambda t: 40e-3 * math.sin(40.0 * t)),
-    ],
-    ids=["ramp", "sine"],
+    {
+        "ramp": (lambda t: 20e-3 * t, lambda t: 20e-3),
+        "sine": (lambda t: 1e-3 * (1.0 - math.cos(40.0 * t)), lambda t: 40e-3 * math.sin(40.0 * t)),
+    },
 )
 def test_filters_agree_with_the_convolution(depth, speed, stepper, step, tolerance):
     # A locked pin that the finger presses; the errors of the frozen and linear parts are of order 2 and 4.

@@ -22,6 +22,8 @@ from digiclay.core.model.actuator import Actuator
 from digiclay.core.model.control_interface import Measurement
 from digiclay.core.model.layout import Layout, make_grid
 
+from tests.assemble import table
+
 REST = 40e-3
 BLISTER = Blister(radius=12e-3, edge_radius=15.5e-3, flat_radius=3e-3)
 CONTROL = CellStatesControl(
@@ -51,17 +53,17 @@ def distance(cell):
     return float(np.hypot(BED.x[cell] - BED.x[MIDDLE], BED.y[cell] - BED.y[MIDDLE]))
 
 
-@pytest.mark.parametrize(
+@table(
     "before, force, after, command",
-    [
-        pytest.param(Mode.REST, 0.06, Mode.FORCE_FOLLOW, -0.3, id="pressed to the trigger: it follows"),
-        pytest.param(Mode.REST, 0.059, Mode.SPRING, -1.0, id="pressed less: on its spring"),
+    {
+        "pressed to the trigger: it follows": (Mode.REST, 0.06, Mode.FORCE_FOLLOW, -0.3),
+        "pressed less: on its spring": (Mode.REST, 0.059, Mode.SPRING, -1.0),
         # 0.02 N over 20 N/m is 1 mm below; the gain of 500 1/m makes half a valve of it.
-        pytest.param(Mode.REST, 0.02, Mode.SPRING, -0.5, id="a spring gives way by force over stiffness"),
+        "a spring gives way by force over stiffness": (Mode.REST, 0.02, Mode.SPRING, -0.5),
         # 15 1/N times (0.04 - 0.02) N.
-        pytest.param(Mode.FORCE_FOLLOW, 0.02, Mode.FORCE_FOLLOW, 0.3, id="gain times missing force"),
-        pytest.param(Mode.FORCE_FOLLOW, 0.0, Mode.CRITICAL, 0.6, id="without a force critical first"),
-    ],
+        "gain times missing force": (Mode.FORCE_FOLLOW, 0.02, Mode.FORCE_FOLLOW, 0.3),
+        "without a force critical first": (Mode.FORCE_FOLLOW, 0.0, Mode.CRITICAL, 0.6),
+    },
 )
 def test_a_cell_is_driven_by_its_own_force(before, force, after, command):
     _, orders = ordered(seen({MIDDLE: force}, {MIDDLE: before}), Patch(felt=before == Mode.FORCE_FOLLOW))
@@ -146,31 +148,36 @@ NOISY = replace(CONTROL, floor=25e-3)
 SHORT, WIDE = (replace(CONTROL, blister=replace(BLISTER, flat_radius=flat)) for flat in (2.9e-3, 3.1e-3))
 
 
-@pytest.mark.parametrize(
+@table(
     "control, forces, before, after",
-    [
-        pytest.param(
-            CONTROL, {MIDDLE: 0.05, MIDDLE + 1: 0.016}, {MIDDLE: FF, MIDDLE + 1: PATCH}, {MIDDLE + 1: FF},
-            id="a blister cell follows at a lower force than one at rest",
+    {
+        "a blister cell follows at a lower force than one at rest": (
+            CONTROL,
+            {MIDDLE: 0.05, MIDDLE + 1: 0.016},
+            {MIDDLE: FF, MIDDLE + 1: PATCH},
+            {MIDDLE + 1: FF},
         ),
-        pytest.param(
-            CONTROL, {}, {MIDDLE + 1: PATCH, MIDDLE + 2: Mode.FROZEN, MIDDLE + 3: Mode.EDGE},
-            dict.fromkeys(range(BED.count), Mode.REST), id="without a following cell no blister is left",
+        "without a following cell no blister is left": (
+            CONTROL,
+            {},
+            {MIDDLE + 1: PATCH, MIDDLE + 2: Mode.FROZEN, MIDDLE + 3: Mode.EDGE},
+            dict.fromkeys(range(BED.count), Mode.REST),
         ),
-        pytest.param(
-            SHORT, {MIDDLE: 0.04}, {MIDDLE: FF, MIDDLE - 1: PATCH}, {MIDDLE - 1: Mode.FROZEN},
-            id="beyond the flat top a cell freezes behind the finger",
+        "beyond the flat top a cell freezes behind the finger": (
+            SHORT,
+            {MIDDLE: 0.04},
+            {MIDDLE: FF, MIDDLE - 1: PATCH},
+            {MIDDLE - 1: Mode.FROZEN},
         ),
-        pytest.param(
-            WIDE, {MIDDLE: 0.04}, {MIDDLE: FF, MIDDLE - 1: PATCH}, {MIDDLE - 1: PATCH}, id="and none within"
+        "and none within": (WIDE, {MIDDLE: 0.04}, {MIDDLE: FF, MIDDLE - 1: PATCH}, {MIDDLE - 1: PATCH}),
+        "a force that may be noise makes no blister cell follow": (
+            NOISY,
+            {MIDDLE: 0.1, MIDDLE + 2: 24e-3, MIDDLE - 2: 26e-3},
+            {MIDDLE: FF, MIDDLE + 2: PATCH, MIDDLE - 2: PATCH},
+            {MIDDLE + 2: PATCH, MIDDLE - 2: FF},
         ),
-        pytest.param(
-            NOISY, {MIDDLE: 0.1, MIDDLE + 2: 24e-3, MIDDLE - 2: 26e-3},
-            {MIDDLE: FF, MIDDLE + 2: PATCH, MIDDLE - 2: PATCH}, {MIDDLE + 2: PATCH, MIDDLE - 2: FF},
-            id="a force that may be noise makes no blister cell follow",
-        ),
-    ],
-)  # fmt: skip
+    },
+)
 def test_what_a_cell_becomes_under_a_finger_that_travels_east(control, forces, before, after):
     memory = Patch(heading=Heading(0.0, 0.0, 1.0, 0.0), felt=True)
     mode = control.command(memory, seen(forces, before))[1].mode

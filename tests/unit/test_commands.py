@@ -14,7 +14,6 @@ from digiclay.cli import main
 from digiclay.commands import compare as compare_command
 from digiclay.commands import form as form_command
 from digiclay.commands import run as run_command
-from digiclay.commands.compare import table
 from digiclay.commands.run import plan_meshes
 from digiclay.core.base.errors import DigiclayError
 from digiclay.core.metrics.metric_table import ERRORS
@@ -32,6 +31,7 @@ from digiclay.core.shapes.fitting import fit_shape
 from digiclay.core.shapes.request import Shape
 from digiclay.plots.sweep import PANELS, comparison
 
+from tests.assemble import table
 from tests.other_process import finish, start
 from tests.scene_files import SMALL_BLISTER, call, left, read_json, scene_text
 
@@ -101,8 +101,11 @@ def test_a_comparison_goes_on_after_a_stop_and_gives_way_to_another_one_only_wit
 
 def test_the_table_has_a_dash_for_what_was_not_found_and_every_panel_a_bar_for_every_method():
     found = {name: dict.fromkeys(RUN_METRICS, 12.345 * (i + 1)) for i, name in enumerate(BOTH)}
-    assert len({len(line) for line in table(found)}) == 1
-    rows = [line.split() for line in table({"one": dict.fromkeys(RUN_METRICS) | {"lag_max": 0.0025}})]
+    assert len({len(line) for line in compare_command.table(found)}) == 1
+    rows = [
+        line.split()
+        for line in compare_command.table({"one": dict.fromkeys(RUN_METRICS) | {"lag_max": 0.0025}})
+    ]
     assert ["lag_max", "mm", "2.5"] in rows
     assert ["rfd", "N", "–"] in rows
     found = {name: dict.fromkeys(RUN_METRICS, 1.0) for name in (*BOTH, "third")}
@@ -153,17 +156,16 @@ def list_files(folder):
 FEW = ["--set", "layout.rows=13", "--set", "layout.columns=13", "--quiet"]
 
 
-@pytest.mark.parametrize(
+@table(
     "command, made",
-    [
-        (
+    {
+        "run": (
             ["run", "my.toml", "--quiet", "--export", "stl,obj", "--plots", "--no-errors"],
             ["surface.stl, surface.obj", "session.png, surface.png"],
         ),
-        (["form", "dome", *FEW], ["surface.stl", "displayed/surface.stl"]),
-    ],
-    ids=["run", "form"],
-)  # fmt: skip
+        "form": (["form", "dome", *FEW], ["surface.stl", "displayed/surface.stl"]),
+    },
+)
 def test_what_is_stopped_before_its_extras_names_them_and_how_to_make_them(command, made, here, stopped):
     assert main([*command, "--out", "whole"]) == 0
     commands = stopped(run_command, "save", *command)
@@ -199,7 +201,7 @@ def test_a_run_stopped_before_its_errors_are_estimated_says_so(here, stopped):
     assert left(here) == [OUT]
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=["Ctrl-C", "as farms stop"])
+@table("number", {"Ctrl-C": signal.SIGINT, "as farms stop": signal.SIGTERM})
 def test_a_run_stopped_within_its_session_is_kept_and_can_be_exported_as_it_says(number, here, stopped):
     arguments = ("run", "my.toml", "--quiet", "--export", "ply")
     commands = stopped(RunRecording, "observe", *arguments, number=number)

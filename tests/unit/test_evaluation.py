@@ -32,6 +32,7 @@ from digiclay.core.studies.evaluation import (
 from digiclay.core.studies.series import finish as finish_series
 from distributed import Client, LocalCluster
 
+from tests.assemble import table
 from tests.other_process import finish as finish
 from tests.other_process import start
 from tests.scene_files import left, read_json, timeless
@@ -132,41 +133,63 @@ NOISE = ("sensors.force_noise=1e-3,2e-3,3e-3", "sensors.seed=1,2")
 TRIGGERS = ("control.blister_trigger=0.01,0.03", "control.spring_trigger=0.02,0.06,0.08")
 
 
-@pytest.mark.parametrize(
+@table(
     "varied, setting, errors, batches, alone, said",
-    [
-        pytest.param(
-            ("control.force_gain=1,2,3,4", "layout.rows=11,13"), "", False, [[0, 2, 4, 6], [1, 3, 5, 7]], [],
-            "8 points run in 2 batches", id="points of one structure run together",
+    {
+        "points of one structure run together": (
+            ("control.force_gain=1,2,3,4", "layout.rows=11,13"),
+            "",
+            False,
+            [[0, 2, 4, 6], [1, 3, 5, 7]],
+            [],
+            "8 points run in 2 batches",
         ),
-        pytest.param(
-            ("layout.rows=11,13,15",), "", False, [], [[0], [1], [2]],
-            "3 points one at a time: fewer than 4 have the same bed, parts and steps", id="too few of a kind",
+        "too few of a kind": (
+            ("layout.rows=11,13,15",),
+            "",
+            False,
+            [],
+            [[0], [1], [2]],
+            "3 points one at a time: fewer than 4 have the same bed, parts and steps",
         ),
-        pytest.param(HALVED, "", False, [[*range(8)]], [], "8 points run in 1 batch", id="not judged"),
+        "not judged": (HALVED, "", False, [[*range(8)]], [], "8 points run in 1 batch"),
         # A dead time of half a control period falls on the end of a half step.
-        pytest.param(HALVED, "", True, [[0, 1, 2, 3], [4, 5, 6, 7]], [], "8 points run in 2 batches", id="h"),
-        pytest.param(
-            HALVED[1:], "simulation.physics_step=5e-6", True, [], [[0], [1], [2], [3]], None, id="too fine"
+        "h": (HALVED, "", True, [[0, 1, 2, 3], [4, 5, 6, 7]], [], "8 points run in 2 batches"),
+        "too fine": (HALVED[1:], "simulation.physics_step=5e-6", True, [], [[0], [1], [2], [3]], None),
+        "every method with noise": (
+            (METHODS, *NOISE),
+            "",
+            False,
+            [[*range(first, first + 6)] for first in (0, 6, 12, 18)],
+            [],
+            "24 points run in 4 batches",
         ),
-        pytest.param(
-            (METHODS, *NOISE), "", False, [[*range(first, first + 6)] for first in (0, 6, 12, 18)], [],
-            "24 points run in 4 batches", id="every method with noise",
+        "with noise and without it are two structures": (
+            ("sensors.force_noise=0,1e-3", NOISE[1]),
+            "",
+            False,
+            [],
+            [[0], [1], [2], [3]],
+            None,
         ),
-        pytest.param(
-            ("sensors.force_noise=0,1e-3", NOISE[1]), "", False, [], [[0], [1], [2], [3]], None,
-            id="with noise and without it are two structures",
+        "Method III": (
+            ("control.force_setpoint=0.2:0.5:4",),
+            "control.method=hybrid",
+            False,
+            [],
+            [[0], [1], [2], [3]],
+            "4 points one at a time: a batch of hybrid takes as long",
         ),
-        pytest.param(
-            ("control.force_setpoint=0.2:0.5:4",), "control.method=hybrid", False, [], [[0], [1], [2], [3]],
-            "4 points one at a time: a batch of hybrid takes as long", id="Method III",
+        "values that do not go together": (
+            TRIGGERS,
+            "control.method=cell_states",
+            False,
+            [[0, 1, 2, 4, 5]],
+            [[3]],
+            None,
         ),
-        pytest.param(
-            TRIGGERS, "control.method=cell_states", False, [[0, 1, 2, 4, 5]], [[3]], None,
-            id="values that do not go together",
-        ),
-    ],
-)  # fmt: skip
+    },
+)
 def test_points_of_one_structure_run_together_and_others_alone(varied, setting, errors, batches, alone, said):
     settings = [*SHORT, *([Setting(*setting.split("="))] if setting else [])]
     points = some(*varied, settings=settings)
@@ -286,7 +309,7 @@ def never():
     return False
 
 
-@pytest.mark.parametrize("words, tables", [(SWEEP, 1), (TUNING, 2)], ids=["sweep", "tuning"])
+@table("words, tables", {"sweep": (SWEEP, 1), "tuning": (TUNING, 2)})
 def test_a_series_on_a_cluster_comes_to_the_tables_of_this_machine(words, tables, here, address):
     assert main([*words, "--workers", "1", "--out", "own"]) == 0
     assert main([*words, "--scheduler", address, "--out", "far"]) == 0

@@ -22,6 +22,7 @@ from openjd.model import (
     preprocess_job_parameters,
 )
 
+from tests.assemble import table
 from tests.scene_files import read_json
 
 JOBS = """
@@ -77,7 +78,7 @@ def test_the_tasks_of_a_job_are_its_run_then_frames_then_films_and_the_page_is_l
     assert planned()["tap-a: run"][0] == ["job", "S/jobs/tap-a"]
 
 
-@pytest.mark.parametrize("before", ["", "x" * 100], ids=["short names", "names cut to one length"])
+@table("before", {"short names": "", "names cut to one length": "x" * 100})
 def test_an_openjd_template_has_these_tasks_in_an_order_that_respects_the_steps(before, here):
     jobs = JOBS.replace("a =", f"{before}a =").replace("b =", f"{before}b =")
     assert submit("openjd", jobs + FILMS, "--program", WINDOWS) == 0

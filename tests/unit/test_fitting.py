@@ -20,6 +20,7 @@ from hypothesis import strategies as st
 from PIL import Image
 
 from tests import pictures
+from tests.assemble import table
 
 REST, STROKE = Actuator().rest_height, Actuator().stroke
 BED = make_grid(Layout(13, 25, 3e-3))
@@ -41,26 +42,24 @@ def box(wide, deep, high):
     return mesh(solid)
 
 
-def table(cells):
+def relief(cells):
     """Return heights above rest, mm, row by row."""
     return np.round((cells.heights.reshape(13, 25) - REST) * 1e3, 9)
 
 
-@pytest.mark.parametrize(
+@table(
     "size, known, rows, columns",
-    [
+    {
         # 39 mm are the shorter side; a square box takes 13 x 13 cells.
-        pytest.param((10, 10, 5), {}, range(13), range(6, 19), id="contained it keeps its proportions"),
+        "contained it keeps its proportions": ((10, 10, 5), {}, range(13), range(6, 19)),
         # Pins 3 mm apart within +- 15.25 mm and +- 6.25 mm.
-        pytest.param((30.5, 12.5, 5), {"fit": "actual"}, range(4, 9), range(7, 18), id="in its own size"),
+        "in its own size": ((30.5, 12.5, 5), {"fit": "actual"}, range(4, 9), range(7, 18)),
         # 5 mm wide about (9, -6) mm: one pin, and none of its neighbors 3 mm away.
-        pytest.param(
-            (10, 10, 5), {"fit": "actual", "scale": 0.5, "x": 9e-3, "y": -6e-3}, [4], [15], id="scaled, moved"
-        ),
-    ],
+        "scaled, moved": ((10, 10, 5), {"fit": "actual", "scale": 0.5, "x": 9e-3, "y": -6e-3}, [4], [15]),
+    },
 )
 def test_a_fit_says_where_the_shape_lies_in_plan(size, known, rows, columns):
-    raised = table(laid(box(*size), **known)) > 0
+    raised = relief(laid(box(*size), **known)) > 0
     assert np.argwhere(raised).tolist() == [[row, column] for row in rows for column in columns]
 
 
@@ -88,7 +87,7 @@ def test_the_relief_goes_from_the_foot_over_the_rise_to_the_strokes_end_or_is_tr
 def test_placed_a_shape_stands_where_it_says_and_heights_of_a_scene_as_they_are():
     solid = trimesh.creation.box((12.5, 12.5, 10.0))
     solid.apply_translation((9.0, -6.0, 48.0))
-    raised = table(laid(mesh(solid), fit="placed"))
+    raised = relief(laid(mesh(solid), fit="placed"))
     assert set(np.unique(raised).tolist()) == {0.0, 13.0}  # its top is at 53 mm, the bed at 40 mm
     row, column = np.nonzero(raised)
     assert (row.min(), row.max(), column.min(), column.max()) == (2, 6, 13, 17)
@@ -186,26 +185,34 @@ ROW, COLUMN = np.indices((72, 72))
 PIXELS = np.random.default_rng(2).uniform(0.0, 1.0, (5, 7))
 
 
-@pytest.mark.parametrize(
+@table(
     "values, rows, columns, pixel, wanted",
-    [
-        pytest.param(PIXELS, 5, 7, PITCH, lambda x, y: PIXELS.ravel(), id="a pixel for every pin is its own"),
-        pytest.param(
-            (2.0 * ROW - COLUMN)[:20, :30], 9, 13, 2.1e-3,
-            lambda x, y: 2.0 * (y / 2.1e-3 + 9.5) - (x / 2.1e-3 + 14.5), id="between pixels a plane is one",
+    {
+        "a pixel for every pin is its own": (PIXELS, 5, 7, PITCH, lambda x, y: PIXELS.ravel()),
+        "between pixels a plane is one": (
+            (2.0 * ROW - COLUMN)[:20, :30],
+            9,
+            13,
+            2.1e-3,
+            lambda x, y: 2.0 * (y / 2.1e-3 + 9.5) - (x / 2.1e-3 + 14.5),
         ),
         # Eight by eight pixels to a pin, one of them white.
-        pytest.param(
-            (ROW % 8 == 1) & (COLUMN % 8 == 6), 9, 9, PITCH / 8, lambda x, y: np.full(x.size, 1 / 64),
-            id="a fine map is averaged over the square of a pin",
+        "a fine map is averaged over the square of a pin": (
+            (ROW % 8 == 1) & (COLUMN % 8 == 6),
+            9,
+            9,
+            PITCH / 8,
+            lambda x, y: np.full(x.size, 1 / 64),
         ),
-        pytest.param(
-            np.ones((3, 3)), 9, 9, PITCH,
+        "pins beside the map are not covered": (
+            np.ones((3, 3)),
+            9,
+            9,
+            PITCH,
             lambda x, y: np.where(np.maximum(np.abs(x), np.abs(y)) < 4e-3, 1.0, np.nan),
-            id="pins beside the map are not covered",
         ),
-    ],
-)  # fmt: skip
+    },
+)
 def test_a_map_gives_each_pin_the_mean_over_its_square(values, rows, columns, pixel, wanted):
     bed = make_grid(Layout(rows, columns, PITCH))
     found, known = make_height_map("x", values).tops(bed, middle(*values.shape, pixel)), wanted(bed.x, bed.y)
@@ -375,10 +382,12 @@ def test_pins_over_no_data_stand_at_the_foot_and_those_beside_are_as_high_as_if_
     cells = laid(grid, fit="stretch", rise=8e-3)
     assert cells.covered == 13 * 25 - 15
     wanted = np.where(absent, 0.0, 2.0 * (heights - 1.0))
-    assert np.abs(table(cells) - wanted).max() < 1e-9
+    assert np.abs(relief(cells) - wanted).max() < 1e-9
     # Twice as fine, each pin has the mean of the pixels that have data.
     fine = np.ma.array(np.kron(heights, np.ones((2, 2))), mask=np.kron(absent, np.ones((2, 2), bool)))
-    assert np.abs(table(laid(make_height_map("a.asc", fine), fit="stretch", rise=8e-3)) - wanted).max() < 1e-9
+    assert (
+        np.abs(relief(laid(make_height_map("a.asc", fine), fit="stretch", rise=8e-3)) - wanted).max() < 1e-9
+    )
 
 
 def test_an_esri_grid_keeps_its_proportions_of_plan_and_height(tmp_path):

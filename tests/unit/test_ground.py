@@ -13,7 +13,7 @@ from digiclay.core.model.control_interface import Measurement
 from digiclay.core.model.layout import Layout, make_grid
 from digiclay.core.scene.toml_table import format_scene, resolve
 
-from tests.assemble import make_system, master
+from tests.assemble import make_system, master, table
 
 BED = make_grid(Layout(15, 15))
 EAST = (1.0, 0.0)
@@ -44,15 +44,15 @@ SHARE = Blister().evaluate_profile(np.array([12e-3]))[0]
 RISEN = seen(np.full(BED.count, 47e-3), Mode.BLISTER, own=np.full(BED.count, 40e-3))
 
 
-@pytest.mark.parametrize(
+@table(
     "measured, place, height",
-    [
-        pytest.param(seen(RIDGE, Mode.HOLD), (0, 15), 44e-3, id="at the rim it stays where it is formed"),
-        pytest.param(seen(RIDGE, Mode.HOLD), (15, 0), 40e-3, id="also beside the ridge"),
-        pytest.param(seen(RIDGE, Mode.HOLD), (0, 12), 44e-3 + SHARE * 6e-3, id="its share of the way"),
-        pytest.param(seen(RIDGE, Mode.HOLD), (12, 0), 40e-3 + SHARE * 10e-3, id="beside the ridge likewise"),
-        pytest.param(RISEN, (12, 0), 40e-3 + SHARE * 10e-3, id="from where it was when the blister came"),
-    ],
+    {
+        "at the rim it stays where it is formed": (seen(RIDGE, Mode.HOLD), (0, 15), 44e-3),
+        "also beside the ridge": (seen(RIDGE, Mode.HOLD), (15, 0), 40e-3),
+        "its share of the way": (seen(RIDGE, Mode.HOLD), (0, 12), 44e-3 + SHARE * 6e-3),
+        "beside the ridge likewise": (seen(RIDGE, Mode.HOLD), (12, 0), 40e-3 + SHARE * 10e-3),
+        "from where it was when the blister came": (RISEN, (12, 0), 40e-3 + SHARE * 10e-3),
+    },
 )
 def test_a_cell_rises_from_its_own_ground(measured, place, height):
     assert command(master(height=50e-3), measured).target[at(*place)] == pytest.approx(height, abs=1e-9)
@@ -126,14 +126,13 @@ def test_a_blister_that_sinks_into_a_slope_raises_no_cell_and_one_that_rises_is_
 EVEN = 40e-3 + 0.03 * BED.x
 
 
-@pytest.mark.parametrize(
+@table(
     "ground, top, left, ahead",
-    [
-        (SLOPE, 36e-3, Mode.FROZEN, Mode.BLISTER),
-        (SLOPE, 45e-3, Mode.BLISTER, Mode.FROZEN),
-        (EVEN, 36e-3, Mode.BLISTER, Mode.FROZEN),
-    ],
-    ids=["sinks into a slope", "rises", "sinks into even ground"],
+    {
+        "sinks into a slope": (SLOPE, 36e-3, Mode.FROZEN, Mode.BLISTER),
+        "rises": (SLOPE, 45e-3, Mode.BLISTER, Mode.FROZEN),
+        "sinks into even ground": (EVEN, 36e-3, Mode.BLISTER, Mode.FROZEN),
+    },
 )
 def test_on_uneven_ground_that_a_blister_sinks_into_cells_freeze_sooner_and_are_freed_ahead(
     ground, top, left, ahead
@@ -142,13 +141,13 @@ def test_on_uneven_ground_that_a_blister_sinks_into_cells_freeze_sooner_and_are_
     assert pressed(0.0, top, Mode.FROZEN, ground).mode[at(6, 0)] == ahead
 
 
-@pytest.mark.parametrize(
+@table(
     "change, x, height, touched, cells",
-    [
+    {
         # Those far behind, where the slope is below the top, and the one 1 mm behind, within what freezes.
-        pytest.param(-3e-3, 1e-3, 38e-3, 6.0, (-9.0, -6.0, 0.0), id="pressed by one that climbs"),
-        pytest.param(3e-3, 0.0, 36e-3, 0.0, (6.0,), id="raised, and ahead again"),
-    ],
+        "pressed by one that climbs": (-3e-3, 1e-3, 38e-3, 6.0, (-9.0, -6.0, 0.0)),
+        "raised, and ahead again": (3e-3, 0.0, 36e-3, 0.0, (6.0,)),
+    },
 )
 def test_what_a_blister_has_formed_on_a_slope_stays_frozen(change, x, height, touched, cells):
     measured = touch(seen(SLOPE + change, Mode.FROZEN, own=SLOPE), touched)

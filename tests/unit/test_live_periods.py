@@ -34,7 +34,7 @@ from digiclay.sessions.sculpting import change_stroke, queue_stroke
 from digiclay.strokes.stroke import draw
 
 from tests import hand
-from tests.assemble import path
+from tests.assemble import path, table
 
 PERIOD = 5e-3
 SCENE = resolve({"layout": {"rows": 11, "columns": 11}})
@@ -93,21 +93,17 @@ def test_a_machine_too_slow_slows_down_instead_of_stalling():
     assert periods_due(update_cost(clock, 1, 5 * PERIOD), 101 * PERIOD, PERIOD, 1000)[0] == 14
 
 
-@pytest.mark.parametrize(
+@table(
     "drawing, least, spent, between",
-    [
-        pytest.param(
-            1e-3, LEAST, 23e-3, 33e-3, id="a graphics card: all of the time but a share for the person"
-        ),
-        pytest.param(15e-3, LEAST, 19e-3, 34e-3, id="a slow one: what is left of the time between two ticks"),
-        pytest.param(30e-3, LEAST, 15e-3, 45e-3, id="drawing takes all of it: a share of the drawing"),
-        pytest.param(0.5, LEAST, 0.25, 0.75, id="drawing by software"),
-        pytest.param(1e-3, RELEASED, 23e-3, 33e-3, id="a graphics card, when the hand has let go"),
-        pytest.param(
-            1 / 30, RELEASED, 1 / 30, 1 / 15, id="a slow one: as long as the drawing, 15 pictures a second"
-        ),
-        pytest.param(0.5, RELEASED, 0.5, 1.0, id="software"),
-    ],
+    {
+        "a graphics card: all of the time but a share for the person": (1e-3, LEAST, 23e-3, 33e-3),
+        "a slow one: what is left of the time between two ticks": (15e-3, LEAST, 19e-3, 34e-3),
+        "drawing takes all of it: a share of the drawing": (30e-3, LEAST, 15e-3, 45e-3),
+        "drawing by software": (0.5, LEAST, 0.25, 0.75),
+        "a graphics card, when the hand has let go": (1e-3, RELEASED, 23e-3, 33e-3),
+        "a slow one: as long as the drawing, 15 pictures a second": (1 / 30, RELEASED, 1 / 30, 1 / 15),
+        "software": (0.5, RELEASED, 0.5, 1.0),
+    },
 )
 def test_the_periods_of_a_queue_leave_the_window_its_redraws(drawing, least, spent, between):
     interval, clock, now = 1 / 30, Clock(), 0.0

@@ -14,7 +14,7 @@ from digiclay.core.model.valve import Valve
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.toml_table import resolve
 
-from tests.assemble import make_basis, make_system
+from tests.assemble import make_basis, make_system, table
 
 PERIOD, BAND = 5e-3, 1e-6
 #: Elongation of the default fingertip, 10 by 8 mm.
@@ -47,12 +47,17 @@ def follow(known, tip, speed=0.0, turn=0.0, count=200):
     return found
 
 
-@pytest.mark.parametrize(
+@table(
     "size, speed, turn",
-    [(1.0, 0.0, 0.0), (1.0, 20e-3, 0.0), (1.0, 10e-3, 0.5 * math.pi), (1.0, 10e-3, 2.5), (0.75, 5e-3, 0.6),
-     (1.3, 5e-3, 0.0)],
-    ids=["at rest", "dragged", "across", "turned far", "smaller than known, turned", "larger"],
-)  # fmt: skip
+    {
+        "at rest": (1.0, 0.0, 0.0),
+        "dragged": (1.0, 20e-3, 0.0),
+        "across": (1.0, 10e-3, 0.5 * math.pi),
+        "turned far": (1.0, 10e-3, 2.5),
+        "smaller than known, turned": (0.75, 5e-3, 0.6),
+        "larger": (1.3, 5e-3, 0.0),
+    },
+)
 def test_a_fingertip_is_found(size, speed, turn):
     tip = Fingertip(10e-3 * size, 8e-3 * size, 8e-3 * size)
     x, y, z, vx, vy, vz, scale, along, askew = follow(filter_of(Fingertip()), tip, speed, turn).mean
