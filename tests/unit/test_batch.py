@@ -277,19 +277,19 @@ def test_when_a_batch_is_killed_its_processes_end_and_a_process_that_dies_is_tol
 
 
 @pytest.mark.parametrize(
-    "arguments, said, told",
+    "words, said, told",
     [
-        ([], 'scenes = ["tap"]\nexport = ["doc"]', "export: "),
-        ([], 'scenes = ["tap"]\nexport = ["stl"]\nsettings.a.recorder = "absent"', "need a recorder"),
-        (["--out", "two.toml"], TWO, "two.toml is a file"),
-        (["--out", "."], TWO, ". holds other things than a batch"),
-        (["--jobs", "0"], TWO, "--jobs"),
-        (["--out", "two", "secnod"], TWO, "unrecognized arguments: secnod"),
+        ("", 'scenes = ["tap"]\nexport = ["doc"]', "export: "),
+        ("", 'scenes = ["tap"]\nexport = ["stl"]\nsettings.a.recorder = "absent"', "need a recorder"),
+        ("--out two.toml", TWO, "two.toml is a file"),
+        ("--out .", TWO, ". holds other things than a batch"),
+        ("--jobs 0", TWO, "--jobs"),
+        ("--out two secnod", TWO, "unrecognized arguments: secnod"),
     ],
 )
-def test_a_mistake_is_refused_in_one_line_before_any_work(arguments, said, told, refused):
+def test_a_mistake_is_refused_in_one_line_before_any_work(words, said, told, refused):
     write(said)
-    refused(["batch", "two.toml", *arguments], told)
+    refused(f"batch two.toml {words}", told)
     assert [path.name for path in Path().iterdir()] == ["two.toml"]
 
 
@@ -360,47 +360,47 @@ def written(run=RUN):
 
 def test_a_job_that_is_done_is_left_as_it_is_with_exit_code_0(capsys):
     prepare()
-    assert main(["job", str(JOB)]) == 0
+    assert call(f"job {JOB}") == 0
     assert capsys.readouterr().out.startswith("written to ")
     before = written()
-    assert main(["job", str(JOB)]) == 0
+    assert call(f"job {JOB}") == 0
     out, err = capsys.readouterr()
     assert (out, err) == (f"was done already: {RUN.resolve()}\n", "")
-    assert main(["job", str(JOB), "--only", "run", "--quiet"]) == 0
+    assert call(f"job {JOB} --only run --quiet") == 0
     assert capsys.readouterr().out == ""
     assert written() == before
-    assert main(["job", str(JOB), "--overwrite", "--quiet"]) == 0
+    assert call(f"job {JOB} --overwrite --quiet") == 0
     assert written() > before
 
 
 def test_a_job_whose_files_changed_or_a_copy_broke_off_is_done_again_and_says_so(capsys):
     prepare()
-    main(["job", str(JOB), "--quiet"])
+    call(f"job {JOB} --quiet")
     before = written()
     prepare(ENDLESS.replace("0.05", "0.06"))
-    assert main(["job", str(JOB)]) == 0
+    assert call(f"job {JOB}") == 0
     assert "is of another definition: it is done again.\n" in capsys.readouterr().out
     assert written() > before
     for harm, rest in (("history.npz", 100), ("scene.toml", 0), ("job.toml", 0)):
         whole = (RUN / harm).read_bytes()
         (RUN / harm).write_bytes(whole[:rest]) if rest else (RUN / harm).unlink()
-        assert main(["job", str(JOB)]) == 0
+        assert call(f"job {JOB}") == 0
         assert "is incomplete: it is done again.\n" in capsys.readouterr().out
         assert (RUN / harm).stat().st_size == len(whole)
     prepare(f'export = ["stl"]\n{ENDLESS.replace("0.05", "0.06")}')
-    assert main(["job", str(JOB), "--quiet"]) == 0
+    assert call(f"job {JOB} --quiet") == 0
     assert (RUN / "surface.stl").is_file()
 
 
 def test_a_folder_outside_the_series_is_replaced_only_when_asked(refused):
     prepare()
-    own = ["job", str(JOB), "--out", "mine", "--quiet"]
-    assert (main(own), main(own)) == (0, 0)
+    own = f"job {JOB} --out mine --quiet"
+    assert (call(own), call(own)) == (0, 0)
     before = written(Path("mine"))
     prepare(ENDLESS.replace("0.05", "0.06"))
     refused(own, "mine is not empty: choose another folder with --out")
     assert written(Path("mine")) == before
-    assert main([*own, "--overwrite"]) == 0
+    assert call(f"{own} --overwrite") == 0
     assert written(Path("mine")) > before
 
 
@@ -416,7 +416,7 @@ def test_a_folder_outside_the_series_is_replaced_only_when_asked(refused):
 )
 def test_a_part_that_cannot_be_done_is_refused_in_one_line(words, said, refused):
     prepare(f"{ENDLESS}[turntable]\nframes = 4\n")
-    refused(["job", str(JOB), *words.split()], said)
+    refused(f"job {JOB} {words}", said)
     assert list(Path("two/runs").iterdir()) == []
 
 

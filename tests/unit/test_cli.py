@@ -120,17 +120,16 @@ def test_export_writes_the_surface_of_a_run_in_a_unit_at_an_instant_and_refuses_
     call("export my --format ply,glb")
     made = [os.path.join("my", f"surface.{kind}") for kind in ("ply", "glb")]
     assert capsys.readouterr().out.split() == made
-    options = "--format obj --unit m --time 0 --up z --out meshes --quiet"
-    main(["export", "my", *options.split()])
+    call("export my --format obj --unit m --time 0 --up z --out meshes --quiet")
     # At rest all pins are 40 mm high; OBJ files are written to 1e-8.
     lines = (here / "meshes" / "surface.obj").read_text().splitlines()
     highest = max(float(line.split()[3]) for line in lines if line.startswith("v "))
     assert highest == pytest.approx(0.04, abs=1e-8)
     for when in ("-1", "0.2", "nan", "1 mm", "soon"):
-        refused(["export", "my", f"--time={when}"], "--time")
+        refused(f"export my '--time={when}'", "--time")
     for count in ("0", "-1", "2.5", "65", "9" * 400, "x"):
         for command in ("export", "features"):
-            refused([command, "my", f"--resolution={count}"], " 64")
+            refused(f"{command} my --resolution={count}", " 64")
     scene, history = here / "my" / "scene.toml", here / "my" / "history.npz"
     scene.write_text(scene.read_text(encoding="utf-8").replace("rows = 3", "rows = 4"), encoding="utf-8")
     refused("export my", "height must have the shape (21, 16) of its scene (got (21, 12))")
@@ -326,7 +325,7 @@ def test_a_missing_library_is_told_before_any_work(line, missing, install, here,
         monkeypatch.delitem(sys.modules, name)
     monkeypatch.delitem(sys.modules, "digiclay.compat", raising=False)
     monkeypatch.setitem(sys.modules, missing, None)  # as Python marks what cannot be imported
-    refused(line.split(), install)
+    refused(line, install)
     assert left(here) == []
 
 

@@ -44,8 +44,8 @@ BOTH = ["virtual_master", "cell_states"]
 
 def test_both_methods_are_printed_side_by_side_and_kept_with_a_picture_of_the_same_input(here, capsys):
     (here / "my.toml").write_text(PRESS, encoding="utf-8")
-    methods, setting = ["--methods", "cell_states,virtual_master"], ["--set", "control.force_setpoint=0.03"]
-    assert main(["compare", "my.toml", *methods, *setting]) == 0
+    line = "compare my.toml --methods cell_states,virtual_master --set control.force_setpoint=0.03"
+    assert call(line) == 0
     lines = capsys.readouterr().out.splitlines()
     assert lines[0].split() == ["metric", "unit", *BOTH[::-1]]
     expected = {*RUN_METRICS, *ERRORS}
@@ -80,22 +80,22 @@ def test_a_comparison_goes_on_after_a_stop_and_gives_way_to_another_one_only_wit
     here, capsys, monkeypatch
 ):
     (here / "my.toml").write_text(PRESS, encoding="utf-8")
-    command = ["compare", "my.toml", "--methods", ",".join(BOTH), "--out", OUT]
+    command = f"compare my.toml --methods {','.join(BOTH)} --out '{OUT}'"
     with monkeypatch.context() as patched:
         stop_before(patched, compare_command, "run", before=1)
-        assert main(command) == 130
+        assert call(command) == 130
     assert capsys.readouterr().out.startswith("Stopped: 1 of 2 methods are done and kept in first run. ")
     (point,) = (here / OUT / "points").iterdir()
     first = read_json(point)["figures"]["run_time"]
-    assert main(command) == 0
+    assert call(command) == 0
     times = read_times(here / OUT)
     assert (list(times), times[BOTH[0]]) == (BOTH, first)
-    assert main(command) == 0  # nothing is left to run
+    assert call(command) == 0  # nothing is left to run
     assert read_times(here / OUT) == times
-    other = [*command, "--set", "control.force_setpoint=0.03"]
-    assert main(other) == 2
+    other = f"{command} --set control.force_setpoint=0.03"
+    assert call(other) == 2
     assert "holds another comparison (virtual_master, cell_states, digiclay" in capsys.readouterr().err
-    assert main([*other, "--overwrite"]) == 0
+    assert call(f"{other} --overwrite") == 0
     assert not set(read_times(here / OUT).values()) & set(times.values())
 
 
@@ -180,15 +180,15 @@ def test_what_is_stopped_before_its_extras_names_them_and_how_to_make_them(comma
 
 
 def test_plot_writes_into_a_folder_prints_its_files_and_says_what_it_cannot(here, capsys, refused):
-    run = ["run", "my.toml", "--quiet", "--no-errors", "--out"]
-    assert main([*run, "o"]) == 0
+    run = "run my.toml --quiet --no-errors --out"
+    assert call(f"{run} o") == 0
     assert call("plot o --out new/pictures") == 0
     assert [Path(line).name for line in capsys.readouterr().out.split()] == ["session.png", "surface.png"]
     assert list_files(here / "new") == {"pictures/session.png", "pictures/surface.png"}
     refused("plot o --out my.toml/x", "my.toml/x cannot be a folder: my.toml is a file.")
-    main([*run, "row", "--set", "layout.rows=1"])
+    call(f"{run} row --set layout.rows=1")
     refused("plot row", "plot needs at least 2 x 2 cells")
-    main([*run, "none", "--set", "recorder=absent"])
+    call(f"{run} none --set recorder=absent")
     refused("plot none", "none has no history.npz")
 
 
@@ -282,21 +282,20 @@ def test_json_is_in_si_units_from_any_former_surface_and_a_threshold_has_a_unit(
 @pytest.mark.parametrize(
     "options, names",
     [
-        ([], ["surface.stl"]),
-        (["--kind", "surface"], ["skin.stl"]),
-        (["--kind", "pins", "--format", "stl_ascii,3mf"], ["pins.3mf", "pins.ascii.stl"]),
-        (["--kind", "features"], ["features.stl"]),
-        (["--kind", "features", "--separate"], ["crease_1.stl"]),
+        ("", ["surface.stl"]),
+        ("--kind surface", ["skin.stl"]),
+        ("--kind pins --format stl_ascii,3mf", ["pins.3mf", "pins.ascii.stl"]),
+        ("--kind features", ["features.stl"]),
+        ("--kind features --separate", ["crease_1.stl"]),
     ],
 )
 def test_each_kind_has_its_file(run, options, names):
-    assert main(["export", "run", "--out", "made", "--quiet", *options]) == 0
+    assert call(f"export run --out made --quiet {options}") == 0
     assert sorted(path.name for path in Path("made").iterdir()) == names
 
 
 def test_a_skin_and_its_resolution_can_be_chosen(run):
-    options = ["--skin", "smooth", "--resolution", "3", "--base-thickness", "5"]
-    assert main(["export", "run", "--quiet", *options]) == 0
+    assert call("export run --quiet --skin smooth --resolution 3 --base-thickness 5") == 0
     made = trimesh.load_mesh(run / "surface.stl")
     assert len(made.faces) == 4 * 24 * 24 + 4 * 2 * 24
     # The spline goes a little lower.
@@ -305,7 +304,7 @@ def test_a_skin_and_its_resolution_can_be_chosen(run):
 
 @pytest.mark.parametrize("said", ["0.8", "800um"])
 def test_a_length_is_in_millimeters_or_has_a_unit_behind_it(said, run):
-    assert main(["export", "run", "--base-thickness", said, "--format", "obj", "--up", "z", "--quiet"]) == 0
+    assert call(f"export run --base-thickness {said} --format obj --up z --quiet") == 0
     lines = (run / "surface.obj").read_text().splitlines()
     lowest = min(float(line.split()[3]) for line in lines if line.startswith("v "))
     assert lowest == pytest.approx(1e3 * deepest(run)[1] - 0.8, abs=1e-5)  # digits of the file

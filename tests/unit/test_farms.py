@@ -23,7 +23,7 @@ from openjd.model import (
 )
 
 from tests.assemble import table
-from tests.scene_files import read_json
+from tests.scene_files import call, read_json
 
 JOBS = """
 scenes = ["tap"]
@@ -221,15 +221,15 @@ def test_a_line_for_windows_protects_what_its_shell_would_read():
             join_words([word], windows=windows)
 
 
-OPENJD = ["--submit", "openjd"]
+OPENJD = "--submit openjd"
 NARROW = 'layout.pitch = "1 mm"'
 REFUSED = [
-    (JOBS, ["--program", "p"], 2, "--program must be given with --submit only."),
-    (JOBS, ["--chunk", "5"], 2, "--chunk must be given with --submit only."),
-    (JOBS, [*OPENJD, "--prepare"], 2, "not allowed with argument"),
-    (JOBS, ["--submit", "flamingo"], 2, "Did you mean flamenco?"),
-    (JOBS, [*OPENJD, "--chunk", "0"], 2, "--chunk"),
-    (JOBS, [*OPENJD, "--program", " "], 2, "--program must be the path of digiclay or Blender"),
+    (JOBS, "--program p", 2, "--program must be given with --submit only."),
+    (JOBS, "--chunk 5", 2, "--chunk must be given with --submit only."),
+    (JOBS, f"{OPENJD} --prepare", 2, "not allowed with argument"),
+    (JOBS, "--submit flamingo", 2, "Did you mean flamenco?"),
+    (JOBS, f"{OPENJD} --chunk 0", 2, "--chunk"),
+    (JOBS, f"{OPENJD} --program ' '", 2, "--program must be the path of digiclay or Blender"),
     (f"{JOBS}[film]\nstart = 1\n", OPENJD, 2, "tap-a: Film.start must be between 0 s and 0.05 s"),
     (f"{JOBS}c = {{ {NARROW} }}\n", OPENJD, 1, "1 of 3 jobs failed; the first one: tap-c: "),
     (f'scenes = ["tap"]\nsettings.a.{NARROW}', OPENJD, 2, "No job can be submitted"),
@@ -239,7 +239,7 @@ REFUSED = [
 @pytest.mark.parametrize("said, options, code, told", REFUSED)
 def test_what_cannot_be_submitted_is_refused_in_one_line(said, options, code, told, capsys):
     Path("two.toml").write_text(said, encoding="utf-8")
-    assert main(["batch", "two.toml", "--quiet", *options]) == code
+    assert call(f"batch two.toml --quiet {options}") == code
     out, err = capsys.readouterr()
     assert (out, err.count("\n"), told in err) == ("", 1, True), err
     assert Path("two/openjd.json").exists() == (code == 1)

@@ -11,7 +11,6 @@ from functools import partial
 from pathlib import Path
 
 import pytest
-from digiclay.cli import main
 from digiclay.core.base.errors import OutputError
 from digiclay.core.files.file_lock import find_host, find_start, hold_lock, hold_record, may_have_made
 from digiclay.core.files.run_folder import (
@@ -62,11 +61,11 @@ def test_a_folder_that_is_being_written_is_refused_at_once_by_every_command(refu
     commands += ["sweep my.toml --vary layout.rows=3,4", "batch jobs.toml"]
     with claim_folder(Path("o"), overwrite=False), claim_folder(Path("older"), overwrite=True):
         for command in commands:
-            refused([*command.split(), "--out", "o", "--quiet"], REFUSED.format("written"))
+            refused(f"{command} --out o --quiet", REFUSED.format("written"))
         assert not Path("o").exists()
         # A run that is being replaced takes in no mesh and no plot.
         for command in ("export older", "plot older", "run my.toml --out older --overwrite"):
-            refused([*command.split(), "--quiet"], "older is being written by another digiclay")
+            refused(f"{command} --quiet", "older is being written by another digiclay")
         assert call("export older --out elsewhere --quiet") == 0
     assert names(Path("older")) == before
     assert call("export older --quiet") == 0
@@ -75,11 +74,10 @@ def test_a_folder_that_is_being_written_is_refused_at_once_by_every_command(refu
 @pytest.mark.parametrize("line", ["sweep my.toml --vary layout.rows=3,4 --workers 1", "batch jobs.toml"])
 def test_a_second_series_in_one_folder_is_refused_at_once(line, refused):
     Path("jobs.toml").write_text(JOBS, encoding="utf-8")
-    command = line.split()
-    finished = [*command, "--prepare"] if command[0] == "batch" else command  # nothing is to be simulated
-    assert main([*finished, "--out", "o", "--quiet"]) == 0
+    finished = f"{line} --prepare" if line.startswith("batch") else line  # nothing is to be simulated
+    assert call(f"{finished} --out o --quiet") == 0
     with hold_lock(Path("o/.lock"), "no"):
-        refused([*command, "--out", "o", "--quiet"], REFUSED.format("worked in"))
+        refused(f"{line} --out o --quiet", REFUSED.format("worked in"))
         refused("run my.toml --out o --quiet", "o holds other things than a run")
 
 
