@@ -199,14 +199,14 @@ def test_a_trace_knows_force_set_point_and_heights_of_picked_pins_one_that_stays
 
 
 def watched(scene, finger):
-    """Follow a path with a monitor; return the last state and the errors it finds."""
+    """Follow a path with a monitor; return the last state, and the errors it finds with what is left, m."""
     system, monitor, found = assemble(scene), accuracy.start(scene), []
     start = begin(system)
     monitor = accuracy.begin_stretch(monitor, start)
     for index, state in enumerate(simulate_path(system, start, finger)):
         monitor = accuracy.note(monitor, state, finger[index : index + 2])
         monitor, errors = accuracy.catch_up(monitor, state, 1)
-        found += [errors] if errors else []
+        found += [(errors, np.abs(monitor.carried).max())] if errors else []
     return state, found
 
 
@@ -250,7 +250,8 @@ def test_the_monitor_finds_the_error_of_a_stretch_and_a_finer_step_has_smaller_o
     # It moves on, quite differently, while the reference lags behind.
     away = interpolate_path(pose(z=0.039), pose(z=0.05), STRETCH * (SPREAD - 1) - 1)
     whole = np.concatenate([finger, away])
-    (_, (found,)), (_, (fine, *_)) = (watched(stepped(step), whole) for step in ("1 ms", "0.25 ms"))
+    _, ((found, _),) = watched(stepped("1 ms"), whole)
+    _, ((fine, _), *_) = watched(stepped("0.25 ms"), whole)
     ends = []
     for step in ("0.05 ms", "1 ms"):
         system = assemble(stepped(step))
@@ -272,14 +273,8 @@ def test_what_a_stretch_left_wrong_stays_in_the_errors_of_the_session():
     )
     rest = np.repeat(up[-1:], 2 * (STRETCH + PAUSE) + STRETCH * SPREAD, axis=0)
     finger = np.concatenate([down, up[1:], rest])
-    system, monitor, found = assemble(scene), accuracy.start(scene), []
-    start = begin(system)
-    monitor = accuracy.begin_stretch(monitor, start)
-    for index, state in enumerate(simulate_path(system, start, finger)):
-        monitor = accuracy.note(monitor, state, finger[index : index + 2])
-        monitor, errors = accuracy.catch_up(monitor, state, 1)
-        found += [(errors.height, np.abs(monitor.carried).max())] if errors else []
-    (first, left), *_, (last, still) = found
+    _, found = watched(scene, finger)
+    (first, left), *_, (last, still) = [(errors.height, carried) for errors, carried in found]
     assert len(found) == 3
     assert first >= SHARE * left > 1e-7
     assert last >= first
