@@ -21,7 +21,7 @@ from digiclay.settings.devices import BEDS, make_scene
 from digiclay.strokes.nominal import find_nominal, find_radius
 from digiclay.strokes.stroke import Brush, draw, make_images
 
-from tests.assemble import replayed, table
+from tests.assemble import assert_near, replayed, table
 from tests.hand import TICK, go_on, heights, let_go, pin, pose, risen, started
 from tests.reliefs import heighten
 from tests.strokes import begin_bed, finish, form, measure_spikes, queue, relief
@@ -71,7 +71,7 @@ def test_a_stroke_leaves_its_nominal_surface_and_presses_no_harder_than_a_finger
     formed = finish(queued)
     # A pin has arrived within half a micrometer of its height; what its valve still lets through until it
     # is shut is as much again.
-    np.testing.assert_allclose(heights(formed), nominal, rtol=0, atol=1e-6)
+    assert_near(heights(formed), nominal, 1e-6)
     sign = 1.0 if brush is Brush.RAISE else -1.0
     assert (sign * relief(formed)).max() == pytest.approx(amount, abs=0.2)
     assert formed.trace.force.max() < 2.0
@@ -89,7 +89,7 @@ def test_a_stroke_leaves_its_nominal_surface_and_presses_no_harder_than_a_finger
     ],
 )
 def test_a_ridge_is_as_high_as_noise_and_stroke_let_it_be(tables, height, off):
-    np.testing.assert_allclose(along(form(begin(**tables), ALONG, Brush.RAISE)), height, rtol=0, atol=off)
+    assert_near(along(form(begin(**tables), ALONG, Brush.RAISE)), height, off)
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -102,8 +102,8 @@ def test_every_method_goes_with_every_size_of_bed(method):
 def test_ridges_drawn_in_quick_succession_both_form_and_along_the_edge_too():
     session = queue(begin(), [(-9.0, -12.0), (9.0, -12.0)], Brush.RAISE)
     done = finish(queue(session, [(-36.0, 36.0), (36.0, 36.0)], Brush.RAISE))
-    np.testing.assert_allclose(relief(done)[8, 9:16], 15.0, rtol=0, atol=0.01)
-    np.testing.assert_allclose(relief(done)[-1], 15.0, rtol=0, atol=0.01)
+    assert_near(relief(done)[8, 9:16], 15.0, 0.01)
+    assert_near(relief(done)[-1], 15.0, 0.01)
     assert len(done.gestures) == 2
 
 
@@ -113,7 +113,7 @@ def test_level_lowers_a_hill_raises_a_hollow_and_fills_a_valley_that_it_crosses_
     before = along(session)
     assert (before.max(), before.min()) == (pytest.approx(6.0, abs=0.2), pytest.approx(-8.0, abs=0.2))
     level = form(session, [(-34.0, 0.0), (34.0, 0.0)], Brush.LEVEL)
-    np.testing.assert_allclose(along(level), 0.0, rtol=0, atol=0.01)
+    assert_near(along(level), 0.0, 0.01)
     # Under a slanting view the pointer moves aside on the floor of a valley, and back when it comes out.
     way = [(0.0, -24.0), (0.0, -15.0), (-8.0, -5.0), (-8.0, 6.0), (0.0, 14.0), (0.0, 24.0)]
     valley = form(begin_bed("paper", 25, 25), ALONG, Brush.LOWER, 4.0)

@@ -21,6 +21,7 @@ from digiclay.core.surface.formed import NO_PIN, PIECE, Formed, make_formed
 
 from benchmarks.__main__ import main
 from benchmarks.bed_size import export
+from tests.assemble import assert_near
 from tests.timeouts import TIMEOUT
 
 BED = Layout(rows=7, columns=5, arrangement="hexagonal")
@@ -58,7 +59,7 @@ def test_meshio_reads_back_the_triangles_in_millimeters(solid, tmp_path, kind):
     assert list(tmp_path.iterdir()) == [path_for(tmp_path, kind)]
     # Corners of every triangle: independent of how a reader numbers the vertices.
     found, known = read.points[read.cells_dict["triangle"]], solid[0].vertices[solid[0].faces] * 1e3
-    np.testing.assert_allclose(found, known, rtol=0.0, atol=WRITTEN)
+    assert_near(found, known, WRITTEN)
 
 
 @pytest.mark.parametrize("unit", ["mm", "m"])
@@ -70,8 +71,8 @@ def test_a_glb_is_in_meters_and_y_up_whatever_the_unit(solid, tmp_path, unit):
     found = description["accessors"][position]
     low, high = solid[0].vertices.min(axis=0), solid[0].vertices.max(axis=0)
     # x stays, up is y, and the bed's y runs toward the viewer's back: minus z. float32 keeps 4e-9 m of 50 mm.
-    np.testing.assert_allclose(found["min"], [low[0], low[2], -high[1]], rtol=0.0, atol=4e-9)
-    np.testing.assert_allclose(found["max"], [high[0], high[2], -low[1]], rtol=0.0, atol=4e-9)
+    assert_near(found["min"], [low[0], low[2], -high[1]], 4e-9)
+    assert_near(found["max"], [high[0], high[2], -low[1]], 4e-9)
 
 
 def test_a_glb_has_a_named_node_for_each_feature(formed, tmp_path):
@@ -105,7 +106,7 @@ def test_a_3mf_names_its_unit_has_an_object_for_each_feature_and_says_what_is_an
             assert found.GetName() == body.name
             assert found.IsManifoldAndOriented()
             points = np.array([list(one.Coordinates) for one in found.GetVertices()])
-            np.testing.assert_allclose(points, body.vertices * factor, rtol=0.0, atol=WRITTEN * factor / 1e3)
+            assert_near(points, body.vertices * factor, WRITTEN * factor / 1e3)
             faces = np.array([list(one.Indices) for one in found.GetTriangleIndices()])
             np.testing.assert_array_equal(faces, body.faces)
 
@@ -270,7 +271,7 @@ def test_all_of_a_pins_top_has_its_values_and_a_skin_of_too_many_points_is_refus
     assert over.sum() > 4 * 168
     # Each height is that of one pin, and its force is a hundredth of the steps it is up.
     up = np.rint((body.vertices[over, 2] - 0.04) / 1e-4)
-    np.testing.assert_allclose(body.values["force"][over], up / 100.0, rtol=0.0, atol=1e-12)
+    assert_near(body.values["force"][over], up / 100.0, 1e-12)
     place = make_grid(Layout(rows=400, columns=400)).positions
     bed = Formed.of(place, np.full(160_000, 0.04), 0.04, 0.0, 0)
     with pytest.raises(ParameterError, match=r"^Model\.resolution must be low enough for 50 million points"):

@@ -34,7 +34,7 @@ from digiclay.sessions.sculpting import change_stroke, queue_stroke
 from digiclay.strokes.stroke import draw
 
 from tests import hand
-from tests.assemble import path, table
+from tests.assemble import assert_near, path, table
 
 PERIOD = 5e-3
 SCENE = resolve({"layout": {"rows": 11, "columns": 11}})
@@ -135,7 +135,7 @@ def test_the_way_goes_from_where_the_finger_was_to_where_it_is_and_stays_where_o
     path = interpolate_path(start, end, 7)
     assert path.shape == (8, 1, 7)
     assert np.array_equal(path[0], start)
-    np.testing.assert_allclose(path[-1], end, rtol=0, atol=1e-15)
+    assert_near(path[-1], end, 1e-15)
     np.testing.assert_allclose(np.diff(path[..., :3], axis=0), [(end - start)[:, :3] / 7] * 7, atol=1e-16)
     places = ([0.0, 0.0, -50.0], [1e9, -1e9, 1e9], [0.01] * 3)
     found = [clamp_pose(np.array([*place, *LEVEL]), 0.1)[:3].tolist() for place in places]

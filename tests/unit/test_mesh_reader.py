@@ -15,6 +15,8 @@ from digiclay.core.mesh_io import mesh_limits, mesh_writer
 from digiclay.core.mesh_io.mesh_reader import read
 from digiclay.core.surface.formed import Body
 
+from tests.assemble import assert_near
+
 KINDS = ("gltf", "stl", "stl_ascii", "obj", "ply", "ply_ascii", "off", "glb", "3mf")
 PROMISE = bytes(80) + struct.pack("<I", 4_000_000)
 BINARY = "ply\nformat binary_little_endian 1.0\nelement vertex 9000000000\n"
@@ -203,7 +205,7 @@ def test_nodes_are_turned_shifted_and_stretched_as_trimesh_has_them(tmp_path):
     nodes = [{"mesh": 0, "children": [1], **parts}, {"mesh": 0, "matrix": inner.T.ravel().tolist()}]
     path = gltf(tmp_path, lambda tree: tree.update(nodes=nodes))
     back, judge = read(path), trimesh.load_mesh(path, process=False)
-    np.testing.assert_allclose(np.sort(back.vertices, 0), np.sort(judge.vertices, 0), rtol=0.0, atol=1e-6)
+    assert_near(np.sort(back.vertices, 0), np.sort(judge.vertices, 0), 1e-6)
     # The mirrored ones turned the right way out: once stretched to 6 times, once to 3 times that.
     volume = trimesh.Trimesh(back.vertices, back.faces, process=False).volume
     assert volume == pytest.approx(24 * 5 * 7 * 11 / 6, rel=1e-6)
