@@ -58,6 +58,11 @@ def path(*waypoints, interpolation="smooth"):
     return make_level(table[:, 0], table[:, 1:] * 1e-3, interpolation)
 
 
+def over_middle(*points):
+    """Return waypoints, as a scene file has them, of a finger over the middle: time in s, height in m."""
+    return [{"time": time, "position": [0, 0, height]} for time, height in points]
+
+
 #: A finger nobody meets.
 AWAY = path((0.0, 0.0, 0.0, 500.0))
 

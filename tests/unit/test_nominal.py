@@ -39,6 +39,11 @@ def stroke(path, brush=Brush.RAISE, amount=4e-3, **more):
     return lay_path(start(1, *path[0], amount, brush=brush, **more), path)
 
 
+def form(stroke, bed=FLAT):
+    """Return the heights that a stroke leaves of a bed, (n,), m."""
+    return find_nominal(stroke, DEVICE, bed).height
+
+
 def measure_distance(path):
     """Return the distances of all pins from a path, (n,), m, by its points some 20 µm apart."""
     steps = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path, axis=0).T))])
@@ -53,7 +58,7 @@ def measure_distance(path):
 @pytest.mark.parametrize("brush", [Brush.RAISE, Brush.LOWER])
 @pytest.mark.parametrize("name", PATHS)
 def test_the_height_follows_from_the_distance_to_the_path_alone(name, brush):
-    found = find_nominal(stroke(PATHS[name], brush), DEVICE, FLAT).height - REST
+    found = form(stroke(PATHS[name], brush)) - REST
     distance = measure_distance(PATHS[name])
     section = np.where(distance <= 7.5e-3, np.clip((7.5e-3 - distance) / 4.5e-3, 0.0, 1.0), 0.0)
     sign = 1.0 if brush is Brush.RAISE else -1.0
@@ -75,7 +80,7 @@ def test_where_no_blister_is_the_fingertip_leaves_its_underside(name):
 @pytest.mark.parametrize("accumulate, height", [(False, 4e-3), (True, 8e-3)])
 def test_a_crossing_counts_once_or_twice_where_it_accumulates(accumulate, height):
     eight = PATHS["a figure eight"]
-    found = find_nominal(stroke(eight, accumulate=accumulate), DEVICE, FLAT).height.reshape(60, 60) - REST
+    found = form(stroke(eight, accumulate=accumulate)).reshape(60, 60) - REST
     # At the crossing; elsewhere it is as high as ever.
     assert found[29:31, 29:31].max() == pytest.approx(height, abs=0.8e-3)
     assert found[:, 38:].max() == pytest.approx(4e-3, abs=1e-9)
@@ -86,9 +91,7 @@ def test_a_crossing_counts_once_or_twice_where_it_accumulates(accumulate, height
 def test_mirror_images_are_alike_and_meet_without_a_seam(symmetry, brush):
     hill = FLAT + 2e-3 * np.cos(90.0 * BED.x) * np.cos(60.0 * BED.y)
     path = np.array([8e-3, 5e-3]) + WAVE
-    found = find_nominal(stroke(path, brush, images=make_images(symmetry)), DEVICE, hill).height.reshape(
-        60, 60
-    )
+    found = form(stroke(path, brush, images=make_images(symmetry)), hill).reshape(60, 60)
     for axis in (0, 1):
         if "YX"[axis] in symmetry:
             assert_near(found, np.flip(found, axis), 1e-12)
@@ -98,12 +101,10 @@ def test_mirror_images_are_alike_and_meet_without_a_seam(symmetry, brush):
 @pytest.mark.parametrize("count", [3, 4, 24])
 def test_images_about_a_center_are_alike_at_every_turn(count):
     images = make_images("RADIAL", count, (2e-3, 1e-3))
-    found = find_nominal(stroke(LINE * 0.4 + [9e-3, 0.0], images=images), DEVICE, FLAT).height
-    single = [
-        find_nominal(stroke(np.array([image.place(*at) for at in LINE * 0.4 + [9e-3, 0.0]])), DEVICE, FLAT)
-        for image in images
-    ]
-    assert_near(found, np.max([one.height for one in single], axis=0), 1e-12)
+    path = LINE * 0.4 + [9e-3, 0.0]
+    found = form(stroke(path, images=images))
+    places = [np.array([image.place(*at) for at in path]) for image in images]
+    assert_near(found, np.max([form(stroke(place)) for place in places], axis=0), 1e-12)
 
 
 @pytest.mark.parametrize("accumulate", [False, True])
@@ -113,7 +114,7 @@ def test_a_surface_that_is_extended_is_that_of_the_whole_path(accumulate):
     for count in (1, 2, 50, 51, len(whole.samples)):
         shown = replace(whole, samples=whole.samples[:count])
         part = find_nominal(shown, DEVICE, FLAT) if part is None else extend(part, shown, DEVICE)
-    assert_array_equal(part.height, find_nominal(whole, DEVICE, FLAT).height)
+    assert_array_equal(part.height, form(whole))
 
 
 CLIFF = FLAT + np.where(BED.x > 0.0, 5e-3, 0.0)
@@ -129,7 +130,7 @@ CLIFF = FLAT + np.where(BED.x > 0.0, 5e-3, 0.0)
 )
 def test_pins_come_to_the_height_of_the_brush(brush, amount, share, lowest, highest):
     line = np.array([[-25e-3, 0.0], [25e-3, 0.0]])
-    found = find_nominal(stroke(line, brush, amount, share=share), DEVICE, CLIFF).height
+    found = form(stroke(line, brush, amount, share=share), CLIFF)
     below = found[(np.abs(BED.y) < 2.9e-3) & (np.abs(np.abs(BED.x) - 15e-3) < 5e-3)]
     assert (below.min(), below.max()) == (
         pytest.approx(lowest, abs=20e-3 * (brush is Brush.RAISE) + 1e-9),
@@ -138,11 +139,11 @@ def test_pins_come_to_the_height_of_the_brush(brush, amount, share, lowest, high
 
 
 def test_no_pin_is_pressed_below_the_floor_and_a_deepened_stroke_is_deeper_from_there_on():
-    low = find_nominal(stroke(LINE, Brush.LOWER, 30e-3), DEVICE, FLAT - 30e-3).height
+    low = form(stroke(LINE, Brush.LOWER, 30e-3), FLAT - 30e-3)
     assert low.min() == 0.0
     deeper = deepen(start(1, -20e-3, 0.0, 2e-3), 3e-3)
     deeper = replace(deeper, samples=(*deeper.samples, replace(deeper.samples[-1], x=20e-3)))
-    found = find_nominal(deeper, DEVICE, FLAT).height
+    found = form(deeper)
     assert found.min() == pytest.approx(REST - 5e-3, abs=1e-12)
 
 
@@ -158,6 +159,6 @@ def test_a_ghost_that_is_drawn_on_is_that_of_the_whole_path_and_others_stay():
     assert find_ghosts((first, last), DEVICE, FLAT, kept)[-1].nominal is kept[-1].nominal
     # Another path of the same number, and other pins below it, are looked at anew.
     other = find_ghosts((stroke(WAVE),), DEVICE, FLAT, kept)[0].nominal
-    assert np.array_equal(other.height, find_nominal(stroke(WAVE), DEVICE, FLAT).height)
+    assert np.array_equal(other.height, form(stroke(WAVE)))
     raised = find_ghosts((first,), DEVICE, FLAT + 1e-3, kept)[0].nominal
     assert np.array_equal(raised.before, FLAT + 1e-3)

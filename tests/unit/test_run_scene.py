@@ -23,9 +23,9 @@ from digiclay.core.session.memory_limit import (
 )
 from digiclay.core.session.run_scene import Result, run
 
-from tests.assemble import table
+from tests.assemble import over_middle, table
 
-WAY = [{"time": t, "position": [0, 0, z]} for t, z in ((0, 0.041), (0.1, 0.038), (0.2, 0.041))]
+WAY = over_middle((0, 0.041), (0.1, 0.038), (0.2, 0.041))
 SMALL = {"radius": 6e-3, "edge_radius": 9e-3, "flat_radius": 3e-3}
 TABLE = {
     "layout": {"rows": 3, "columns": 4}, "blister": SMALL, "trajectory": {"waypoints": WAY},
@@ -111,8 +111,7 @@ def test_a_run_whose_errors_cannot_be_estimated_says_why(changed, why):
 
 @pytest.mark.parametrize("speed, said", [(24e-3, ", lost once, 0.99 s"), (26e-3, ""), (5e-3, "")])
 def test_the_summary_tells_that_a_lift_lost_the_finger_unless_no_pin_rises_so_fast(speed, said):
-    points = [(0.0, 0.041), (0.2, 0.037), (0.5, 0.037), (1.5, 0.037 + speed)]
-    way = [{"time": time, "position": [0, 0, z]} for time, z in points]
+    way = over_middle((0.0, 0.041), (0.2, 0.037), (0.5, 0.037), (1.5, 0.037 + speed))
     path = {"waypoints": way, "interpolation": "linear"}
     done = run(scene(layout={"rows": 13, "columns": 13}, blister={}, trajectory=path))
     assert said in done.summary()
@@ -302,7 +301,7 @@ def measured_and_estimated(**changes):
     """Return bytes a cell at a session's peak: those numpy asks for, and those the estimate says."""
     taken, told = [], []
     for side in SIDES:
-        press = [{"time": 0.0, "position": [0, 0, 0.041]}, {"time": 0.05, "position": [0, 0, 0.038]}]
+        press = over_middle((0.0, 0.041), (0.05, 0.038))
         bed = {"layout": {"rows": side, "columns": side}, "trajectory": {"waypoints": press}}
         scene = resolve({**bed, "simulation": {"duration": 0.05}, **changes})
         system = assemble(scene)

@@ -9,7 +9,18 @@ from digiclay.core.base.errors import DigiclayError
 from digiclay.core.scene.toml_table import resolve
 from digiclay.core.session import snapshot
 from digiclay.core.session.live_session import simulate_path
-from digiclay.sessions import sculpting
+from digiclay.sessions.sculpting import (
+    GESTURES,
+    advance,
+    begin_session,
+    change_scene,
+    match_poses,
+    reset,
+    restore,
+    restore_gesture,
+    rewind,
+    set_recording,
+)
 
 from tests.assemble import assert_near
 from tests.hand import SCENE, SIZES, Hand, heights, pose, started
@@ -26,10 +37,10 @@ def test_a_paused_session_goes_on_without_catching_up_and_gestures_kept_do_not_g
     session = hand.move(replace(session, paused=False), [(0.0, 39.0)] * 2)
     assert session.state.period <= before + 7
     hand, session = Hand(), started()
-    assert sculpting.rewind(session) is session  # there is none yet
-    for _ in range(sculpting.GESTURES + 3):
+    assert rewind(session) is session  # there is none yet
+    for _ in range(GESTURES + 3):
         session = hand.move(session, [(0.0, 46.0)] * 2 + [(0.0, 39.5)] * 4)
-    assert len(session.gestures) == sculpting.GESTURES
+    assert len(session.gestures) == GESTURES
 
 
 @pytest.mark.parametrize("off", [0.0, 1e-6])
@@ -39,7 +50,7 @@ def test_what_was_taken_back_within_a_press_counts_again_when_the_finger_moves(o
     first = heights(session)
     session = hand.move(session, [(x, 38.0) for x in np.linspace(0, 5, 10)])
     assert len(session.gestures) == 2
-    back = sculpting.rewind(session)
+    back = rewind(session)
     # Put there by 32 bits, the finger is read a little beside; and stands on the pins as it stood.
     back = hand.move(back, [(1e3 * off, 38.0)] * 3)
     assert len(back.gestures) == 1
@@ -47,7 +58,7 @@ def test_what_was_taken_back_within_a_press_counts_again_when_the_finger_moves(o
     assert_near(heights(back), first, 5e-5)
     again = hand.move(back, [(x, 38.0) for x in np.linspace(1, 5, 10)])
     assert len(again.gestures) == 2
-    back = sculpting.rewind(sculpting.rewind(again))
+    back = rewind(rewind(again))
     assert (heights(back) == 40e-3).all()
 
 
@@ -55,26 +66,26 @@ def test_undo_brings_back_the_state_it_finds_bit_for_bit():
     hand = Hand()
     session = hand.press(started())
     kept = session.snapshot
-    back = sculpting.restore(hand.press(session, 6.0), kept, pose())
+    back = restore(hand.press(session, 6.0), kept, pose())
     assert snapshot.dump(back.system, back.state) == kept
     assert len(back.gestures) == 1
-    other, said = sculpting.begin_session(8, "Copy", SCENE, pose(), kept)
+    other, said = begin_session(8, "Copy", SCENE, pose(), kept)
     assert (said, snapshot.dump(other.system, other.state)) == ("", kept)
     # Before the first start it finds a bed at rest.
-    assert (heights(sculpting.restore(session, None, pose())) == 40e-3).all()
+    assert (heights(restore(session, None, pose())) == 40e-3).all()
 
 
 def test_changed_parts_keep_the_heights_and_say_so_and_a_changed_gain_takes_effect():
     session = Hand().press(started())
     other = resolve({"layout": SIZES, "control": {"method": "plastic"}})
-    later, said = sculpting.begin_session(8, "Copy", other, pose(), session.snapshot)
+    later, said = begin_session(8, "Copy", other, pose(), session.snapshot)
     assert np.array_equal(heights(later), heights(session))
     assert "heights were taken up" in said
     hand = Hand()
     session = hand.move(started(), [(0.0, 38.0)] * 10)
-    assert sculpting.change_scene(session, resolve({"layout": SIZES}))[0] is session
+    assert change_scene(session, resolve({"layout": SIZES}))[0] is session
     other = resolve({"layout": SIZES, "control": {"force_setpoint": 0.8}})
-    later, said = sculpting.change_scene(session, other)
+    later, said = change_scene(session, other)
     assert (said, later.snapshot) == ("", session.snapshot)
     assert hand.move(later, [(0.0, 38.0)] * 30).trace.set_point[-1] == 0.8
 
@@ -101,12 +112,12 @@ def test_a_session_takes_no_more_memory_the_longer_it_lasts():
 
 def test_a_step_too_long_to_halve_has_no_estimate_and_parts_that_do_not_go_together_are_refused():
     table = {"simulation": {"control_period": "1 s"}, "layout": SIZES, "control": "absent"}
-    session, _ = sculpting.begin_session(7, "Bed", resolve(table), pose())
-    session = sculpting.advance(session, pose(), 0.0, 9)
-    assert sculpting.advance(session, pose(z=39.0), 2.0, 9).errors is None
+    session, _ = begin_session(7, "Bed", resolve(table), pose())
+    session = advance(session, pose(), 0.0, 9)
+    assert advance(session, pose(z=39.0), 2.0, 9).errors is None
     table = {"layout": SIZES, "control": {"method": "shape_display", "amplitude": "1 m"}}
     with pytest.raises(DigiclayError, match="amplitude"):
-        sculpting.change_scene(started(), resolve(table))
+        change_scene(started(), resolve(table))
 
 
 class Bed:
@@ -125,32 +136,30 @@ def plays(session):
 
 def test_a_recording_gives_the_session_again_bit_for_bit_and_undo_shortens_it():
     hand = Hand()
-    session = sculpting.set_recording(hand.press(started(), -6.0), True)
+    session = set_recording(hand.press(started(), -6.0), True)
     session = hand.press(session)
     kept, moment, at = session.snapshot, session.tick, session.pose
     session = hand.press(session, 6.0)
     assert plays(session)
-    session = hand.press(sculpting.restore(session, kept, at, moment), 3.0)
+    session = hand.press(restore(session, kept, at, moment), 3.0)
     assert plays(session)
-    session = hand.press(
-        sculpting.rewind(hand.press(session)), 6.0
-    )  # a gesture taken back is gone from it too
+    session = hand.press(rewind(hand.press(session)), 6.0)  # a gesture taken back is gone from it too
     assert plays(session)
 
 
 def test_redo_to_what_a_recording_did_not_lead_to_ends_it():
     hand = Hand()
-    session = sculpting.set_recording(started(), True)
+    session = set_recording(started(), True)
     early = hand.press(session)
     here = early.snapshot, early.pose, early.tick
     late = hand.press(early, 6.0)
     there = late.snapshot, late.pose, late.tick
-    session = hand.press(sculpting.restore(late, *here), -6.0)
-    assert sculpting.restore(session, *there).recording is None
+    session = hand.press(restore(late, *here), -6.0)
+    assert restore(session, *there).recording is None
 
 
 def test_a_long_recording_copies_itself_seldom():
-    session = sculpting.set_recording(started(), True)
+    session = set_recording(started(), True)
     keep, arrays = session.recording, set()
     for moment in range(5000):
         keep = keep.extend(np.zeros((7, 7)), moment)
@@ -162,20 +171,20 @@ def test_a_long_recording_copies_itself_seldom():
 def test_a_recording_ends_with_what_began_before_it_a_gesture_or_a_reset_that_is_rewound():
     hand = Hand()
     begun = hand.press(started())
-    session = hand.press(sculpting.set_recording(begun, True), 6.0)
-    assert sculpting.restore_gesture(session, *begun.gestures).recording is None
+    session = hand.press(set_recording(begun, True), 6.0)
+    assert restore_gesture(session, *begun.gestures).recording is None
     # Periods are counted anew from a reset on: those before it are not the recording's.
-    session = sculpting.set_recording(sculpting.reset(begun), True)
+    session = set_recording(reset(begun), True)
     session = hand.press(hand.press(session), 6.0)
     for _ in range(3):
-        session = sculpting.rewind(session)
+        session = rewind(session)
     assert session.state.period > 0
     assert session.recording is None
 
 
 def test_fingertips_keep_their_poses_by_number_and_far_below_the_floor_do_no_harm():
     had, others = np.arange(14.0).reshape(2, 7), -np.ones((3, 7))
-    matched = sculpting.match_poses(had, (2, 5), others, (1, 5, 2))
+    matched = match_poses(had, (2, 5), others, (1, 5, 2))
     np.testing.assert_array_equal(matched, [others[0], had[1], had[0]])
     hand, session = Hand(), started()
     session = hand.move(session, [(0.0, -1e9), (1e12, -1e9), (0.0, 1e9), (0.0, 46.0)])

@@ -15,7 +15,7 @@ from digiclay.core.scene.toml_table import resolve
 from digiclay.core.session.run_scene import run
 from numpy.testing import assert_array_equal
 
-from tests.assemble import record, sample, scripted
+from tests.assemble import over_middle, record, sample, scripted
 
 CELLS = 500
 PERIODS = 400
@@ -169,8 +169,8 @@ def test_seed_and_coarse_sensors_make_the_session_also_one_taken_up_again_in_the
 # The force observer: what it makes of a pin's motion, beside the force that is there
 
 PERIOD = 5e-3
-PRESS = [{"time": 0.0, "position": [0, 0, 0.0395]}, {"time": 0.6, "position": [0, 0, 0.036]}]
-AWAY = [{"time": 0.0, "position": [0, 0, 0.09]}, {"time": 0.6, "position": [0, 0, 0.09]}]
+PRESS = over_middle((0.0, 0.0395), (0.6, 0.036))
+AWAY = over_middle((0.0, 0.09), (0.6, 0.09))
 
 
 def scene(waypoints=PRESS, **sections):
@@ -237,7 +237,7 @@ LINES = [
 ]
 #: A valve in its turbulent branch, and a finger that follows a falling pin.
 NARROW = {"valve": {"orifice_diameter": 0.4e-3, "stroke": 5e-6}, "fluid": {"viscosity": 6.5e-7}}
-FALL = [{"time": 0.0, "position": [0, 0, 0.040]}, {"time": 0.4, "position": [0, 0, 0.010]}]
+FALL = over_middle((0.0, 0.040), (0.4, 0.010))
 PRESSED = slice(30, 68)  # the finger has caught up with the pin, which falls freely at first
 
 
@@ -285,8 +285,12 @@ def test_the_last_estimate_is_held_while_the_valve_is_shut_at_a_stop_or_of_a_bed
     assert np.unique(read[64:]).size == 1
     # At an end stop too: an open valve and no motion would otherwise mean that the finger holds the high
     # reservoir, 157 mN. It rises the millimeter in 15 periods.
-    away = [{**point, "position": [0, 0, 0.15]} for point in AWAY]
-    assert watched(scene(away, actuator={"rest_height": 99e-3}), lambda period: 0.8)[1].max() < 1e-3
+    assert (
+        watched(
+            scene(over_middle((0.0, 0.15), (0.6, 0.15)), actuator={"rest_height": 99e-3}), lambda period: 0.8
+        )[1].max()
+        < 1e-3
+    )
     # Its valves are shut, and stay shut: there is nothing to tell the force from.
     history = run(resolve({"layout": {"rows": 11, "columns": 11}, "sensors": {"observer": "valve"}})).history
     assert history["total_force"].max() > 1.0

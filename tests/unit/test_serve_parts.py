@@ -38,7 +38,7 @@ from digiclay_serve.served_session import (
     reset,
 )
 from digiclay_serve.tracked_fingers import PARKED
-from tests.assemble import sample
+from tests.assemble import over_middle, sample
 from tests.scene_files import left
 from tests.timeouts import wait_until
 
@@ -47,7 +47,7 @@ SMALL = {
     "layout": {"rows": 7, "columns": 7},
     "blister": {"radius": 5e-3, "edge_radius": 8e-3, "flat_radius": 2e-3},
 }
-WAIT = {"waypoints": [{"time": time, "position": [0, 0, 0.05]} for time in (0.0, 1.0)]}
+WAIT = {"waypoints": over_middle((0.0, 0.05), (1.0, 0.05))}
 STILL = resolve({**SMALL, "trajectory": WAIT})
 
 

@@ -14,8 +14,7 @@ from digiclay.core.engine.simulation import begin, periods
 from digiclay.core.engine.state import State
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.toml_table import resolve
-from digiclay.core.session import snapshot
-from digiclay.core.session.snapshot import START, flatten, rebuild
+from digiclay.core.session.snapshot import START, dump, flatten, load, rebuild, transfer_heights
 from numpy.typing import NDArray
 
 from tests.assemble import path
@@ -62,11 +61,11 @@ SENSORS = {"sensors": {"delay": 3, "observer": "valve", "height_noise": "1 um"}}
 def test_a_session_goes_on_from_a_kept_state_bit_for_bit(method, tables):
     system = system_of(method, **tables)
     half = run(system, begin(system), 70)
-    data = snapshot.dump(system, half)
+    data = dump(system, half)
     before = bytes(data)
     # 10 rows of float64, the time of aging and a mode for each of 99 cells, and a header.
     assert len(data) < 2 * 99 * (8 * system.rows.count + 9) + 4000
-    taken_up = snapshot.load(system, data)
+    taken_up = load(system, data)
     assert same(taken_up, half)
     assert same(run(system, taken_up, 90), run(system, half, 90))
     assert data == before  # the state that was taken up has its own arrays
@@ -75,7 +74,7 @@ def test_a_session_goes_on_from_a_kept_state_bit_for_bit(method, tables):
 @cache
 def kept():
     system = system_of()
-    return system, snapshot.dump(system, run(system, begin(system), 70))
+    return system, dump(system, run(system, begin(system), 70))
 
 
 @pytest.mark.parametrize(
@@ -91,7 +90,7 @@ def kept():
 def test_a_state_of_another_bed_is_refused(tables, said):
     _, data = kept()
     with pytest.raises(StateError, match=said):
-        snapshot.load(bed(**tables), data)
+        load(bed(**tables), data)
 
 
 def header_replaced(data, old, new):
@@ -125,7 +124,7 @@ LONG = b"0" * 400
 def test_a_damaged_header_is_refused(old, new):
     system, data = kept()
     with pytest.raises(StateError):
-        snapshot.load(system, header_replaced(data, old, new))
+        load(system, header_replaced(data, old, new))
 
 
 @cache
@@ -135,16 +134,16 @@ def kept_of_twelve():
     paths = [PRESS, *[path((0.0, 0, 0, 90), (0.8, 0, 0, 90))] * 11]
     *_, state = periods(system, paths, begin(system), 70)
     state.rows[-1, 3] = -0.0
-    return system, state, snapshot.dump(system, state)
+    return system, state, dump(system, state)
 
 
 def test_fingertips_that_touch_nothing_take_next_to_no_room_and_nothing_is_lost():
     system, state, data = kept_of_twelve()
     assert len(data) < 0.25 * 2 * 99 * 8 * system.rows.count  # of what all their zeros would take
-    taken_up = snapshot.load(system, data)
+    taken_up = load(system, data)
     for one, other in ((taken_up.rows, state.rows), (taken_up.active.block, state.active.block)):
         assert one.tobytes() == other.tobytes()
-    assert snapshot.dump(system, taken_up) == data
+    assert dump(system, taken_up) == data
 
 
 @pytest.mark.parametrize(
@@ -153,7 +152,7 @@ def test_fingertips_that_touch_nothing_take_next_to_no_room_and_nothing_is_lost(
 def test_another_number_of_what_is_not_zero_is_refused(wrong):
     system, _, data = kept_of_twelve()
     with pytest.raises(StateError):
-        snapshot.load(system, header_replaced(data, wrong[:8] + b"[", wrong))
+        load(system, header_replaced(data, wrong[:8] + b"[", wrong))
 
 
 IMPOSSIBLE = [("rows", (0, 3), np.nan), ("rows", (0, 3), np.inf), ("rows", (0, 3), -np.inf)]
@@ -169,48 +168,48 @@ IMPOSSIBLE += [
 @pytest.mark.parametrize("name, index, value", IMPOSSIBLE)
 def test_numbers_no_state_or_device_can_have_are_refused(name, index, value):
     system, data = kept()
-    state = snapshot.load(system, data)
+    state = load(system, data)
     if isinstance(index, tuple) and index[1] == 1:
         rows = (0, system.cell.lag_rows.start, system.rows.command, system.rows.force)
         index = rows[index[0]], 1
     array = getattr(state, name) if name in state._fields else getattr(state.active, name)
     array[index] = value
     with pytest.raises(StateError, match="no state has"):
-        snapshot.load(system, snapshot.dump(system, state))
+        load(system, dump(system, state))
 
 
 def test_pins_at_their_ends_are_taken_up_and_a_memory_of_no_number_of_the_world_is_refused():
     system, data = kept()
-    state = snapshot.load(system, data)
+    state = load(system, data)
     state.rows[0, :2] = 0.0, system.cell.actuator.stroke
     state.rows[system.cell.lag_rows, :2] = state.rows[system.rows.commands, :2] = -1.0, 1.0
-    assert same(snapshot.load(system, snapshot.dump(system, state)), state)
+    assert same(load(system, dump(system, state)), state)
     # A field that is added to a state must be added to what is kept, and to `packed_parts`.
     assert set(State._fields) == {"period", "rows", "modes", "aged", "peak", "active", "memory"}
     system = system_of("hybrid")
     state = run(system, begin(system), 70)
     state.active.block[system.rows.controlled, 1] = -1e91  # pulp of Method III: the logarithm is NaN
     with pytest.raises(StateError, match="no state has"):
-        snapshot.load(system, snapshot.dump(system, state))
+        load(system, dump(system, state))
 
 
 def test_heights_are_carried_over_to_other_parts_within_the_stroke():
     system, data = kept()
-    before = snapshot.load(system, data).row(0)
+    before = load(system, data).row(0)
     for tables in (
         {"control": {"method": "plastic"}}, {"relaxation": "absent"},
         {"simulation": {"control_period": "10 ms"}}
     ):  # fmt: skip
         other = bed(**tables)
-        state = snapshot.transfer_heights(other, data)
+        state = transfer_heights(other, data)
         assert np.array_equal(state.row(0), before)
         # Nothing calls the pins back: without a finger they stay where they are.
         *_, later = periods(other, [path((0.0, 0, 0, 500))], state, 40)
         assert np.array_equal(later.row(0), before)
     low = bed(actuator={"stroke": "38 mm", "rest_height": "20 mm"})
-    assert snapshot.transfer_heights(low, data).row(0).max() == 38e-3
+    assert transfer_heights(low, data).row(0).max() == 38e-3
     with pytest.raises(StateError, match="number of cells"):
-        snapshot.transfer_heights(assemble(resolve({})), data)
+        transfer_heights(assemble(resolve({})), data)
 
 
 class Color(IntEnum):

@@ -7,8 +7,34 @@ import numpy as np
 import pytest
 from digiclay.core.base.errors import ParameterError
 from digiclay.core.base.modes import Mode
-from digiclay.core.metrics import summary
 from digiclay.core.metrics.metric_table import METRICS, describe_losses
+from digiclay.core.metrics.summary import (
+    BORDER,
+    SPATIAL_RESOLUTION,
+    WINDOW,
+    compute_cell_area,
+    compute_contact_loss_share,
+    compute_deviation,
+    compute_mean,
+    compute_metrics,
+    compute_rfd,
+    compute_weights,
+    find_losses,
+    find_weber_fractions,
+    measure_amplitude,
+    measure_frequency,
+    measure_lag,
+    measure_oscillation,
+    measure_overshoot,
+    measure_ridge_errors,
+    measure_settling_time,
+    measure_surface_under,
+    measure_touchdown,
+    perceive,
+    split_fingers,
+    sum_cells,
+    take_worst,
+)
 from digiclay.core.model.control_interface import SetPoint
 from digiclay.core.model.layout import Layout, make_grid
 from numpy.testing import assert_allclose, assert_array_equal
@@ -37,7 +63,7 @@ def history(total, time=TIME):
 
 def measure(*given):
     """Return the metrics of such a history, for a force asked of all cells."""
-    return summary.compute_metrics(history(*given), WHOLE)
+    return compute_metrics(history(*given), WHOLE)
 
 
 @table(
@@ -55,7 +81,7 @@ def measure(*given):
     },
 )
 def test_the_rfd_is_the_rms_deviation_in_contact(total, wanted):
-    assert summary.compute_rfd(TIME, total, 0.4) == wanted
+    assert compute_rfd(TIME, total, 0.4) == wanted
 
 
 def test_the_rfd_weighs_rows_by_their_time_and_by_session_and_shaping():
@@ -63,15 +89,15 @@ def test_the_rfd_weighs_rows_by_their_time_and_by_session_and_shaping():
     time = np.concatenate([np.linspace(0.0, 1.0, 101), np.arange(2.0, 11.0)])
     total = np.where(time <= 1.0, 0.5, 0.4)
     # The row at 1 s stands for half a second after it as well: 1.5 s in all.
-    assert summary.compute_rfd(time, total, 0.4) == pytest.approx(0.1 * np.sqrt(1.5 / 10.0), rel=1e-9)
+    assert compute_rfd(time, total, 0.4) == pytest.approx(0.1 * np.sqrt(1.5 / 10.0), rel=1e-9)
     uneven = np.array([0.0, 0.1, 0.5, 2.0, 2.5])
-    assert summary.compute_weights(uneven).sum() == pytest.approx(2.5, rel=ROUNDING)
+    assert compute_weights(uneven).sum() == pytest.approx(2.5, rel=ROUNDING)
     # 4 s of 0 and 6 s of 0.4; the trapezium rule smears each of the two jumps over half a row of 2001.
     found = measure(np.where((TIME > 2.0) & (TIME < 6.0), 0.0, 0.4))
     assert (found["rfd"], found["rfd_session"]) == (0.0, pytest.approx(0.4 * np.sqrt(0.4), rel=1e-3))
     case = history(np.where(TIME < 5.0, 0.2, 0.4))
     case["mode"][TIME < 5.0] = Mode.SPRING  # touching down is no shaping
-    found = summary.compute_metrics(case, WHOLE)
+    found = compute_metrics(case, WHOLE)
     assert found["rfd_shaping"] == 0.0 < 0.1 < found["rfd"]
     # The deviation from the mean leaves out a constant offset.
     found = measure(0.5 + 0.1 * np.sin(2.0 * np.pi * TIME))
@@ -83,26 +109,26 @@ def test_a_force_asked_of_each_cell_is_judged_by_how_many_follow_in_that_row():
     early = TIME < 5.0
     case = history(np.where(early, 0.36, 0.16))
     case["mode"][~early, :5] = Mode.SPRING
-    found = summary.compute_metrics(case, EACH)
+    found = compute_metrics(case, EACH)
     assert found["rfd"] == found["rfd_shaping"] == pytest.approx(0.0, abs=ROUNDING)
     # The middle row, 1 of 2000 intervals, belongs to the second half.
     assert found["set_point"] == pytest.approx(0.5 * (0.36 + 0.16), abs=1e-4)
     case["total_force"] = case["total_force"] + 0.05
-    assert summary.compute_metrics(case, EACH)["rfd"] == pytest.approx(0.05, rel=1e-10)
+    assert compute_metrics(case, EACH)["rfd"] == pytest.approx(0.05, rel=1e-10)
     # Rows in which no cell follows ask for nothing.
     case = history(np.where(early, 0.2, 0.36))
     case["mode"][early] = Mode.SPRING
-    found = summary.compute_metrics(case, EACH)
+    found = compute_metrics(case, EACH)
     assert found["rfd"] == found["rfd_session"] == pytest.approx(0.0, abs=ROUNDING)
     case["mode"][:] = Mode.SPRING
-    found = summary.compute_metrics(case, EACH)
+    found = compute_metrics(case, EACH)
     names = ("set_point", "rfd", "rfd_session", "force_overshoot", "settling_time")
     assert [found[name] for name in names] == [None] * 5
 
 
 def test_without_a_set_point_there_is_none_and_no_deviation_from_it():
     case = history(np.full(2001, 0.4))
-    with_one, without = summary.compute_metrics(case, WHOLE), summary.compute_metrics(case, None)
+    with_one, without = compute_metrics(case, WHOLE), compute_metrics(case, None)
     assert {name for name in METRICS if with_one[name] is not None and without[name] is None} == {
         "set_point", "rfd", "rfd_shaping", "rfd_session", "force_overshoot", "settling_time",
         "rfd_jnd_least", "rfd_jnd_most",
@@ -113,15 +139,13 @@ def test_shaping_wants_contact_and_a_follower_and_a_loss_is_a_gap_between_two_co
     case = history(np.array([0.4, 0.4, 0.0]), np.arange(3.0))
     case["mode"][:] = Mode.REST
     case["mode"][:, 4] = Mode.FORCE_FOLLOW, Mode.SPRING, Mode.FORCE_FOLLOW
-    assert_array_equal(summary.sum_cells(case).shaping, [True, False, False])
+    assert_array_equal(sum_cells(case).shaping, [True, False, False])
     touching = ((TIME >= 2.0) & (TIME <= 4.0)) | ((TIME >= 5.0) & (TIME <= 7.0))
     # 1 s of 5; the gap is 199 rows of 5 ms, and the ends of the window 2 half rows more.
-    assert summary.compute_contact_loss_share(TIME, 0.4 * touching) == pytest.approx(0.2, abs=2e-3)
+    assert compute_contact_loss_share(TIME, 0.4 * touching) == pytest.approx(0.2, abs=2e-3)
     # A row a second: one between two others stands for 1 s, the first and the last for half of it.
     for force, share in (([1, 0, 0, 1], 2 / 3), ([0, 1, 0, 1, 1], 2 / 7), ([0, 1, 1, 0], 0.0), ([1], 0.0)):
-        assert summary.compute_contact_loss_share(range(len(force)), force) == pytest.approx(
-            share, rel=ROUNDING
-        )
+        assert compute_contact_loss_share(range(len(force)), force) == pytest.approx(share, rel=ROUNDING)
 
 
 #: 9 pins of 9 mm² raised by 3 and 1 mm and sunk by 1 mm; differences of heights lose three digits.
@@ -151,7 +175,7 @@ def test_the_summary_has_lag_extremes_volumes_and_share_of_contact():
     ],
 )
 def test_a_cell_stands_for_pitch_times_row_spacing(layout, square_millimeters):
-    assert summary.compute_cell_area(make_grid(layout).positions) == pytest.approx(
+    assert compute_cell_area(make_grid(layout).positions) == pytest.approx(
         square_millimeters * 1e-6, rel=1e-9
     )
 
@@ -169,7 +193,7 @@ def test_a_session_without_contact_has_no_rfd_lag_or_loss():
 
 def test_the_first_touch_overshoots_by_its_peak_and_settles_within_a_tenth_of_the_set_point():
     touched_twice = np.array([0.0, 0.0, 0.3, 0.5, 0.0, 0.9])
-    assert summary.measure_touchdown(np.arange(6.0), touched_twice, np.full(6, 0.4)) == (
+    assert measure_touchdown(np.arange(6.0), touched_twice, np.full(6, 0.4)) == (
         pytest.approx(0.25),
         None,
     )
@@ -181,29 +205,29 @@ def test_the_first_touch_overshoots_by_its_peak_and_settles_within_a_tenth_of_th
     # Asked of each cell, of which none follows before 2 s; a quarter too much then, falling as above.
     case = history(np.where(TIME < 1.0, 0.0, 0.36 * (1.0 + 0.25 * np.exp(-(TIME - 2.0)))))
     case["mode"][TIME < 2.0] = Mode.SPRING
-    found = summary.compute_metrics(case, EACH)
+    found = compute_metrics(case, EACH)
     assert found["force_overshoot"] == pytest.approx(0.25, rel=1e-6)
     assert found["settling_time"] == pytest.approx(1.0 + np.log(2.5), abs=0.011)
 
 
 def test_the_summary_is_json_and_has_every_key_at_extremes_as_well():
     case = history(np.full(2001, 0.4))
-    found = summary.compute_metrics(case, WHOLE)
+    found = compute_metrics(case, WHOLE)
     assert json.loads(json.dumps(found, allow_nan=False)) == found
     assert found.keys() == METRICS.keys()
     one = measure(np.array([0.5]), np.array([0.0]))
     assert (one["rfd"], one["duration"]) == (pytest.approx(0.1, rel=1e-10), 0.0)
     # A single pin has no area to form a volume over.
     single = {name: value[:, :1] if value.shape[1:] == (9,) else value for name, value in case.items()}
-    assert summary.compute_metrics({**single, "position": np.zeros((1, 2))}, WHOLE)["raised_volume"] is None
+    assert compute_metrics({**single, "position": np.zeros((1, 2))}, WHOLE)["raised_volume"] is None
     # Forces that give a lag beyond all numbers give none and no warning.
     far = {**history(np.full(2001, 1e-300)), "force": case["force"], "position": case["position"] + 1.0}
-    assert summary.compute_metrics(far, WHOLE)["lag_max"] is None
+    assert compute_metrics(far, WHOLE)["lag_max"] is None
     case["height"][-1, 0] = np.nan
-    assert summary.compute_metrics(case, WHOLE)["height_range"] is None
+    assert compute_metrics(case, WHOLE)["height_range"] is None
     nothing = {name: value if name == "position" else value[:0] for name, value in case.items()}
     with pytest.raises(ParameterError, match=r"^History\.time must have at least one row \(got none\)\.$"):
-        summary.compute_metrics(nothing, WHOLE)
+        compute_metrics(nothing, WHOLE)
 
 
 FINE = np.linspace(0.0, 10.0, 10001)
@@ -225,7 +249,7 @@ OVERSHOOT = pytest.approx(np.exp(-np.pi * 0.5 / DAMPED), abs=1e-6)
     },
 )
 def test_the_overshoot_is_known(values, target, wanted):
-    assert summary.measure_overshoot(values, target) == wanted
+    assert measure_overshoot(values, target) == wanted
 
 
 @table(
@@ -245,20 +269,18 @@ def test_the_overshoot_is_known(values, target, wanted):
     },
 )
 def test_the_settling_time_is_known(time, values, target, band, wanted):
-    assert summary.measure_settling_time(time, values, target, band) == wanted
+    assert measure_settling_time(time, values, target, band) == wanted
 
 
 def test_a_sine_has_its_amplitude_and_frequency_and_mean_and_deviation_are_weighted():
-    assert summary.measure_amplitude(3.0 + 0.2 * np.sin(8.0 * FINE)) == pytest.approx(0.2, rel=1e-4)
+    assert measure_amplitude(3.0 + 0.2 * np.sin(8.0 * FINE)) == pytest.approx(0.2, rel=1e-4)
     # Ten rises; each is found to a row of 1 ms.
-    assert summary.measure_frequency(FINE, np.sin(2.0 * np.pi * 1.3 * FINE + 0.3)) == pytest.approx(
-        1.3, rel=1e-3
-    )
-    assert summary.measure_frequency(FINE, FINE) is None
+    assert measure_frequency(FINE, np.sin(2.0 * np.pi * 1.3 * FINE + 0.3)) == pytest.approx(1.3, rel=1e-3)
+    assert measure_frequency(FINE, FINE) is None
     # A value for 3 s and another, 4 higher, for 1 s: mean 1, variance (3·1 + 1·9)/4.
     values, weight, nothing = np.array([0.0, 4.0]), np.array([3.0, 1.0]), np.empty(0)
-    assert summary.compute_deviation(values, weight) == pytest.approx(np.sqrt(3.0), rel=1e-12)
-    assert (summary.compute_mean(nothing, nothing), summary.compute_deviation(nothing, nothing)) == (
+    assert compute_deviation(values, weight) == pytest.approx(np.sqrt(3.0), rel=1e-12)
+    assert (compute_mean(nothing, nothing), compute_deviation(nothing, nothing)) == (
         None,
         None,
     )
@@ -271,9 +293,9 @@ ALL_ROWS = np.ones(len(MOMENTS), dtype=bool)
 
 @pytest.mark.parametrize("frequency", [1.0, 2.0, 4.0, 9.0])
 def test_of_a_sine_the_share_beside_its_moving_average_counts_as_oscillation(frequency):
-    found = summary.measure_oscillation(MOMENTS, 3.0 + np.sin(2.0 * np.pi * frequency * MOMENTS), ALL_ROWS)
+    found = measure_oscillation(MOMENTS, 3.0 + np.sin(2.0 * np.pi * frequency * MOMENTS), ALL_ROWS)
     # The moving average of a sine is its sinc; 29.75 s are no whole number of periods.
-    assert found == pytest.approx((1.0 - np.sinc(frequency * summary.WINDOW)) / np.sqrt(2.0), rel=0.01)
+    assert found == pytest.approx((1.0 - np.sinc(frequency * WINDOW)) / np.sqrt(2.0), rel=0.01)
 
 
 @table(
@@ -285,12 +307,12 @@ def test_of_a_sine_the_share_beside_its_moving_average_counts_as_oscillation(fre
             (MOMENTS < 1.0) | (MOMENTS > 2.0),
             0.0,
         ),
-        "a stretch longer than the window": (MOMENTS, MOMENTS < summary.WINDOW + 4e-3, 0.0),
-        "a stretch shorter than the window": (MOMENTS, MOMENTS < summary.WINDOW - 2e-3, None),
+        "a stretch longer than the window": (MOMENTS, MOMENTS < WINDOW + 4e-3, 0.0),
+        "a stretch shorter than the window": (MOMENTS, MOMENTS < WINDOW - 2e-3, None),
     },
 )
 def test_what_follows_its_moving_average_does_not_oscillate(values, rows, wanted):
-    found = summary.measure_oscillation(MOMENTS, values, rows)
+    found = measure_oscillation(MOMENTS, values, rows)
     assert found is None if wanted is None else found == pytest.approx(0.0, abs=1e-9)
 
 
@@ -299,20 +321,20 @@ def test_what_follows_its_moving_average_does_not_oscillate(values, rows, wanted
     [
         # Gueorguiev and others 2022; Pang, Tan and Durlach 1991 have 7 % from 2.5 to 10 N.
         *((force, (0.07, 0.10)) for force in (0.5, 0.76, 2.5, 10.0)),
-        *((force, (0.15, 0.27)) for force in (0.01, 0.4, math.nextafter(summary.BORDER, 0.0))),
+        *((force, (0.15, 0.27)) for force in (0.01, 0.4, math.nextafter(BORDER, 0.0))),
     ],
 )
 def test_a_jnd_is_7_to_10_percent_from_half_a_newton_on_and_15_to_27_below(force, fractions):
-    assert summary.find_weber_fractions(force) == fractions
+    assert find_weber_fractions(force) == fractions
 
 
 def test_deviations_are_counted_in_units_of_touch():
-    assert list(summary.perceive(0.15 * 0.4, 0.4, None).values())[:2] == pytest.approx([15 / 27, 1.0])
-    assert list(summary.perceive(0.10 * 2.5, 2.5, None).values())[:2] == pytest.approx([1.0, 10 / 7])
+    assert list(perceive(0.15 * 0.4, 0.4, None).values())[:2] == pytest.approx([15 / 27, 1.0])
+    assert list(perceive(0.10 * 2.5, 2.5, None).values())[:2] == pytest.approx([1.0, 10 / 7])
     # Van Boven and Johnson 1994: 0.94 mm at the finger.
-    assert pytest.approx(0.94e-3) == summary.SPATIAL_RESOLUTION
-    assert summary.perceive(None, None, 0.47e-3)["ridge_unevenness_touch"] == pytest.approx(0.5)
-    assert set(summary.perceive(0.1, None, None).values()) == {None}
+    assert pytest.approx(0.94e-3) == SPATIAL_RESOLUTION
+    assert perceive(None, None, 0.47e-3)["ridge_unevenness_touch"] == pytest.approx(0.5)
+    assert set(perceive(0.1, None, None).values()) == {None}
 
 
 @pytest.mark.parametrize(
@@ -328,7 +350,7 @@ def test_deviations_are_counted_in_units_of_touch():
 )
 def test_what_is_no_deviation_is_refused(values, said):
     with pytest.raises(ParameterError, match=said):
-        summary.perceive(*values)
+        perceive(*values)
 
 
 #: 21 pins 3 mm apart on a slanting line; the finger goes over all of them in 201 rows, 50 mm up.
@@ -339,7 +361,7 @@ ALL = np.ones(201, dtype=bool)
 
 
 def errors(final, rows=ALL, tip=TIP):
-    return summary.measure_ridge_errors(PLACE, final, tip, rows, 11e-3) * 1e3
+    return measure_ridge_errors(PLACE, final, tip, rows, 11e-3) * 1e3
 
 
 def test_a_ridge_has_its_height_over_the_path_at_each_pin():
@@ -360,14 +382,14 @@ def test_pins_the_finger_did_not_go_on_from_no_travel_no_rows_and_what_follows_a
     found = errors(final)
     assert (len(found), found.max()) == (17, 0.0)
     # With 12 mm, as if none is given, the last of them is on the border.
-    assert len(summary.measure_ridge_errors(PLACE, final, TIP, ALL)) in (16, 17)
+    assert len(measure_ridge_errors(PLACE, final, TIP, ALL)) in (16, 17)
     still = np.tile(TIP[100], (50, 1))
-    assert summary.measure_ridge_errors(PLACE, np.full(21, 60e-3), still, np.ones(50, dtype=bool)).size == 0
+    assert measure_ridge_errors(PLACE, np.full(21, 60e-3), still, np.ones(50, dtype=bool)).size == 0
     assert errors(np.full(21, 50e-3), rows=~ALL).size == 0
     # Shaping stops in the middle, and goes on 12 mm later.
     rows = ALL.copy()
     rows[100:140] = False
-    counted = summary.measure_ridge_errors(PLACE, np.arange(21.0), TIP, rows, 11e-3) + 50e-3
+    counted = measure_ridge_errors(PLACE, np.arange(21.0), TIP, rows, 11e-3) + 50e-3
     # Of pins 0 to 10, passed before, 11 mm of way must follow before the middle: up to pin 6, at -12 mm.
     assert [int(pin) for pin in np.rint(counted) if pin < 10] == list(range(7))
 
@@ -384,18 +406,16 @@ HISTORY = {
 
 def test_the_surface_counts_cells_by_force_and_the_lag_is_that_of_their_centroid():
     # 0.3 N at 51 mm and 0.1 N at 53 mm: 51.5 mm, over a finger at 50 mm.
-    assert summary.measure_surface_under(summary.sum_cells(HISTORY), TIP[:2]) * 1e3 == pytest.approx(
-        [1.5], rel=1e-9
-    )
+    assert measure_surface_under(sum_cells(HISTORY), TIP[:2]) * 1e3 == pytest.approx([1.5], rel=1e-9)
     nothing = {**HISTORY, "force": np.zeros((2, 2)), "total_force": np.zeros(2)}
-    assert summary.measure_surface_under(summary.sum_cells(nothing), TIP[:2]).size == 0
+    assert measure_surface_under(sum_cells(nothing), TIP[:2]).size == 0
     place = np.array([[0.0, 0.0], [0.004, 0.0]])
     fingertip = np.tile([0.001, 0.004, 0.05, 1.0, 0.0, 0.0, 0.0], (3, 1))
     force = np.array([[0.1, 0.3], [0.0, 0.0], [0.4, 0.0]])
     # Centroids (3, 0) and (0, 0) mm from (1, 4) mm: √(4+16) and √(1+16); the row without force is left out.
     case = {"position": place, "force": force, "total_force": force.sum(axis=1)}
-    sums = summary.sum_cells({**case, "height": np.zeros_like(force), "mode": np.zeros_like(force)})
-    assert_allclose(summary.measure_lag(sums, fingertip), np.sqrt([20.0, 17.0]) * 1e-3, rtol=ROUNDING)
+    sums = sum_cells({**case, "height": np.zeros_like(force), "mode": np.zeros_like(force)})
+    assert_allclose(measure_lag(sums, fingertip), np.sqrt([20.0, 17.0]) * 1e-3, rtol=ROUNDING)
 
 
 def of_two(places, force, own):
@@ -428,7 +448,7 @@ def test_a_pin_counts_for_the_nearest_of_two_fingers_whose_forces_stay_as_they_a
         given = of_two(places, force, own)
         given["fingertip"][:, :, 0] *= mirror
         given["force"] = given["force"][:, ::mirror]
-        each = [summary.compute_metrics(one, None) for one in summary.split_fingers(given)]
+        each = [compute_metrics(one, None) for one in split_fingers(given)]
         # Rounding.
         assert [one["max_total_force"] for one in each] == pytest.approx(own, abs=1e-15)
         assert [one["lag_mean"] for one in each] == [lag and pytest.approx(lag, abs=1e-12) for lag in lags]
@@ -439,7 +459,7 @@ def test_of_two_fingers_the_lower_one_presses_a_pin_between_them_that_stands_low
     given = of_two((-5e-3, 8e-3), {1: 0.1, 2: 0.2, 4: 0.3}, (0.1, 0.5))
     given["fingertip"][:, 1, 2] = 35e-3
     given["height"] += [0.0, 41e-3, 40e-3, 0.0, 36e-3]
-    mine, lower = summary.split_fingers(given)
+    mine, lower = split_fingers(given)
     assert_allclose(mine["force"][0], [0.0, 0.1, 0.0, 0.0, 0.0])
     assert_allclose(lower["force"][0], [0.0, 0.0, 0.2, 0.0, 0.3])
 
@@ -456,7 +476,7 @@ def test_of_two_fingers_the_lower_one_presses_a_pin_between_them_that_stands_low
     ],
 )
 def test_the_worst_of_several_fingers_is_told(name, each, worst):
-    assert summary.take_worst([{name: value} for value in each]) == {name: worst}
+    assert take_worst([{name: value} for value in each]) == {name: worst}
 
 
 @table(
@@ -474,7 +494,7 @@ def test_a_finger_is_lost_where_contact_ends_though_it_rises_no_faster_than_a_pi
     """At 20 mm/s from the time `quick` on it is at 30 mm/s, where pins rise at 24."""
     felt = np.any([(start <= TIME) & (end >= TIME) for start, end in touching], axis=0) & (TIME >= 0.0)
     height = 20e-3 * TIME + 10e-3 * np.maximum(TIME - quick, 0.0)
-    found = summary.find_losses(TIME, 0.4 * felt, height, 24e-3)
+    found = find_losses(TIME, 0.4 * felt, height, 24e-3)
     # A row is 5 ms.
     assert [tuple(one) for one in found] == [pytest.approx(one, abs=11e-3) for one in wanted]
 
@@ -483,7 +503,7 @@ def test_a_finger_is_lost_where_contact_ends_though_it_rises_no_faster_than_a_pi
 def test_a_history_of_a_row_or_two_has_no_losses_unless_contact_ends(rows):
     """A single row has no gradient."""
     force, ends = np.array([0.4, 0.0])[:rows], rows - 1
-    assert len(summary.find_losses(TIME[:rows], force, np.zeros(rows), 24e-3)) == ends
+    assert len(find_losses(TIME[:rows], force, np.zeros(rows), 24e-3)) == ends
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,19 @@ from digiclay.core.model.fingertip import LEVEL
 from digiclay.core.model.layout import Layout
 from digiclay.core.session import snapshot
 from digiclay.core.session.take import from_bytes, make_take, play, to_bytes
-from digiclay.sessions import sculpting
+from digiclay.sessions.sculpting import (
+    begin_session,
+    change_scene,
+    change_stroke,
+    drop_strokes,
+    find_device,
+    follow_finger,
+    list_pressing,
+    queue_stroke,
+    restore,
+    rewind,
+    set_recording,
+)
 from digiclay.settings.devices import make_scene
 from digiclay.strokes.nominal import find_nominal
 from digiclay.strokes.stroke import ALONE, FINISHING, PRESSING, YIELDING, Brush, lay_path, make_images
@@ -27,15 +39,15 @@ def begin(method="virtual_master", fingers=1):
     """Return a session that is recorded, of fingertips of which only the first one is near the bed."""
     scene = make_scene("paper", Layout(COUNT, COUNT, PITCH), method, 0.5).with_fingers(fingers)
     poses = np.array([[0.3 * number, 0.0, ABOVE, *LEVEL] for number in range(fingers)])
-    return sculpting.set_recording(sculpting.begin_session(7, "Bed", scene, poses)[0], True)
+    return set_recording(begin_session(7, "Bed", scene, poses)[0], True)
 
 
 def queue(session, path, images, brush=Brush.LOWER, held=False):
     """Queue a stroke of 4 mm along a path, mm, for a hand that holds it or has let it go."""
     places = 1e-3 * np.asarray(path, float)
-    session, number = sculpting.queue_stroke(session, *places[0], 4e-3, images, brush)
-    session = sculpting.change_stroke(session, number, partial(lay_path, points=places))
-    return sculpting.change_stroke(session, number, lambda stroke: replace(stroke, held=held))
+    session, number = queue_stroke(session, *places[0], 4e-3, images, brush)
+    session = change_stroke(session, number, partial(lay_path, points=places))
+    return change_stroke(session, number, lambda stroke: replace(stroke, held=held))
 
 
 def line(x, y, end_x, end_y):
@@ -47,7 +59,7 @@ def go_on(session, periods):
     """Simulate so many periods of the strokes."""
     end = session.state.period + periods
     while session.state.period < end:
-        session = sculpting.follow_finger(session, session.poses, 1)
+        session = follow_finger(session, session.poses, 1)
     return session
 
 
@@ -126,7 +138,7 @@ def follow_to_the_end(session, periods=8):
     """
     force, left = 0.0, heights(session)
     while session.strokes:
-        session = sculpting.follow_finger(session, session.poses, periods)
+        session = follow_finger(session, session.poses, periods)
         force = max(force, float(session.state.finger_forces().max()))
         if session.strokes and session.strokes[0].phase != FINISHING:
             left = heights(session)
@@ -215,7 +227,7 @@ def test_no_fingertip_lifts_again_for_another_one_that_is_down():
     images = make_images("RADIAL", 12, (1.1e-3, -0.7e-3), 0.4)
     session, pressing, lifted = queue(begin(), line(3.7, 0.9, 11.6, 5.4), images, RAISE), set[int](), 0
     while session.strokes:
-        session = sculpting.follow_finger(session, session.poses, 1)
+        session = follow_finger(session, session.poses, 1)
         parts, forces = session.strokes[0].parts if session.strokes else (), session.state.finger_forces()
         lifted += sum(part.image in pressing for part in parts if part.phase == YIELDING)
         pressing = {part.image for part in parts if part.phase == PRESSING and forces[part.image] > 0.0}
@@ -235,12 +247,12 @@ def test_rays_leave_their_nominal_surface_whenever_the_hand_lets_go(drawn):
     path = line(2, 1, 18, -6)
     session = queue(begin("hybrid"), path[: drawn + 1], RAYS, RAISE, held=True)
     for _ in range(40):  # as far as the hand has drawn
-        session = sculpting.follow_finger(session, session.poses, 8)
-    session = sculpting.change_stroke(session, 1, partial(lay_path, points=1e-3 * path))
+        session = follow_finger(session, session.poses, 8)
+    session = change_stroke(session, 1, partial(lay_path, points=1e-3 * path))
     laid = session.strokes[0]
     session, force, _ = follow_to_the_end(session)
     assert force < 0.6
-    nominal = find_nominal(laid, sculpting.find_device(session), np.full(COUNT**2, 40e-3))
+    nominal = find_nominal(laid, find_device(session), np.full(COUNT**2, 40e-3))
     assert_near(heights(session), nominal.height, 2e-6)
 
 
@@ -249,7 +261,7 @@ def test_there_are_no_more_fingertips_than_a_bed_can_have_and_the_others_stay():
     stood, most = session.poses.copy(), 0
     session = queue(session, line(24, 0, 24, 0), make_images("RADIAL", 24))
     while session.strokes:
-        session = sculpting.follow_finger(session, session.poses, 8)
+        session = follow_finger(session, session.poses, 8)
         most = max(most, session.system.fingers)
     assert (max(keep(meet("many")[0]).fingers), most) == (24, 32)
     assert_array_equal(session.poses[1:], stood[1:])
@@ -263,7 +275,7 @@ def test_there_are_no_more_fingertips_than_a_bed_can_have_and_the_others_stay():
 def test_what_the_valves_do_alone_takes_no_further_fingertips(brush):
     session = queue(begin("hybrid"), line(8, 8, 9, 8), make_images("XY"), brush)
     while session.strokes:
-        session = sculpting.follow_finger(session, session.poses, 16)
+        session = follow_finger(session, session.poses, 16)
         assert session.system.fingers == 1
 
 
@@ -276,7 +288,7 @@ def middle():
 
 
 def test_a_stroke_that_is_taken_back_in_its_middle_leaves_nothing_and_another_symmetry_goes_on():
-    session = sculpting.rewind(middle())
+    session = rewind(middle())
     assert (session.poses.shape, session.system.fingers, session.strokes) == ((1, 7), 1, ())
     assert_array_equal(heights(session), 40e-3)
     session = finish(queue(session, APART, make_images("X")))
@@ -287,12 +299,12 @@ def test_a_stroke_that_is_taken_back_in_its_middle_leaves_nothing_and_another_sy
 
 
 def test_a_recording_begins_and_ends_in_the_middle_of_a_stroke():
-    session = sculpting.set_recording(middle(), True)
+    session = set_recording(middle(), True)
     session = go_on(session, 20)
     assert set(keep(session).fingers) == {4}
     assert is_replayed(keep(session))
     # Dropped, the stroke ends there, and so do its fingertips.
-    dropped = sculpting.drop_strokes(session)
+    dropped = drop_strokes(session)
     assert (dropped.system.fingers, dropped.poses.shape) == (1, (1, 7))
     assert is_replayed(keep(dropped))
 
@@ -307,11 +319,11 @@ def test_settings_and_fingertips_change_in_the_middle_of_a_stroke(change):
         scene, numbers = scene.with_fingers(2), (1, 2)
     force = go_on(middle(), 1).state.finger_forces()
     poses = np.array([[0.0, 0.0, ABOVE, *LEVEL]] * len(numbers))
-    session, lost = sculpting.change_scene(session, scene, numbers, poses)
+    session, lost = change_scene(session, scene, numbers, poses)
     assert (lost, session.numbers, session.names[len(numbers) :]) == ("", numbers, (33, 34, 35))
     session = go_on(session, 1)
     # The pulps of the images' fingertips relax on: ones that begin anew would press 2.6 times as hard.
-    pressing = session.state.finger_forces()[sculpting.list_pressing(session)]
+    pressing = session.state.finger_forces()[list_pressing(session)]
     assert_allclose(pressing, force, rtol=0.1)
     done = finish(session)
     table = 1e3 * heights(done).reshape(COUNT, COUNT)
@@ -319,18 +331,18 @@ def test_settings_and_fingertips_change_in_the_middle_of_a_stroke(change):
     assert done.system.fingers == len(numbers)
     back = done
     while back.gestures:  # a change is where another one begins
-        back = sculpting.rewind(back)
+        back = rewind(back)
         assert back.system.fingers == len(numbers)
     assert_near(heights(back), 40e-3, 1e-9)
 
 
 def test_a_session_begins_from_the_state_that_was_kept_in_the_middle_of_a_stroke():
     session = middle()
-    again, lost = sculpting.begin_session(
+    again, lost = begin_session(
         7, "Bed", session.scene, session.poses[:1], session.snapshot, 0, session.numbers, session.names
     )
     assert (lost, again.system.fingers) == ("", 1)
     assert_array_equal(heights(again), heights(session))
     # Undo comes back to it as well.
-    back = sculpting.restore(again, session.snapshot, session.poses, 1, session.names)
+    back = restore(again, session.snapshot, session.poses, 1, session.names)
     assert_array_equal(heights(back), heights(session))
