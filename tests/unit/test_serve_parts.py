@@ -3,7 +3,6 @@
 import socket
 from dataclasses import replace
 from time import thread_time
-from typing import cast
 
 import numpy as np
 import pytest
@@ -14,7 +13,7 @@ from digiclay.core.session import snapshot
 from digiclay.core.session.take import from_bytes, make_take, replay
 
 from digiclay_serve import real_time_loop, serve_command
-from digiclay_serve.doors import Doors, Order, make_slot, open_slot, pack_order, unpack_order
+from digiclay_serve.doors import Order, make_slot, open_slot, pack_order, unpack_order
 from digiclay_serve.protocol import (
     LIMITS,
     VARIABLE,
@@ -98,7 +97,7 @@ class Asked:
     def __init__(self, clock, *, restless):
         self.clock, self.restless, self.order = clock, restless, Order()
         #: Periods simulated, and when their frame was shown, s.
-        self.shown: list[tuple[int, float]] = []
+        self.shown = []
 
     def read_order(self):
         """Return the newest order."""
@@ -126,7 +125,7 @@ LONG = 0.1
 def test_a_new_pose_begins_its_period_early_by_one(restless, clock):
     session = begin_session(resolve({**SMALL, "trajectory": WAIT, "simulation": {"control_period": LONG}}))
     doors = Asked(clock, restless=restless)
-    _, figures = run_session(session, cast(Doors, doors), None, 1.0, doors.stopped, print)
+    _, figures = run_session(session, doors, None, 1.0, doors.stopped, print)
     (_, before), *shown = doors.shown
     assert (figures["periods"], figures["left_out"], len(shown)) == (7, 0, 7)
     # To within the readings of the clock in a period.
@@ -140,7 +139,7 @@ def test_a_new_pose_begins_its_period_early_by_one(restless, clock):
 def test_each_take_has_its_simulated_time_and_errors_or_why_there_are_none(clock, tmp_path):
     doors, session = Asked(clock, restless=False), begin_session(STILL)
     with PartWriter(tmp_path / "out") as writer:
-        run_session(session, cast(Doors, doors), writer, 1.0, doors.stopped, print)
+        run_session(session, doors, writer, 1.0, doors.stopped, print)
         assert len(writer.finish()) == 1
     simulated = pytest.approx(doors.shown[-1][0] * session.system.period)
     assert writer.efforts == {1: {"simulated": simulated, "errors_absent": "not yet"}}

@@ -43,11 +43,11 @@ AT = np.array([0.0, 0.0, 0.046, *LEVEL])
 DEVICE = Device(CELLS, Fingertip(), None, 0.08)
 
 
-def line(end=0.02, moves=20, images=ALONE):
+def line(end=0.02, moves=20, images=ALONE, lean=(0.0, 0.0)):
     """Return a stroke drawn evenly along x from (0, 5) mm on, 4 mm deep, that the hand still holds."""
-    stroke = start(1, 0.0, 0.005, 4e-3, images)
+    stroke = start(1, 0.0, 0.005, 4e-3, images, lean=lean)
     for part in np.arange(1, moves + 1) / moves:
-        stroke = draw(stroke, part * end, 0.005, 4e-3)
+        stroke = draw(stroke, part * end, 0.005, 4e-3, lean=lean)
     return stroke
 
 
@@ -294,10 +294,7 @@ def test_a_pen_that_is_jerked_turns_the_finger_no_faster_than_a_hand_to_its_aim(
 @pytest.mark.parametrize("name", ["none", "both", "three turns"])
 def test_the_finger_leans_with_the_pen_on_each_image_and_ends_as_it_began(name):
     images = IMAGES[name][0]
-    stroke = start(1, 0.0, 0.005, 4e-3, images, lean=(0.4, 0.2))
-    for part in np.arange(1, 21) / 20:
-        stroke = draw(stroke, part * 0.02, 0.005, 4e-3, lean=(0.4, 0.2))
-    stroke, poses = path(release(stroke), np.array([*AT[:3], *TWISTED]))
+    stroke, poses = path(release(line(images=images, lean=(0.4, 0.2))), np.array([*AT[:3], *TWISTED]))
     assert stroke.done
     assert_array_equal(poses[-1, 3:], TWISTED)
     down = pressed(poses)
