@@ -30,7 +30,6 @@ from tests.timeouts import TIMEOUT, wait_until
 
 #: What the second process says.
 REFUSED = "o is being {} by another digiclay: choose another place with --out, or wait.\n"
-JOBS = 'scenes = ["my.toml"]\nerrors = false\n'
 
 
 pytestmark = pytest.mark.usefixtures("here")
@@ -48,12 +47,16 @@ def running(*arguments, sign):
         process.communicate(timeout=TIMEOUT)
 
 
+def write_jobs():
+    Path("jobs.toml").write_text('scenes = ["my.toml"]\nerrors = false\n', encoding="utf-8")
+
+
 def names(folder=Path()):
     return sorted(path.name for path in folder.iterdir())
 
 
 def test_a_folder_that_is_being_written_is_refused_at_once_by_every_command(refused):
-    Path("jobs.toml").write_text(JOBS, encoding="utf-8")
+    write_jobs()
     assert call("batch jobs.toml --out b --prepare --quiet") == 0
     assert call("run my.toml --out older --quiet --no-errors") == 0
     before = names(Path("older"))
@@ -73,7 +76,7 @@ def test_a_folder_that_is_being_written_is_refused_at_once_by_every_command(refu
 
 @pytest.mark.parametrize("line", ["sweep my.toml --vary layout.rows=3,4 --workers 1", "batch jobs.toml"])
 def test_a_second_series_in_one_folder_is_refused_at_once(line, refused):
-    Path("jobs.toml").write_text(JOBS, encoding="utf-8")
+    write_jobs()
     finished = f"{line} --prepare" if line.startswith("batch") else line  # nothing is to be simulated
     assert call(f"{finished} --out o --quiet") == 0
     with hold_lock(Path("o/.lock"), "no"):
@@ -89,7 +92,7 @@ def test_a_folder_of_the_system_that_takes_no_files_is_refused(refused):
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no signals to send")
 def test_what_a_killed_job_leaves_is_taken_away_by_the_next_and_its_lock_with_it():
-    Path("jobs.toml").write_text(JOBS, encoding="utf-8")
+    write_jobs()
     call("batch jobs.toml --prepare --quiet")
     scene = Path("jobs/jobs/my/scene.toml")
     short = scene.read_text(encoding="utf-8")
