@@ -1,8 +1,8 @@
 """Sections of the overlay, and their placement in a view; no Blender."""
 
 import math
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -120,16 +120,18 @@ class Pen:
         if len(points) > 1:
             self.picture.lines.append(Line(points, color, 1.5 * self.scale))
 
-    def entries(self, top: float, columns: int, entries: Iterable[tuple[Color, str]]) -> None:
-        """Draw dots and what they stand for, row by row."""
-        radius, size = 4.0 * self.scale, (SMALL + 1.0) * self.scale
-        for place, (color, text) in enumerate(entries):
-            row, column = divmod(place, columns)
+    def entries(self, top: float, columns: int, entries: Sequence[tuple[Color, str]]) -> float:
+        """Draw dots and what they stand for, row by row; return the bottom of the last row, pixels."""
+        radius = 4.0 * self.scale
+        size = (SMALL + 1.0) * self.scale
+        for number, (color, text) in enumerate(entries):
+            row, column = divmod(number, columns)
             x, y = self.x + column * self.width / columns, top - (row + 0.75) * ROW * self.scale
             middle = y + 0.36 * size
             self.picture.dots.append(Dot(x + radius, middle, radius + self.scale, self.look.frame))
             self.picture.dots.append(Dot(x + radius, middle, radius, color))
             self.picture.words.append(Words(x + 3.5 * radius, y, size, self.look.ink, text))
+        return top - math.ceil(len(entries) / columns) * ROW * self.scale
 
 
 def error_message(errors: Sequence[float] | None) -> str:
@@ -162,14 +164,14 @@ def describe_state(readings: Readings) -> str:
     return "" if readings.factor is None else localize("{:.2f} x real time", readings.factor)
 
 
-def _draw_head(readings: Readings, pen: Pen, top: float) -> None:
+def _draw_head(readings: Readings, pen: Pen, top: float) -> float:
     """Name the bed, the method and how well the simulation keeps up."""
     top = pen.row(top, readings.name, describe_state(readings))
     top = pen.row(top, localize("Method: {}", localize(readings.method.replace("_", " ") or "none")))
-    pen.row(top, error_message(readings.errors), small=True)
+    return pen.row(top, error_message(readings.errors), small=True) - GAP * pen.scale
 
 
-def _draw_force(readings: Readings, pen: Pen, top: float) -> None:
+def _draw_force(readings: Readings, pen: Pen, top: float) -> float:
     """Draw the force over the last seconds, of several fingertips each one's, its set point dashed."""
     now = _tell_force(readings) if readings.force.size else ""
     words = "set point {:.2f} N each" if readings.hardest is not None else "set point {:.2f} N"
@@ -190,20 +192,15 @@ def _draw_force(readings: Readings, pen: Pen, top: float) -> None:
         pen.level(box, y, pen.look.set_point, 1.5, dashed=True)
     for curve, color in curves:
         pen.curve(readings, curve, ends, box, make_legible(color, pen.look.back, LINES))
-    _draw_fingers(readings, pen, box.y - ROW * pen.scale)
+    return _draw_fingers(readings, pen, box.y - ROW * pen.scale) - GAP * pen.scale
 
 
-def _draw_fingers(readings: Readings, pen: Pen, top: float) -> None:
+def _draw_fingers(readings: Readings, pen: Pen, top: float) -> float:
     """List the force of each of several fingertips by number."""
     now = readings.finger_force[-1] if len(readings.finger_force) else np.zeros(len(readings.fingers))
     texts = zip(readings.fingers, now, strict=True)
     entries = [(color, f"{number}: {force:.2f} N") for (number, color), force in texts]
-    pen.entries(top, _count_columns(pen.width / pen.scale), entries)
-
-
-def _count_columns(width: float) -> int:
-    """Return how many fingertips stand in a row of a width at a UI scale of 1, pixels."""
-    return int(width / FINGER)
+    return pen.entries(top, int(pen.width / (FINGER * pen.scale)), entries)
 
 
 def _tell_force(readings: Readings) -> str:
@@ -211,11 +208,11 @@ def _tell_force(readings: Readings) -> str:
     return force_message(float(readings.force[-1]), beyond=readings.beyond, hardest=readings.hardest)
 
 
-def _draw_heights(readings: Readings, pen: Pen, top: float) -> None:
+def _draw_heights(readings: Readings, pen: Pen, top: float) -> float:
     """Draw the heights of the picked pins over the last seconds."""
+    gap = GAP * pen.scale
     if not readings.pins:
-        pen.row(top, localize("Pick pins to see their heights (Laboratory)"), small=True)
-        return
+        return pen.row(top, localize("Pick pins to see their heights (Laboratory)"), small=True) - gap
     top = pen.row(top, localize("Heights of picked pins"))
     values = readings.heights * 1e3
     recent = values[readings.time >= readings.window[0]]
@@ -223,31 +220,36 @@ def _draw_heights(readings: Readings, pen: Pen, top: float) -> None:
     low, high = (float(finite.min()), float(finite.max())) if finite.size else (0.0, 0.0)
     spare = max(0.0, LEAST_SPAN - (high - low)) / 2
     ends = round_axis(low - spare, high + spare)
-    box, entries = pen.plot(readings, top, ends, "mm"), []
-    for place, (pin, color) in enumerate(zip(readings.pins, pen.look.pins, strict=False)):
-        pen.curve(readings, values[:, place], ends, box, color)
-        now = f" {values[-1, place]:.1f} mm" if len(values) and np.isfinite(values[-1, place]) else ""
+    box = pen.plot(readings, top, ends, "mm")
+    entries = []
+    for pin, color, curve in zip(readings.pins, pen.look.pins, values.T, strict=False):
+        pen.curve(readings, curve, ends, box, color)
+        now = f" {curve[-1]:.1f} mm" if np.isfinite(curve[-1:]).any() else ""
         entries.append((color, f"{pin}:{now}"))
-    pen.entries(box.y - ROW * pen.scale, 3, entries)
+    return pen.entries(box.y - ROW * pen.scale, 3, entries) - gap
 
 
-def _draw_scale(readings: Readings, pen: Pen, top: float) -> None:
-    """Draw the colors of the force on a pin."""
-    assert readings.top is not None  # or the section has no height
+def _draw_scale(readings: Readings, pen: Pen, top: float) -> float:
+    """Draw the colors of the force on a pin, if the pins wear them."""
+    if readings.top is None:
+        return top
     top = pen.row(top, localize("Force on a pin"))
     width, height = pen.width / len(heat.COLORS), 0.5 * ROW * pen.scale
-    for place, color in enumerate(heat.COLORS):
-        pen.picture.boxes.append(Box(pen.x + place * width, top - height, width, height, color))
-    pen.row(top - height, "0 N", f"{readings.top:.3g} N", small=True)
+    for level, color in enumerate(heat.COLORS):
+        pen.picture.boxes.append(Box(pen.x + level * width, top - height, width, height, color))
+    # A tenth of a row is left below.
+    return pen.row(top - height, "0 N", f"{readings.top:.3g} N", small=True) - 0.1 * ROW * pen.scale
 
 
-def _draw_modes(readings: Readings, pen: Pen, top: float) -> None:
+def _draw_modes(readings: Readings, pen: Pen, top: float) -> float:
     """List how many pins are in each mode that occurs, with its color."""
     top = pen.row(top, localize("Pins by mode"), f"{int(readings.modes.sum())}")
-    names = {mode: localize(mode.name.lower().replace("_", " ")) for mode in Mode if readings.modes[mode]}
-    pen.entries(
-        top, 2, [(readings.colors[mode], f"{readings.modes[mode]} {name}") for mode, name in names.items()]
-    )
+    entries = []
+    for mode in Mode:
+        if readings.modes[mode]:
+            name = localize(mode.name.lower().replace("_", " "))
+            entries.append((readings.colors[mode], f"{readings.modes[mode]} {name}"))
+    return pen.entries(top, 2, entries)
 
 
 def _size(error: float, unit: str) -> str:
@@ -255,23 +257,18 @@ def _size(error: float, unit: str) -> str:
     return f"{error:.2g} {unit}" if error >= 0.01 else localize("0.01 {} or less", unit)
 
 
-def _draw_brief(readings: Readings, pen: Pen, top: float) -> None:
+def _draw_brief(readings: Readings, pen: Pen, top: float) -> float:
     """Write force, set point, simulated time and state in two rows."""
-    now = localize("no force yet")
-    if readings.force.size:
-        now = _tell_force(readings)
+    now = _tell_force(readings) if readings.force.size else localize("no force yet")
     words = "{:.2f} N each" if readings.hardest is not None else "of {:.2f} N"
     asked = "" if readings.set_point is None else localize(words, readings.set_point)
     top = pen.row(top, now, asked)
     time = float(readings.time[-1]) if readings.time.size else 0.0
-    _draw_fingers(readings, pen, pen.row(top, f"{time:.1f} s", describe_state(readings)))
+    return _draw_fingers(readings, pen, pen.row(top, f"{time:.1f} s", describe_state(readings)))
 
 
-class Section(NamedTuple):
-    """Section of the overlay: its height at a UI scale of 1, pixels, 0 without content, and its drawing."""
-
-    height: Callable[[Readings], float]
-    draw: Callable[[Readings, Pen, float], None]
+#: Draws readings with a pen from the top of a section, pixels; returns its bottom.
+Section = Callable[[Readings, Pen, float], float]
 
 
 class Content(NamedTuple):
@@ -281,27 +278,10 @@ class Content(NamedTuple):
     width: float
 
 
-def _measure_heights(readings: Readings) -> float:
-    return ROW * (2 + math.ceil(len(readings.pins) / 3)) + PLOT + GAP if readings.pins else ROW + GAP
-
-
-def _measure_fingers(readings: Readings, width: float) -> float:
-    return ROW * math.ceil(len(readings.fingers) / _count_columns(width - 2.0 * PADDING))
-
-
-#: Widths of the overlay at a UI scale of 1, in short and in full, and the space about it and in it, pixels.
-BRIEF, WIDE, MARGIN, PADDING = 190.0, 290.0, 12.0, 10.0
-COMPACT = Content((Section(lambda told: 2 * ROW + _measure_fingers(told, BRIEF), _draw_brief),), BRIEF)
-FULL = Content(
-    (
-        Section(lambda readings: 3 * ROW + GAP, _draw_head),
-        Section(lambda told: 2 * ROW + PLOT + GAP + _measure_fingers(told, WIDE), _draw_force),
-        Section(lambda readings: 0.0 if readings.top is None else 2.6 * ROW, _draw_scale),
-        Section(_measure_heights, _draw_heights),
-        Section(lambda readings: ROW * (1 + math.ceil(np.count_nonzero(readings.modes) / 2)), _draw_modes),
-    ),
-    WIDE,
-)
+COMPACT = Content((_draw_brief,), 190.0)
+FULL = Content((_draw_head, _draw_force, _draw_scale, _draw_heights, _draw_modes), 290.0)
+#: Space about the overlay and in it, pixels.
+MARGIN, PADDING = 12.0, 10.0
 #: Height that Blender's own text and gizmos take in corners of the view at a UI scale of 1, pixels.
 TAKEN = {"top_left": 54.0, "top_right": 220.0}
 #: Opacity of the box behind it all: the bed shines through a little.
@@ -352,30 +332,33 @@ def place_label(xy: Place, size: Place, room: Room, scale: float) -> Place:
 
 
 def lay_out(
-    readings: Readings, look: Look, room: Room, scale: float, content: Content = FULL,
+    readings: Readings,
+    look: Look,
+    room: Room,
+    scale: float,
+    content: Content = FULL,
     corner: str = "bottom_right",
-) -> Picture:  # fmt: skip
+) -> Picture:
     """Lay the overlay out in a corner of a room; sections that do not fit are left out."""
     left, bottom, right, top = room
-    at_top, at_left = corner.startswith("top"), corner.endswith("left")
     top -= TAKEN.get(corner, 0.0) * scale
     width, margin, padding = content.width * scale, MARGIN * scale, PADDING * scale
-    space, sections = SHARE * (top - bottom) - 2 * padding, []
+    x = left + margin if corner.endswith("left") else right - margin - width
+    pen = Pen(Picture(), look, x + padding, width - 2 * padding, scale)
+    space = SHARE * (top - bottom) - 2 * padding
+    total, sections = 0.0, []
     for section in content.sections:
-        height = section.height(readings) * scale
-        if 0.0 < height <= space:
-            sections.append((height, section.draw))
-            space -= height
-    picture = Picture()
+        # Drawn once into a picture that nobody sees, it tells its height.
+        height = -section(readings, replace(pen, picture=Picture()), 0.0)
+        if 0.0 < height <= space - total:
+            sections.append(section)
+            total += height
     if not sections or right - left < width + 2 * margin:
-        return picture
-    tall = sum(height for height, _ in sections) + 2 * padding
-    x = left + margin if at_left else right - margin - width
-    y = top - margin - tall if at_top else bottom + margin
-    picture.boxes.append(Box(x, y, width, tall, look.back, BACK_ALPHA))
-    pen = Pen(picture, look, x + padding, width - 2 * padding, scale)
+        return pen.picture
+    tall = total + 2 * padding
+    y = top - margin - tall if corner.startswith("top") else bottom + margin
+    pen.picture.boxes.append(Box(x, y, width, tall, look.back, BACK_ALPHA))
     y += tall - padding
-    for height, draw in sections:
-        draw(readings, pen, y)
-        y -= height
-    return picture
+    for section in sections:
+        y = section(readings, pen, y)
+    return pen.picture
