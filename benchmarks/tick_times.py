@@ -34,7 +34,7 @@ from digiclay.sessions import running, sculpting
 from digiclay.sessions.sculpting import change_stroke, queue_stroke
 from digiclay.settings import properties
 from digiclay.settings.devices import make_scene
-from digiclay.strokes.stroke import draw
+from digiclay.strokes.stroke import draw, start
 
 from .report import BLUE, RED, Report, Row, Steps, tabulate
 
@@ -194,7 +194,7 @@ def draw_circles(rows: int, columns: int, pitch: float, bore: float, ticks: int)
 
     layout = {"rows": rows, "columns": columns, "pitch": pitch}
     with open_session(resolve({"layout": layout, "actuator": {"bore": bore}})) as bed:
-        session, number = queue_stroke(_find_session(bed), *place(0), DEPTH)
+        session, number = queue_stroke(_find_session(bed), start(0, *place(0), DEPTH))
         running.put(session)
         return time_ticks(move, 1.0 / RATE, ticks)
 

@@ -6,7 +6,7 @@ from digiclay.core.model.layout import Layout
 from digiclay.sessions import sculpting
 from digiclay.sessions.sculpting import change_stroke, queue_stroke
 from digiclay.settings.devices import BEDS, make_scene
-from digiclay.strokes.stroke import draw
+from digiclay.strokes.stroke import draw, start
 
 from tests import hand
 from tests.hand import heights, let_go
@@ -29,7 +29,9 @@ def queue(session, ends, brush, depth=15.0, share=1.0):
     """Queue a quick stroke straight from place to place, mm."""
     places = np.array(ends) * 1e-3
     way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(places, axis=0).T))])
-    session, number = queue_stroke(session, *places[0].tolist(), depth * 1e-3, brush=brush, share=share)
+    session, number = queue_stroke(
+        session, start(0, *places[0].tolist(), depth * 1e-3, brush=brush, share=share)
+    )
     for part in np.arange(1, 31) / 30:
         at = tuple(np.interp(part * way[-1], way, places[:, axis]) for axis in (0, 1))
         session = change_stroke(

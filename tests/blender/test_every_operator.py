@@ -12,6 +12,7 @@ from digiclay.press import tool
 from digiclay.roles import fingertip_of
 from digiclay.sessions import running
 from digiclay.sessions.sculpting import queue_stroke
+from digiclay.strokes.stroke import start
 
 from tests.blender.at_hand import in_the_view, new_bed, select
 from tests.blender.session.live import Clock
@@ -91,7 +92,7 @@ def prepare(file: str, odd: str, live: bool) -> Any:
     bed, clock = bpy.context.object, Clock()
     if live:
         tick.start(bpy.context, bed)
-        running.put(queue_stroke(running.find(bed), 0.0, 0.0, 4e-3)[0])
+        running.put(queue_stroke(running.find(bed), start(0, 0.0, 0.0, 4e-3))[0])
         clock.tick(2)
         assert running.find(bed).strokes[0].height is not None  # it has begun
     ODD[odd](bed)

@@ -19,7 +19,7 @@ from digiclay.sessions import sculpting
 from digiclay.sessions.sculpting import change_stroke, find_device, queue_stroke
 from digiclay.settings.devices import BEDS, make_scene
 from digiclay.strokes.nominal import find_nominal, find_radius
-from digiclay.strokes.stroke import Brush, draw, make_images
+from digiclay.strokes.stroke import Brush, draw, make_images, start
 
 from tests.assemble import assert_near, replayed, table
 from tests.hand import TICK, go_on, heights, let_go, pin, pose, risen, started
@@ -145,13 +145,13 @@ def spiked(*places):
 
 
 def queue_smooth(
-    session, start, end, share = 1.0,
+    session, first, last, share = 1.0,
     symmetry = "NONE",
 ):  # fmt: skip
     """Queue a stroke of half a second from place to place, mm."""
-    (x, y), (to_x, to_y) = start, end
+    (x, y), (to_x, to_y) = first, last
     session, number = queue_stroke(
-        session, 1e-3 * x, 1e-3 * y, 4e-3, make_images(symmetry), Brush.SMOOTH, share
+        session, start(0, 1e-3 * x, 1e-3 * y, 4e-3, make_images(symmetry), Brush.SMOOTH, share)
     )
     for part in np.arange(1, 11) / 10:
         at = 1e-3 * (x + part * (to_x - x)), 1e-3 * (y + part * (to_y - y))
@@ -169,7 +169,7 @@ def test_a_smooth_stroke_takes_down_a_spike_from_above_and_a_short_one_waits_for
     assert 0.0 < min(above) < SPIKE
     weaker = finish(queue_smooth(spiked((0.0, 0.0)), (-9.0, 0.0), (9.0, 0.0), 0.1))
     assert risen(session, 0.0, 0.0) + 1e-3 < risen(weaker, 0.0, 0.0) < SPIKE - 1e-3
-    session, number = queue_stroke(spiked((0.0, 0.0)), 0.0, 0.0, 4e-3, brush=Brush.SMOOTH)
+    session, number = queue_stroke(spiked((0.0, 0.0)), start(0, 0.0, 0.0, 4e-3, brush=Brush.SMOOTH))
     session = change_stroke(session, number, lambda one: replace(draw(one, 0.0, 0.0, 4e-3), held=False))
     done = finish(session)
     assert risen(done, 0.0, 0.0) < SPIKE - 2e-3
@@ -180,10 +180,10 @@ def test_a_smooth_stroke_takes_down_a_spike_from_above_and_a_short_one_waits_for
 
 def test_strokes_that_press_and_smooth_are_queued_behind_each_other():
     session = spiked((-12.0, 0.0))
-    session, number = queue_stroke(session, 12e-3, 0.0, 4e-3)
+    session, number = queue_stroke(session, start(0, 12e-3, 0.0, 4e-3))
     session = let_go(session, number)
     session = queue_smooth(session, (-12.0, -6.0), (-12.0, 6.0))
-    session, number = queue_stroke(session, 12e-3, 12e-3, 4e-3)
+    session, number = queue_stroke(session, start(0, 12e-3, 12e-3, 4e-3))
     session = let_go(session, number)
     done = finish(session)
     assert (done.finished_strokes, len(done.gestures)) == (3, 3)

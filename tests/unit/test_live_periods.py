@@ -31,7 +31,7 @@ from digiclay.core.session.live_session import (
 from digiclay.core.session.recent_trace import ROWS
 from digiclay.sessions import sculpting
 from digiclay.sessions.sculpting import change_stroke, queue_stroke
-from digiclay.strokes.stroke import draw
+from digiclay.strokes.stroke import draw, start
 
 from tests import hand
 from tests.assemble import assert_near, path, table
@@ -319,7 +319,7 @@ def test_a_move_between_two_ticks_changes_the_commands_of_the_next():
 
 
 def test_a_place_drawn_between_two_ticks_changes_the_commands_of_the_next():
-    session, number = queue_stroke(hand.started(), 0.0, 0.0, 4e-3)
+    session, number = queue_stroke(hand.started(), start(0, 0.0, 0.0, 4e-3))
     now = 0.0
     # A tick has as much time as it wants: how far it comes must not depend on the machine's load.
     while session.strokes[0].reached < 5 and now < 3.0:
@@ -339,7 +339,7 @@ def test_a_place_drawn_between_two_ticks_changes_the_commands_of_the_next():
 def test_a_tick_ends_with_a_stroke_since_each_has_an_undo_step():
     session = hand.started()
     for x in (-9e-3, 9e-3):
-        session, number = queue_stroke(session, x, 0.0, 4e-3)
+        session, number = queue_stroke(session, start(0, x, 0.0, 4e-3))
         session = hand.let_go(session, number)
     finished = []
     for now in (1.0, 2.0):

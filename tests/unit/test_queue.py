@@ -61,7 +61,7 @@ def draw(name):
     scene = make_scene("design", Layout(41, 41, 1.5e-3), "hybrid", 0.5)
     session, _ = sculpting.begin_session(7, "Bed", scene, np.array([0.0, 0.0, 46e-3, *LEVEL]))
     for brush, amount, path, symmetry in DRAWN[name]:
-        session, number = queue_stroke(session, *path[0], amount, make_images(symmetry), brush)
+        session, number = queue_stroke(session, start(0, *path[0], amount, make_images(symmetry), brush))
         session = change_stroke(session, number, partial(lay_path, points=path))
     return session
 

@@ -307,7 +307,7 @@ def test_the_finger_leans_with_the_pen_on_each_image_and_ends_as_it_began(name):
 
 
 def test_a_stroke_that_is_dropped_leaves_a_finger_that_does_not_lean():
-    session, number = queue_stroke(started(), 0.0, 0.0, 4e-3, lean=(0.5, 0.0))
+    session, number = queue_stroke(started(), start(0, 0.0, 0.0, 4e-3, lean=(0.5, 0.0)))
     before = session.pose[3:].copy()
     for step in range(1, 10):
         session = sculpting.advance(session, session.pose, step * TICK, 100)
@@ -323,7 +323,7 @@ FORMED = -2e-3
 
 def tap(session, x, y):
     """Queue a click, mm."""
-    session, number = queue_stroke(session, 1e-3 * x, 1e-3 * y, DEPTH)
+    session, number = queue_stroke(session, start(0, 1e-3 * x, 1e-3 * y, DEPTH))
     return let_go(session, number)
 
 

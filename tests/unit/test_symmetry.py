@@ -25,7 +25,7 @@ from digiclay.sessions.sculpting import (
 )
 from digiclay.settings.devices import make_scene
 from digiclay.strokes.nominal import find_nominal
-from digiclay.strokes.stroke import ALONE, FINISHING, PRESSING, YIELDING, Brush, lay_path, make_images
+from digiclay.strokes.stroke import ALONE, FINISHING, PRESSING, YIELDING, Brush, lay_path, make_images, start
 from numpy.testing import assert_allclose, assert_array_equal
 
 from tests.assemble import assert_near
@@ -45,7 +45,7 @@ def begin(method="virtual_master", fingers=1):
 def queue(session, path, images, brush=Brush.LOWER, held=False):
     """Queue a stroke of 4 mm along a path, mm, for a hand that holds it or has let it go."""
     places = 1e-3 * np.asarray(path, float)
-    session, number = queue_stroke(session, *places[0], 4e-3, images, brush)
+    session, number = queue_stroke(session, start(0, *places[0], 4e-3, images, brush))
     session = change_stroke(session, number, partial(lay_path, points=places))
     return change_stroke(session, number, lambda stroke: replace(stroke, held=held))
 

@@ -15,7 +15,7 @@ from digiclay.core.base.arrays import Floats
 from digiclay.core.scene.schema import Scene
 from digiclay.recorded.pointer_strokes import PointerStroke
 from digiclay.sessions.sculpting import change_stroke, find_stroke, follow_finger, queue_stroke
-from digiclay.strokes.stroke import draw, lay_ring
+from digiclay.strokes.stroke import draw, lay_ring, start
 
 from tests.window.intended import THINGS, find_distance
 from tests.window.made import Played, begin, draw_made, make, make_bed, move, play
@@ -109,7 +109,7 @@ def find_spikes(made: Played) -> Floats:
 def draw_by_hand(scene: Scene, stroke: PointerStroke, rate: float, moves: int) -> Floats:
     """Draw a stroke on a bed at rest, some moves a tick, ticks at a rate, 1/s; return heights, (n,), m."""
     session = begin(scene)
-    session, number = queue_stroke(session, *stroke.moves[0][1:], stroke.amount, brush=stroke.kind)
+    session, number = queue_stroke(session, start(0, *stroke.moves[0][1:], stroke.amount, brush=stroke.kind))
     left, count = list(stroke.moves[1:]), round(1.0 / (rate * session.system.period))
     while find_stroke(session, number) is not None:
         for _, x, y in left[:moves]:

@@ -6,8 +6,8 @@ from ..compat import bpy
 from ..live import beds
 from ..press import aim, brush, tool
 from ..press.pointer import HELD
-from ..sessions.sculpting import change_stroke, queue_stroke
-from ..strokes.stroke import SHALLOWEST, Brush, let_go
+from ..sessions.sculpting import queue_stroke
+from ..strokes.stroke import SHALLOWEST, Brush, let_go, start
 from ..ui_text import localize
 from .action import Drawing, Polled, action, show_status
 from .poll_messages import no_finger, no_tool, no_tool_in_view
@@ -89,8 +89,8 @@ def _tell_all(operator: Any, context: Any, kind: Brush) -> set[str] | None:
     if session is None:
         return {"CANCELLED"}
     x, y = session.pose[:2].tolist()
-    session, number = queue_stroke(session, x, y, SHALLOWEST, brush=kind)
-    beds.put(change_stroke(session, number, let_go))
+    session, _ = queue_stroke(session, let_go(start(0, x, y, SHALLOWEST, brush=kind)))
+    beds.put(session)
     return None
 
 

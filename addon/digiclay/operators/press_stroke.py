@@ -1,7 +1,6 @@
 """Strokes of the Press tool, queued for the session: drawn by the mouse, lines and rings."""
 
 from collections.abc import Callable
-from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -143,16 +142,9 @@ class Press(PressSettings, Modal, bpy.types.Operator):
         self._feel(context, target.bed, event)
         self.lagged = place = float(target.point[0]), float(target.point[1])
         depth, share = self._amount()
-        session, self.number = queue_stroke(
-            session,
-            *place,
-            depth,
-            brush.find_images(self),
-            self.kind,
-            share,
-            self.lean,
-            accumulate=self.accumulate,
-        )
+        images = brush.find_images(self)
+        stroke = start(0, *place, depth, images, self.kind, share, self.lean, accumulate=self.accumulate)
+        session, self.number = queue_stroke(session, stroke)
         running.put(session)
         self._show(context)
         return None
@@ -431,7 +423,6 @@ def _queue_path(operator: Any, context: Any, bed: Any, path: Any, kind: Brush) -
     session = open_session(operator, context, bed, kind)
     if session is None:
         return {"CANCELLED"}
-    (x, y), laid = path[0], _lay_stroke(brush.tool_settings(context), path, kind)
-    session, number = queue_stroke(session, x, y, 0.0)
-    beds.put(change_stroke(session, number, lambda queued: replace(laid, number=queued.number)))
+    session, _ = queue_stroke(session, _lay_stroke(brush.tool_settings(context), path, kind))
+    beds.put(session)
     return {"FINISHED"}

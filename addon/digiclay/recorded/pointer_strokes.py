@@ -7,7 +7,6 @@ places of the pointer. What is formed follows from the places; the times say how
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -20,7 +19,7 @@ from ..core.scene.scene_source import read_table
 from ..core.scene.schema import Scene
 from ..device.instant import find_ellipsoid
 from ..sessions.running import Running
-from ..sessions.sculpting import change_scene, change_stroke, find_stroke, follow_finger, queue_stroke
+from ..sessions.sculpting import change_scene, find_stroke, follow_finger, queue_stroke
 from ..settings.devices import BEDS, change_finger
 from ..strokes.stamps import load_stamp
 from ..strokes.stroke import (
@@ -37,6 +36,7 @@ from ..strokes.stroke import (
     lay_ring,
     make_images,
     pull,
+    start,
 )
 from ..strokes.tracking import find_tracking
 
@@ -172,17 +172,16 @@ def _take_finger(running: Running, usual: Scene, finger: Fingertip) -> Running:
 def _play(running: Running, stroke: PointerStroke, number: int) -> Iterator[Running]:
     """Draw a stroke, and continue the session until it is formed; yield it after each tick."""
     places = [(x, y) for _, x, y in stroke.moves]
-    running, queued = queue_stroke(
-        running, *places[0], stroke.amount, stroke.images, stroke.kind, stroke.strength,
-        accumulate=stroke.accumulate, stamp=load_stamp(stroke.stamp) if stroke.kind in STAMPS else None,
-    )  # fmt: skip
     lagged = places[:1]
     for place in places[1:]:
         # Released, the stroke ends at the pointer.
         string = stroke.stabilizer if len(lagged) + 1 < len(places) else 0.0
         lagged.append(pull(lagged[-1], place, string))
     path = LAYS[stroke.path](places[0], places[-1]) if stroke.path in LAYS else lagged
-    running = change_stroke(running, queued, partial(lay_path, points=path))
+    stamp = load_stamp(stroke.stamp) if stroke.kind in STAMPS else None
+    begun = start(0, *places[0], stroke.amount, stroke.images, stroke.kind, stroke.strength)
+    begun = replace(begun, accumulate=stroke.accumulate, stamp=stamp)
+    running, queued = queue_stroke(running, lay_path(begun, path))
     first = running.state.period
     while find_stroke(running, queued) is not None:
         running = _tick(running)

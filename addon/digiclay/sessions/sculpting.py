@@ -18,14 +18,13 @@ from ..core.model.fingers import MOST_FINGERS
 from ..core.scene.assembly import assemble
 from ..core.scene.schema import Scene
 from ..core.session import accuracy, live_session, recent_trace, snapshot
-from ..core.shapes.heightmap import HeightMap
 from ..device.instant import CLEARANCE, find_ellipsoid
 from ..strokes import drawn
 from ..strokes.motion import DRAG, follow, follow_images
 from ..strokes.motion import begin as begin_stroke
 from ..strokes.nominal import Device
 from ..strokes.pose import turn_image
-from ..strokes.stroke import ALONE, FINISHING, Brush, Image, Stroke, start
+from ..strokes.stroke import FINISHING, Brush, Stroke
 from ..strokes.sweep import SWEEPS, WHOLE, finish, order_all, sweep
 from ..strokes.tracking import find_blister, find_tracking
 from ..ui_text import localize
@@ -400,15 +399,11 @@ def reset(running: Running) -> Running:
     return replace(back, gestures=(before,), trace=replace(back.trace, rows=back.trace.rows[:0]), errors=None)
 
 
-def queue_stroke(
-    running: Running, x: float, y: float, depth: float, images: tuple[Image, ...] = ALONE,
-    brush: Brush = Brush.LOWER, share: float = 1.0, lean: tuple[float, float] = (0.0, 0.0),
-    *, accumulate: bool = False, stamp: HeightMap | None = None,
-) -> tuple[Running, int]:  # fmt: skip
-    """Queue the stroke of a mouse that goes down at a place; return its number as well; see `Sample`."""
+def queue_stroke(running: Running, stroke: Stroke) -> tuple[Running, int]:
+    """Queue a stroke under the next number; return that as well."""
     number = running.begun_strokes + 1
-    begun = start(number, x, y, depth, images, brush, share, lean, accumulate=accumulate, stamp=stamp)
-    return replace(running, strokes=(*running.strokes, begun), begun_strokes=number), number
+    strokes = (*running.strokes, replace(stroke, number=number))
+    return replace(running, strokes=strokes, begun_strokes=number), number
 
 
 def find_stroke(running: Running, number: int) -> Stroke | None:

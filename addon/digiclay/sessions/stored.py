@@ -6,7 +6,7 @@ from ..core.base.arrays import Floats
 from ..core.session.live_session import Moment
 from ..strokes import drawn
 from .running import Gesture, Running, name_fingers
-from .sculpting import Numbers, drop_strokes, restore
+from .sculpting import Numbers, drop_strokes, queue_stroke, restore
 
 
 def take_up(
@@ -38,8 +38,7 @@ def take_up(
 def add_strokes(running: Running, lines: list[str]) -> Running:
     """Return the session with strokes of `drawn` queued, without those that are none."""
     for line in lines:
-        stroke = drawn.load(line, running.begun_strokes + 1)
+        stroke = drawn.load(line)
         if stroke is not None:
-            strokes = (*running.strokes, stroke)
-            running = replace(running, strokes=strokes, begun_strokes=stroke.number)
+            running, _ = queue_stroke(running, stroke)
     return running

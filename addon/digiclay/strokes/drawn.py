@@ -22,7 +22,7 @@ def dump(stroke: Stroke) -> str:
     return json.dumps([stroke.brush.value, stroke.accumulate, stroke.images, samples, stamp])
 
 
-def load(line: str, number: int) -> Stroke | None:
+def load(line: str) -> Stroke | None:
     """Return the stroke of a line, to be formed from its beginning; None for a line that is none."""
     try:
         brush, accumulate, images, samples, stamp = json.loads(line)
@@ -32,7 +32,7 @@ def load(line: str, number: int) -> Stroke | None:
         depths = [sample.depth for sample in path]
         if not (sizes < LARGEST).all() or min(depths) < SHALLOWEST or max(depths) > DEEPEST:
             return None
-        kept = None if stamp is None else make_height_map(str(stamp[0]), np.array(stamp[1]))
-        return Stroke(number, path, Brush(brush), turns, bool(accumulate), kept, held=False)
+        shape = None if stamp is None else make_height_map(str(stamp[0]), np.array(stamp[1]))
+        return Stroke(0, path, Brush(brush), turns, bool(accumulate), shape, held=False)
     except (DigiclayError, ValueError, TypeError, IndexError, RecursionError):
         return None

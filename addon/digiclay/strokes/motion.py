@@ -80,8 +80,8 @@ DOWN = (PRESSING, RISING, DRAGGING, LEAVING)
 
 
 @dataclass(frozen=True, eq=False)
-class Way:
-    """Device, control period, s, and height above all pins, m, in which a fingertip goes its way."""
+class Workspace:
+    """Device, control period, s, and height above all pins, m, for a fingertip on its path."""
 
     device: Device
     period: float
@@ -160,15 +160,15 @@ def follow(
         stroke = stroke if firm else alter(stroke, waited=0)
         # No farther than to where the force may count.
         count = _count_even(stroke, device, pose, count, period) if drags else count
-    way, path = Way(device, period, find_safe(stroke, device, now)), [pose]
+    space, path = Workspace(device, period, find_safe(stroke, device, now)), [pose]
     while len(path) <= count and stroke.phase not in (FINISHING, DONE):
-        step = _step(stroke, way, path[-1][:3].tolist())
+        step = _step(stroke, space, path[-1][:3].tolist())
         if step is None:
             break
         before, (stroke, place) = stroke, step
         if (stroke.phase, stroke.image) != (before.phase, before.image):
-            way = replace(way, safe=find_safe(stroke, device, now))
-        turn = _turn(stroke, path[-1][3:], place[2] >= way.safe - TIE, period)
+            space = replace(space, safe=find_safe(stroke, device, now))
+        turn = _turn(stroke, path[-1][3:], place[2] >= space.safe - TIE, period)
         path.append(np.array([*place, *turn]))
         if stroke.phase != before.phase:
             break
@@ -177,8 +177,8 @@ def follow(
 
 def _look_down(stroke: Stroke, device: Device, now: Floats, x: float, y: float) -> Stroke:
     """Return the stroke of a fingertip above a place, where it comes down to pins at heights (n,), m."""
-    stroke, way = replace(stroke, standing=now.copy()), Way(device, 0.0, 0.0)
-    touch, lowest = way.find_touch(stroke, x, y), way.find_lowest(stroke, x, y)
+    stroke, space = replace(stroke, standing=now.copy()), Workspace(device, 0.0, 0.0)
+    touch, lowest = space.find_touch(stroke, x, y), space.find_lowest(stroke, x, y)
     slopes = touch - device.find_surface(now, x, y) > UNEVEN
     return replace(stroke, touch=touch, slopes=slopes, lowest=lowest)
 
@@ -248,7 +248,7 @@ def _follow_once(
         part = alter(parts[image], samples=samples, held=stroke.held)
         # One that waits lets pass whoever is down: none has to lift again from the clay.
         others = parts if part.phase == YIELDING else parts[:image]
-        down = [at[one.image] for one in others if one.image in at and one.phase in DOWN]
+        down = [at[other.image] for other in others if other.image in at and other.phase in DOWN]
         part = _yield(part, parts[:image], down, device, now, pose)
         if part.phase == PRESSING and not _stands(part, pose):
             part = replace(part, standing=None)
@@ -361,39 +361,39 @@ def leave(stroke: Stroke) -> Stroke:
     return replace(stroke, phase=FINISHING if stroke.tracking else DONE, waited=0)
 
 
-def _step(stroke: Stroke, way: Way, place: Point) -> tuple[Stroke, Point] | None:
+def _step(stroke: Stroke, space: Workspace, place: Point) -> tuple[Stroke, Point] | None:
     """Return the stroke after a control period, and where the fingertip is then; None: it has to wait."""
     x, y, z = place
     if stroke.phase == ABOVE:
-        return cross(stroke, place, way.safe, way.period)
+        return cross(stroke, place, space.safe, space.period)
     if stroke.phase in (LEAVING, YIELDING):
         # Pins that look for the fingertip are not to find it again.
         lift = max(DESCEND, OUTRUN * stroke.tracking.speed) if stroke.tracking else DESCEND
-        above = min(way.safe, z + lift * way.period)
+        above = min(space.safe, z + lift * space.period)
         if stroke.phase == YIELDING:
             return stroke, (x, y, max(z, above))
-        return (leave(stroke) if above >= way.safe - TIE else stroke), (x, y, above)
+        return (leave(stroke) if above >= space.safe - TIE else stroke), (x, y, above)
     if stroke.brush in STAMPS:
-        return _wait_for_stamp(stroke, way, place)
+        return _wait_for_stamp(stroke, space, place)
     if stroke.phase == PRESSING:
-        return _press(stroke, way, place)
+        return _press(stroke, space, place)
     if stroke.phase == RISING:
-        stroke, z = _climb(stroke, z, stroke.lowest, way.period)
+        stroke, z = _climb(stroke, z, stroke.lowest, space.period)
         return replace(stroke, phase=DRAGGING if abs(z - stroke.lowest) < TIE else RISING), (x, y, z)
-    return _drag_on(stroke, way, place)
+    return _drag_on(stroke, space, place)
 
 
-def _wait_for_stamp(stroke: Stroke, way: Way, place: Point) -> tuple[Stroke, Point] | None:
+def _wait_for_stamp(stroke: Stroke, space: Workspace, place: Point) -> tuple[Stroke, Point] | None:
     """Wait above the pins until the hand has drawn how large the stamp is; the valves form all its images."""
     x, y, z = place
     if stroke.held:
         return None
-    if z < way.safe - TIE:
-        return stroke, (x, y, min(way.safe, z + DESCEND * way.period))
+    if z < space.safe - TIE:
+        return stroke, (x, y, min(space.safe, z + DESCEND * space.period))
     return replace(stroke, phase=FINISHING, image=len(stroke.images) - 1), place
 
 
-def _press(stroke: Stroke, way: Way, place: Point) -> tuple[Stroke, Point]:
+def _press(stroke: Stroke, space: Workspace, place: Point) -> tuple[Stroke, Point]:
     """Come down to the pins, and press into them: to the depth of the stroke, or until a blister starts."""
     x, y, z = place
     lowest, touch, after, fastest = stroke.lowest, stroke.touch, DRAGGING, PRESS
@@ -402,23 +402,23 @@ def _press(stroke: Stroke, way: Way, place: Point) -> tuple[Stroke, Point]:
         fastest = min(stroke.tracking.sink_speed, PRESS if stroke.slopes else math.inf)
         if stroke.brush is not Brush.LOWER:
             pressed = max(0.0, touch - stroke.tracking.press)
-            lowest, after = way.pass_over_locked(stroke, x, y, pressed), RISING
+            lowest, after = space.pass_over_locked(stroke, x, y, pressed), RISING
     touch = max(touch, lowest)
     if stroke.tracking:
         # Stopped at once it would be lost: the pins below it go on.
         braked = math.sqrt(2.0 * SUDDEN * max(z - lowest, 0.0))
-        fastest = min(fastest, max(braked, SUDDEN * way.period))
+        fastest = min(fastest, max(braked, SUDDEN * space.period))
     # One limit after the other, the last that it comes to.
     for end, speed in ((touch + CLEARANCE, DESCEND), (touch, APPROACH), (lowest, fastest)):
         if z > end + TIE:
-            z = max(end, z - speed * way.period)
+            z = max(end, z - speed * space.period)
             break
     return alter(stroke, phase=after if z - lowest < TIE else PRESSING), (x, y, z)
 
 
-def _drag_on(stroke: Stroke, way: Way, place: Point) -> tuple[Stroke, Point] | None:
+def _drag_on(stroke: Stroke, space: Workspace, place: Point) -> tuple[Stroke, Point] | None:
     """Go along the path at the height of the stroke; a blister goes along where the fingertip is near it."""
-    (x, y, z), tracking, device = place, stroke.tracking, way.device
+    (x, y, z), tracking, device = place, stroke.tracking, space.device
     lowest = stroke.lowest
     if tracking is None or abs(z - lowest) <= SLACK:
         if stroke.drawn and abs(z - lowest) < TIE:
@@ -431,16 +431,16 @@ def _drag_on(stroke: Stroke, way: Way, place: Point) -> tuple[Stroke, Point] | N
                 near = stroke.ground[device.grid.disc(x, y, tracking.radius)]
                 change = float(np.abs(near - z - tracking.sink).max(initial=0.0))
             speed = tracking.limit_drag(change, pressed=stroke.brush is Brush.LOWER)
-            speed = min(speed, stroke.pace + HURRY * way.period)
-        dragged = drag(stroke, device, x, y, speed * way.period)
+            speed = min(speed, stroke.pace + HURRY * space.period)
+        dragged = drag(stroke, device, x, y, speed * space.period)
         if dragged is None:
             return None
         stroke, x, y = dragged
-        lowest = way.find_lowest(stroke, x, y)
+        lowest = space.find_lowest(stroke, x, y)
         stroke = alter(stroke, pace=speed if tracking else 0.0, lowest=lowest)
     if tracking is None:
-        return stroke, (x, y, max(lowest, z - PRESS * way.period) if z > lowest else lowest)
-    stroke, z = _climb(stroke, z, lowest, way.period)
+        return stroke, (x, y, max(lowest, z - PRESS * space.period) if z > lowest else lowest)
+    stroke, z = _climb(stroke, z, lowest, space.period)
     return stroke, (x, y, z)
 
 

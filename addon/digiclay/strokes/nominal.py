@@ -138,35 +138,35 @@ def _mark(nominal: Nominal, stroke: Stroke, device: Device, image: Image, index:
     length = math.hypot(sample.x - last.x, sample.y - last.y)
     parts = max(1, math.ceil(length / device.grid.layout.pitch - TIE))
     row = [_between(last, sample, part / parts) for part in range(parts + 1)]
-    places = [image.place(one.x, one.y) for one in row]
+    places = [image.place(point.x, point.y) for point in row]
     level = device.find_level(stroke, image, nominal.before)
     tops = [
-        device.find_top(stroke, one, place, nominal.ground, level)
-        for one, place in zip(row, places, strict=True)
+        device.find_top(stroke, point, place, nominal.ground, level)
+        for point, place in zip(row, places, strict=True)
     ]
     reach = device.reach + 0.5 * length / parts
     for part, (start, end) in enumerate(pairwise(places)):
         cells = device.grid.disc(0.5 * (start[0] + end[0]), 0.5 * (start[1] + end[1]), reach)
         if device.locked is not None:
             cells = cells[~device.locked[cells]]
-        own, now = nominal.ground[cells], nominal.height[cells]
+        ground, now = nominal.ground[cells], nominal.height[cells]
         if device.blister is None:
             under = find_undersides(device, stroke, image, row[part + 1].lean, end, cells)
-            change = tops[part + 1] + under - own
+            change = tops[part + 1] + under - ground
         else:
             distance, share = _measure(device.grid, cells, start, end)
             section = device.blister.evaluate_profile(distance).clip(0.0, 1.0)
             section[distance > device.reach] = 0.0
             if level is None:
-                way = tops[part] + share * (tops[part + 1] - tops[part]) - own
+                full = tops[part] + share * (tops[part + 1] - tops[part]) - ground
             else:
-                one, other = row[part].share, row[part + 1].share
-                way = (one + share * (other - one)) * (level - own)
-            change = section * way
+                before, after = row[part].share, row[part + 1].share
+                full = (before + share * (after - before)) * (level - ground)
+            change = section * full
         low, high = LIMITS[stroke.brush]
         change = change.clip(low, high)
         nominal.near[cells] = True
-        nominal.height[cells] = np.where(np.abs(change) > np.abs(now - own) + TIE, own + change, now)
+        nominal.height[cells] = np.where(np.abs(change) > np.abs(now - ground) + TIE, ground + change, now)
 
 
 def find_frame(stroke: Stroke, device: Device) -> tuple[float, float]:
@@ -194,8 +194,8 @@ def _stamp(nominal: Nominal, stroke: Stroke, device: Device) -> Nominal:
     for image in stroke.images:
         x, y = image.trace(grid.x, grid.y)
         x, y = x - first.x, y - first.y
-        own = Grid(grid.layout, cos * x + sin * y, cos * y - sin * x)
-        rise = np.maximum(rise, stroke.stamp.tops(own, Placement(scale[1], scale[0], -half, -half)).value)
+        turned = Grid(grid.layout, cos * x + sin * y, cos * y - sin * x)
+        rise = np.maximum(rise, stroke.stamp.tops(turned, Placement(scale[1], scale[0], -half, -half)).value)
     if device.locked is not None:
         rise[device.locked] = 0.0
     height = nominal.before + (1.0 if stroke.brush is Brush.STAMP else -1.0) * last.depth * rise
@@ -203,25 +203,20 @@ def _stamp(nominal: Nominal, stroke: Stroke, device: Device) -> Nominal:
     return replace(nominal, height=height, near=rise > 0.0)
 
 
-def _between(one: Sample, other: Sample, part: float) -> Sample:
-    """Return the sample at a part of the way between two."""
-
-    def mix(a: float, b: float) -> float:
-        return a + part * (b - a)
-
-    lean = mix(one.lean[0], other.lean[0]), mix(one.lean[1], other.lean[1])
-    place, other_place = (one.x, one.y, one.depth, one.share), (other.x, other.y, other.depth, other.share)
-    x, y, depth, share = map(mix, place, other_place)
-    return Sample(x, y, depth, share, lean)
+def _between(first: Sample, last: Sample, share: float) -> Sample:
+    """Return the sample at a share of the straight line between two."""
+    start, end = (np.array([at.x, at.y, at.depth, at.share, *at.lean]) for at in (first, last))
+    x, y, depth, strength, lean_x, lean_y = (start + share * (end - start)).tolist()
+    return Sample(x, y, depth, strength, (lean_x, lean_y))
 
 
 def _measure(grid: Grid, cells: Cells, start: Place, end: Place) -> tuple[Floats, Floats]:
-    """Return how far cells are from a straight way, (m,), m, and at which part of it they are nearest."""
+    """Return the distance of cells (m,) from a straight line, m, and the share of it where it is nearest."""
     x, y = grid.x[cells] - start[0], grid.y[cells] - start[1]
-    way_x, way_y = end[0] - start[0], end[1] - start[1]
-    square = max(way_x * way_x + way_y * way_y, np.finfo(float).tiny)
-    part = np.clip((x * way_x + y * way_y) / square, 0.0, 1.0)
-    return np.hypot(x - part * way_x, y - part * way_y), part
+    along_x, along_y = end[0] - start[0], end[1] - start[1]
+    square = max(along_x * along_x + along_y * along_y, np.finfo(float).tiny)
+    share = np.clip((x * along_x + y * along_y) / square, 0.0, 1.0)
+    return np.hypot(x - share * along_x, y - share * along_y), share
 
 
 def find_undersides(
@@ -248,27 +243,29 @@ class Ghost:
 
     def has_grown(self, stroke: Stroke, before: Floats) -> bool:
         """Tell whether a stroke, on pins at heights (n,), m, is this one drawn on."""
-        own, count = self.stroke, self.nominal.count
-        same = own.number == stroke.number and own.images == stroke.images and own.turn is stroke.turn
-        same = same and own.samples[count - 1 :][:1] == stroke.samples[count - 1 :][:1]
+        former, count = self.stroke, self.nominal.count
+        same = (
+            former.number == stroke.number and former.images == stroke.images and former.turn is stroke.turn
+        )
+        same = same and former.samples[count - 1 :][:1] == stroke.samples[count - 1 :][:1]
         return same and float(np.abs(self.nominal.before - before).max()) < SAME
 
 
 def find_ghosts(
-    strokes: tuple[Stroke, ...], device: Device, height: Floats, kept: tuple[Ghost, ...] = ()
+    strokes: tuple[Stroke, ...], device: Device, height: Floats, former: tuple[Ghost, ...] = ()
 ) -> tuple[Ghost, ...]:
     """Return the ghosts of a queue's strokes that have one, on pins at heights (n,), m.
 
-    Those `kept` of an earlier look are drawn on, which takes less time than all of a path.
+    The `former` ones, of an earlier look, are drawn on: that takes less time than a whole path.
     """
-    found: list[Ghost] = []
+    ghosts: list[Ghost] = []
     for stroke in strokes:
         if stroke.brush in LIMITS or stroke.brush in STAMPS:
             before = height if stroke.height is None else stroke.height
-            same = [one.nominal for one in kept if one.has_grown(stroke, before)]
+            same = [ghost.nominal for ghost in former if ghost.has_grown(stroke, before)]
             nominal = same[0] if same else find_nominal(stroke, device, before)
             if nominal.count < len(stroke.samples):
                 nominal = extend(nominal, stroke, device)
-            found.append(Ghost(stroke, nominal))
+            ghosts.append(Ghost(stroke, nominal))
             height = nominal.height
-    return tuple(found)
+    return tuple(ghosts)

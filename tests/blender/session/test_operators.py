@@ -135,7 +135,7 @@ def test_a_script_finishes_strokes_at_once_and_what_was_in_haste_is_shown(bed: A
     across = [(-6e-3, 0.0), (6e-3, 0.0)]
     for number in (1, 2):
         assert bpy.ops.digiclay.finish_strokes.poll() == (number > 1)
-        running.put(queue_stroke(running.find(bed), -6e-3, 0.0, 4e-3)[0])
+        running.put(queue_stroke(running.find(bed), start(0, -6e-3, 0.0, 4e-3))[0])
         assert bpy.ops.digiclay.finish_strokes.poll() == (number > 1)  # the hand still draws
         running.put(change_stroke(running.find(bed), number, partial(lay_path, points=across)))
     running.put(change_stroke(running.find(bed), 1, partial(replace, held=True)))
@@ -157,7 +157,7 @@ def test_the_ghost_is_there_with_the_queue_and_goes_with_it(bed: Any, clock: Clo
     ghost.plan(bed.session_uid, start(0, 0.0, 0.0, 4e-3))
     assert ghost.find_surface(running.find(bed)).min() == pytest.approx(36e-3, abs=1e-6)
     ghost.plan(bed.session_uid, None)
-    running.put(queue_stroke(running.find(bed), 0.0, 0.0, 4e-3)[0])
+    running.put(queue_stroke(running.find(bed), start(0, 0.0, 0.0, 4e-3))[0])
     surface = ghost.find_surface(running.find(bed))
     assert surface.min() == pytest.approx(36e-3, abs=1e-6)
     way = surface - shown(bed)

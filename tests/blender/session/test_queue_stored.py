@@ -14,7 +14,7 @@ from digiclay.live import beds, handlers, tick
 from digiclay.sessions import running
 from digiclay.sessions.sculpting import change_stroke, queue_stroke
 from digiclay.strokes.stamps import load_stamp
-from digiclay.strokes.stroke import Brush, lay_path, make_images
+from digiclay.strokes.stroke import Brush, lay_path, make_images, start
 
 from tests.blender.session.live import FLOAT32, Clock, exact, only_bed, shown, started, undone
 
@@ -26,7 +26,7 @@ def draw(y: float, **how: Any) -> None:
     """Draw a stroke along a row, as the Press tool does, with its undo step."""
     session = running.find(only_bed())
     path = [(1e-3 * x, 1e-3 * y) for x in ENDS]
-    session, number = queue_stroke(session, *path[0], 3e-3, **how)
+    session, number = queue_stroke(session, start(0, *path[0], 3e-3, **how))
     beds.put(change_stroke(session, number, partial(lay_path, points=path)))
     bpy.ops.ed.undo_push(message="Press")
 

@@ -19,7 +19,7 @@ from digiclay.recorded import takes
 from digiclay.roles import fingertips_of
 from digiclay.sessions import running, sculpting
 from digiclay.settings import properties
-from digiclay.strokes.stroke import make_images
+from digiclay.strokes.stroke import make_images, start
 
 from tests.blender.at_hand import looked, select
 from tests.blender.session.live import Clock, exact, only_bed, shown, started, waits
@@ -284,7 +284,7 @@ def test_a_press_stroke_moves_the_first_fingertip_alone(pair: Any, clock: Clock,
     move(pair, {1: 46.0, 2: 45.0})
     clock.tick(5)
     before = bridge.poses(pair)
-    running.put(sculpting.queue_stroke(running.find(pair), -10e-3, -10e-3, 4e-3)[0])
+    running.put(sculpting.queue_stroke(running.find(pair), start(0, -10e-3, -10e-3, 4e-3))[0])
     clock.until(lambda: shown(pair).min() < 39e-3)
     now = bridge.poses(pair)
     np.testing.assert_allclose(now[1], before[1], rtol=0, atol=1e-6)  # Blender's 32 bits
@@ -334,7 +334,7 @@ def test_animated_fingertips_are_baked_and_takes_of_several_replayed_and_exporte
 @pytest.mark.usefixtures("machine")
 def test_strokes_end_with_the_fingertip_that_goes_along_them_and_say_so(pair: Any, clock: Clock) -> None:
     started(pair)
-    running.put(sculpting.queue_stroke(running.find(pair), 0.0, 0.0, 4e-3)[0])
+    running.put(sculpting.queue_stroke(running.find(pair), start(0, 0.0, 0.0, 4e-3))[0])
     clock.tick(2)
     bpy.data.objects.remove(fingertips_of(pair)[1])
     looked()
@@ -387,7 +387,9 @@ def test_a_symmetric_stroke_survives_saving_undo_and_a_stop_in_its_middle(pair, 
     images = make_images("RADIAL", 2)
 
     def press_down() -> int:
-        session, number = sculpting.queue_stroke(running.find(only_bed()), 14e-3, 8e-3, 3e-3, images)
+        session, number = sculpting.queue_stroke(
+            running.find(only_bed()), start(0, 14e-3, 8e-3, 3e-3, images)
+        )
         running.put(session)
         clock.until(lambda: (running.find(only_bed()).state.finger_forces() > 0.01).sum() == 2)
         return number

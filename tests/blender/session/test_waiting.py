@@ -10,6 +10,7 @@ from digiclay.live import beds, handlers, tick
 from digiclay.roles import fingertip_of
 from digiclay.sessions import running
 from digiclay.sessions.sculpting import queue_stroke, withdraw_stroke
+from digiclay.strokes.stroke import start
 
 from tests.blender.session.live import FLOAT32, Clock, goes_on, press, shown, started, waits
 
@@ -73,7 +74,7 @@ def test_a_session_waits_while_it_is_hindered(bed, clock, hinder, words, free):
 @pytest.mark.usefixtures("machine")
 def test_a_stroke_taken_back_in_edit_mode_is_drawn_so_afterwards(bed: Any, clock: Clock) -> None:
     started(bed)
-    running.put(queue_stroke(running.find(bed), 0.0, 0.0, 4e-3)[0])
+    running.put(queue_stroke(running.find(bed), start(0, 0.0, 0.0, 4e-3))[0])
     clock.until(lambda: shown(bed).min() < 39e-3)
     edit()
     clock.tick()
