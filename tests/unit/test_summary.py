@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from digiclay.core.base.errors import ParameterError
 from digiclay.core.base.modes import Mode
-from digiclay.core.metrics.metric_table import METRICS, describe_losses
+from digiclay.core.metrics.metric_table import METRICS
 from digiclay.core.metrics.summary import (
     BORDER,
     SPATIAL_RESOLUTION,
@@ -19,7 +19,6 @@ from digiclay.core.metrics.summary import (
     compute_metrics,
     compute_rfd,
     compute_weights,
-    find_losses,
     find_weber_fractions,
     measure_amplitude,
     measure_frequency,
@@ -477,46 +476,3 @@ def test_of_two_fingers_the_lower_one_presses_a_pin_between_them_that_stands_low
 )
 def test_the_worst_of_several_fingers_is_told(name, each, worst):
     assert take_worst([{name: value} for value in each]) == {name: worst}
-
-
-@table(
-    "touching, quick, wanted",
-    {
-        "lost until the end": ([(0.0, 4.0)], 99.0, [(4.0, 6.0)]),
-        "felt again, then lifted": ([(0.0, 4.0), (6.5, 9.0)], 8.9, [(4.0, 2.5)]),
-        "lost, and lifted later": ([(0.0, 4.0)], 7.0, [(4.0, 3.0)]),
-        "lifted": ([(0.0, 4.0)], 3.95, []),
-        "lost twice": ([(0.0, 4.0), (4.5, 5.0)], 99.0, [(4.0, 0.5), (5.0, 5.0)]),
-        "never felt": ([], 99.0, []),
-    },
-)
-def test_a_finger_is_lost_where_contact_ends_though_it_rises_no_faster_than_a_pin(touching, quick, wanted):
-    """At 20 mm/s from the time `quick` on it is at 30 mm/s, where pins rise at 24."""
-    felt = np.any([(start <= TIME) & (end >= TIME) for start, end in touching], axis=0) & (TIME >= 0.0)
-    height = 20e-3 * TIME + 10e-3 * np.maximum(TIME - quick, 0.0)
-    found = find_losses(TIME, 0.4 * felt, height, 24e-3)
-    # A row is 5 ms.
-    assert [tuple(one) for one in found] == [pytest.approx(one, abs=11e-3) for one in wanted]
-
-
-@pytest.mark.parametrize("rows", [1, 2])
-def test_a_history_of_a_row_or_two_has_no_losses_unless_contact_ends(rows):
-    """A single row has no gradient."""
-    force, ends = np.array([0.4, 0.0])[:rows], rows - 1
-    assert len(find_losses(TIME[:rows], force, np.zeros(rows), 24e-3)) == ends
-
-
-@pytest.mark.parametrize(
-    "lost, said",
-    [
-        ([(0, 0.0)], ""),
-        ([(1, 2.71)], "lost once, 2.7 s without contact"),
-        ([(0, 0.0), (2, 0.5)], "finger 2 lost 2 times, 0.5 s without contact"),
-        (
-            [(1, 1.0), (1, 3.0)],
-            "finger 1 lost once, 1 s without contact; finger 2 lost once, 3 s without contact",
-        ),
-    ],
-)
-def test_losses_are_told_by_finger_where_there_are_any(lost, said):
-    assert describe_losses({"lost": [{"losses": count, "time": time} for count, time in lost]}) == said
