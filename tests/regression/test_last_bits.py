@@ -33,7 +33,8 @@ from digiclay.strokes.tracking import Tracking
 
 from tests.assemble import sample
 from tests.scenes.test_hands import FINGER as PAPER_FINGER
-from tests.scenes.test_hands import REST
+from tests.scenes.test_hands import PERIOD, REST, press, scene
+from tests.scenes.test_hands import follow as simulate
 from tests.scenes.test_pressed_together import at_times, play, replaying, rock
 
 #: Largest relative change of a number.
@@ -110,6 +111,29 @@ def test_a_run_is_the_same_when_all_it_reads_is_shaken(
         np.testing.assert_allclose(other.row(0), one.row(0), rtol=0.0, atol=HEIGHT, err_msg=period)
         np.testing.assert_allclose(other.row(force), one.row(force), rtol=0.0, atol=FORCE, err_msg=period)
         np.testing.assert_array_equal(other.mode(), one.mode(), period)
+
+
+@pytest.mark.parametrize(
+    ("method", "apart", "depth"),
+    [
+        pytest.param("virtual_master", 15e-3, 2e-3, id="it presses later"),
+        pytest.param("hybrid", 12e-3, 0.0, id="pins rise into it beside another fingertip"),
+    ],
+)
+def test_a_fingertip_at_the_very_height_of_pins_is_as_one_a_rounding_error_above_or_below(
+    method: str, apart: float, depth: float
+) -> None:
+    system = assemble(scene(method, PAPER_FINGER, PAPER_FINGER))
+    poses = press(system, [(1.5e-3, 1.5e-3), (1.5e-3 + apart, 1.5e-3)], (0.0, 12e-3), 120)
+    poses[..., 3:] = LEVEL
+    time = np.arange(120)[:, None] * PERIOD + system.instants
+    ends = []
+    for error in (0.0, -3e-16, 3e-16):
+        poses[:, :, 1, 2] = REST * (1.0 + error) - depth * np.clip(time / 0.2 - 1.0, 0.0, 1.0)
+        ends.append(simulate(system, poses))
+    for state, forces in ends[1:]:
+        np.testing.assert_allclose(state.row(0), ends[0][0].row(0), rtol=0.0, atol=HEIGHT)
+        np.testing.assert_allclose(forces, ends[0][1], rtol=0.0, atol=FORCE)
 
 
 #: Heights off the bed, mm, at places x, y, mm: each with equal heights at places that are none's neighbor.

@@ -42,8 +42,16 @@ def integrated(e, bow, slip, decay, pulp):
 
 
 def solved(e, bow, slip, decay, pulp):
-    push, mean = closed_form.solve_crossing(*(np.array([value]) for value in (e, bow, slip, decay, pulp)))
+    numbers = e, bow, slip, decay, pulp, slip > 0.0
+    push, mean = closed_form.solve_crossing(*(np.array([value]) for value in numbers))
     return float(push[0]), float(mean[0])
+
+
+def test_a_cell_that_touches_by_a_rounding_error_at_the_start_meets_the_finger_then():
+    touching = solved(0.0, 0.0, 2.0, 1.5, 1.0)
+    assert touching[0] < -0.1
+    for e, bow in ((1e-15, 0.0), (0.0, 1e-15)):
+        assert solved(e, bow, 2.0, 1.5, 1.0) == pytest.approx(touching, abs=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -75,7 +83,8 @@ def test_no_size_overflows_and_no_load_pulls(exponent, slip, decay, pulp):
     with np.errstate(all="raise", under="ignore"):
         growth = closed_form.replace_zeros(numbers[0] + numbers[1] * numbers[2])
         push, mean = closed_form.solve_carefully(np.array([exponent]), growth, *numbers)
-        met = closed_form.solve_crossing(np.array([exponent]), np.zeros(1), *numbers)
+        idle = np.array([exponent <= math.log(pulp)])
+        met = closed_form.solve_crossing(np.array([exponent]), np.zeros(1), *numbers, idle)
     assert np.isfinite([push, mean, *met]).all()
     assert mean[0] >= 0.0
     # Not to the last bit: exponents are in the thousands.

@@ -349,7 +349,8 @@ class StepWorkspace:
                 crossing = last <= lost
                 crossing ^= idle
                 if any_true(crossing):
-                    parts = (values[crossing] for values in (exponent, deviation, slip, decay, relaxed))
+                    numbers = exponent, deviation, slip, decay, relaxed, idle
+                    parts = (values[crossing] for values in numbers)
                     push[crossing], mean[crossing] = solve_crossing(*parts)
                     end = exponent + slip + push
                     _tension(end, zero, most, last)

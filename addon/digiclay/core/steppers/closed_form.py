@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.arrays import Floats
+from ..base.arrays import Flags, Floats
 from ..model.contact import LARGEST_EXPONENT
 from ..model.physics import Cell
 
@@ -76,21 +76,21 @@ def solve_carefully(
 
 
 def solve_crossing(
-    exponent: Floats, deviation: Floats, slip: Floats, decay: Floats, pulp: Floats
+    exponent: Floats, deviation: Floats, slip: Floats, decay: Floats, pulp: Floats, idle: Flags
 ) -> tuple[Floats, Floats]:
     """Return ``e(1) - e(0) - slip`` and the mean of ``max(exp(e) - 1, 0)`` as contact begins or ends.
 
-    Contact begins if e(0) is below ``log(pulp)``, and ends if it is above; the instant is exact on a straight
-    path, and of second order on a curved one. `deviation`: chord deviation of the path without load, its mean
-    above the straight line between its ends.
+    Contact begins at ``log(pulp)`` where the pin is `idle` at the start, and ends there where it is not; the
+    instant is exact on a straight path, and of second order on a curved one. `deviation`: chord deviation of
+    the path without load, its mean above the straight line between its ends.
     """
     growth = replace_zeros(slip + decay * pulp)
     slip = np.where(np.abs(slip) < _STILL, _STILL, slip)
     threshold = np.log(pulp)
-    share = _loaded_share(threshold - exponent, slip, growth)
+    share = _loaded_share(threshold - exponent, slip, growth, idle)
     # Mean height of a parabola over the loaded part, from its mean over the whole step.
     exponent = exponent + deviation * share * (3.0 - 2.0 * share)
-    share = _loaded_share(threshold - exponent, slip, growth)
+    share = _loaded_share(threshold - exponent, slip, growth, idle)
     start = np.maximum(exponent, threshold)
     loaded_decay = np.maximum(share * decay, TINY)
     push, mean = solve_carefully(start, replace_zeros(share * growth), share * slip, loaded_decay, pulp)
@@ -101,12 +101,15 @@ def solve_crossing(
     return push, share * (mean - 1.0) + (1.0 - share) * alone
 
 
-def _loaded_share(gap: Floats, slip: Floats, growth: Floats) -> Floats:
-    """Return the share of the step in which a cell is loaded; `gap`: threshold less e(0)."""
+def _loaded_share(gap: Floats, slip: Floats, growth: Floats, idle: Flags) -> Floats:
+    """Return the share of the step in which a cell is loaded; `gap`: threshold less e(0).
+
+    An idle cell that touches at the start may have a gap below 0 by rounding: it meets the finger then.
+    """
     # At the end of contact u has grown from exp(-e(0)) to 1/pulp, by the linear equation.
     shrunk = np.expm1(np.minimum(gap, 0.0)) / slip
     leaving = np.log1p(np.maximum(growth * shrunk, _ALL_BUT_GONE)) / growth
-    share: Floats = np.where(gap >= 0.0, 1.0 - gap / slip, leaving)
+    share: Floats = np.where(idle, 1.0 - gap / slip, leaving)
     return np.minimum(np.maximum(share, 0.0), 1.0)
 
 
@@ -160,7 +163,7 @@ def find_loaded_path(
     mean -= 1.0
     crossing = (_exponential(exponent + slip + push) <= start.relaxed) != idle
     if crossing.any():
-        parts = (values[crossing] for values in (exponent, start.deviation, slip, decay, start.relaxed))
+        parts = (values[crossing] for values in (exponent, start.deviation, slip, decay, start.relaxed, idle))
         push[crossing], mean[crossing] = solve_crossing(*parts)
     rise = _limit(m, to_load, start, free + push / m)
     return rise, exponent + (m * rise - start.lift), mean
