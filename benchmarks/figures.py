@@ -26,6 +26,10 @@ ROOT = Path(__file__).parents[1]
 RESULTS = Path(__file__).with_name("results")
 #: A number of a page, and what is between its thousands.
 NUMBER, THOUSANDS = re.compile(r"\d+(?:\.\d+)?"), re.compile(r"(?<=\d)[ ,](?=\d{3}\b)")
+#: A cell of a table that begins with a number, as a measured one does.
+MEASURED = re.compile(r"[*~]*\d[\d.]*( \d{3})*( ?([µmnp]?[msNA]|mm/s|x|%|MB|million))?\b")
+#: A row with a day says when and by which command others were measured.
+DATE = re.compile(r"\d{4}-\d\d-\d\d")
 #: Factors of units that only pages have, beside `FACTORS`.
 UNITS = {**FACTORS, "ms": 1e3, "nm": 1e9, "pm": 1e12, "µN": 1e6, "nN": 1e9, "million": 1e-6}
 #: A figure where its row of the table says nothing else: two digits may be off by 5 %.
@@ -61,6 +65,21 @@ def read_figures(page: str | None = None) -> list[Row]:
                 }
                 figures += [{**row, **found, "where": row["where"] | where | dict(*own)}] if metric else []
     return figures
+
+
+def list_measured_rows(text: str) -> list[str]:
+    """Return the rows of a page's tables that have a measured number in a cell other than the first."""
+    lines = (line for line in text.splitlines() if line.startswith("|") and not DATE.search(line))
+    rows = (" ".join(line.split()) for line in lines)
+    return [row for row in rows if any(MEASURED.match(cell.strip()) for cell in row[1:-1].split("|")[1:])]
+
+
+def describe_uncompared(page: str) -> str:
+    """Return which rows of a page's tables no figure is of, in a line."""
+    behind = [figure["behind"] for figure in read_figures(page)]
+    rows = list_measured_rows((ROOT / page).read_text(encoding="utf-8"))
+    left = [row.split("|")[1].strip() for row in rows if not any(text in row for text in behind)]
+    return f"{page}: rows not compared: {'; '.join(left)}" if left else ""
 
 
 @cache
@@ -123,5 +142,6 @@ def measure(arguments: argparse.Namespace, steps: Steps) -> Report:
     chosen = [figure for figure in figures if not (arguments.quick and figure["slow"])]
     rows = [judge(figure) for figure in steps.through(chosen, lambda figure: figure["page"])]
     stale = sum(row["stale"] != "" for row in rows)
-    lines = [*tabulate(rows, COLUMNS, 4), f"{stale} of {len(rows)} figures are stale."]
+    left = filter(None, map(describe_uncompared, dict.fromkeys(figure["page"] for figure in figures)))
+    lines = [*tabulate(rows, COLUMNS, 4), "", *left, f"{stale} of {len(rows)} figures are stale."]
     return Report(lines, rows, failed=stale > 0)
