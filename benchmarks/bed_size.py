@@ -29,15 +29,25 @@ PATH = ((0.0, 0.0, 42.0), (0.3, 0.0, 36.5), (0.8, 6.0, 40.0), (1.3, 12.0, 44.0),
 #: Kind and format of exports: every format of the solid, and the other kinds in one.
 EXPORTS = (*(("solid", name) for name in FORMATS), ("surface", "stl"), ("pins", "stl"), ("features", "stl"))
 SCALE = {
-    "pins": "pins d", "taking part": "gathered .1f", "period, µs": "period .0f 1e6",
-    "to smallest": "ratio .2f", "CPU mean, µs": "mean .0f 1e6", "built in, ms": "built .3g 1e3",
+    "pins": "pins d",
+    "taking part": "gathered .1f",
+    "period, µs": "period .0f 1e6",
+    "to smallest": "ratio .2f",
+    "CPU mean, µs": "mean .0f 1e6",
+    "built in, ms": "built .3g 1e3",
     "bytes a pin": "bytes_a_pin .1f",
-}  # fmt: skip
+}
 EXPORT = {
-    "mesh": "kind", "format": "file", "pins": "pins d", "triangles": "triangles d", "made in, s": "made .3g",
-    "written in, s": "written .3g", "file, MB": "size .3g", "memory, MB": "peak .3g",
+    "mesh": "kind",
+    "format": "file",
+    "pins": "pins d",
+    "triangles": "triangles d",
+    "made in, s": "made .3g",
+    "written in, s": "written .3g",
+    "file, MB": "size .3g",
+    "memory, MB": "peak .3g",
     "bytes a pin": "bytes_a_pin .0f",
-}  # fmt: skip
+}
 
 
 def scene(side: int) -> Scene:
@@ -79,9 +89,13 @@ def _time_bed(side: int, repeats: int) -> dict[str, float]:
         spent += [b - a for a, b in pairwise(moments)]
     build, period, mean = (statistics.median(times) for times in (built, spent, means))
     return {
-        "pins": side * side, "built": build, "period": period, "mean": mean,
-        "gathered": statistics.fmean(gathered), "bytes_a_pin": measure_bytes(side) / side**2,
-    }  # fmt: skip
+        "pins": side * side,
+        "built": build,
+        "period": period,
+        "mean": mean,
+        "gathered": statistics.fmean(gathered),
+        "bytes_a_pin": measure_bytes(side) / side**2,
+    }
 
 
 def measure(arguments: argparse.Namespace, steps: Steps) -> Report:
@@ -127,9 +141,15 @@ def export(side: int, kind: str, file: str) -> dict[str, Any]:
         finally:
             tracemalloc.stop()
         return {
-            "pins": side * side, "kind": kind, "file": file, "triangles": triangles, "made": made - started,
-            "written": done - made, "size": path.stat().st_size / 1e6, "peak": peak / 1e6,
-        }  # fmt: skip
+            "pins": side * side,
+            "kind": kind,
+            "file": file,
+            "triangles": triangles,
+            "made": made - started,
+            "written": done - made,
+            "size": path.stat().st_size / 1e6,
+            "peak": peak / 1e6,
+        }
 
 
 def measure_export(arguments: argparse.Namespace, steps: Steps) -> Report:

@@ -34,9 +34,16 @@ DATE = re.compile(r"\d{4}-\d\d-\d\d")
 UNITS = {**FACTORS, "ms": 1e3, "nm": 1e9, "pm": 1e12, "µN": 1e6, "nN": 1e9, "million": 1e-6}
 #: A figure where its row of the table says nothing else: two digits may be off by 5 %.
 USUAL: Row = {
-    "number": 1, "scene": PAPER, "set": [], "off": 0.05, "slow": False, "stored": "", "where": {}, "head": "",
+    "number": 1,
+    "scene": PAPER,
+    "set": [],
+    "off": 0.05,
+    "slow": False,
+    "stored": "",
+    "where": {},
+    "head": "",
     "rows": [],
-}  # fmt: skip
+}
 
 
 @cache
@@ -128,9 +135,15 @@ def judge(figure: Row) -> Row:
 
 
 COLUMNS = {
-    "page": "page", "behind": "behind", "figure": "of", "unit": "unit", "of the page": "there .4g",
-    "of the source": "now .4g", "source": "source", "": "stale",
-}  # fmt: skip
+    "page": "page",
+    "behind": "behind",
+    "figure": "of",
+    "unit": "unit",
+    "of the page": "there .4g",
+    "of the source": "now .4g",
+    "source": "source",
+    "": "stale",
+}
 
 
 def measure(arguments: argparse.Namespace, steps: Steps) -> Report:

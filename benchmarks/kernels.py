@@ -92,16 +92,21 @@ def measure(arguments: argparse.Namespace, steps: Steps) -> Report:
     kinds = [[row for row in rows if row["kernel"] == name] for name in kernels if name != REFERENCE]
     shown = [
         {
-            "kernel": own[0]["kernel"], "runs": len(own),
+            "kernel": own[0]["kernel"],
+            "runs": len(own),
             **{key: max(row[key] for row in own) for key in ("height", "force", "modes")},
             "run": max(own, key=lambda row: row["height"])["run"],
         }
         for own in kinds
-    ]  # fmt: skip
+    ]
     columns = {
-        "kernel": "kernel", "runs": "runs", "height (µm)": "height .2g 1e6", "force (mN)": "force .2g 1e3",
-        "modes": "modes", "run of the largest": "run",
-    }  # fmt: skip
+        "kernel": "kernel",
+        "runs": "runs",
+        "height (µm)": "height .2g 1e6",
+        "force (mN)": "force .2g 1e3",
+        "modes": "modes",
+        "run of the largest": "run",
+    }
     title = f"\nlargest differences from {REFERENCE}; modes: of so many pins at once\n"
     return Report([title, *tabulate(shown, columns)], rows)
 

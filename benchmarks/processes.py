@@ -76,9 +76,12 @@ def measure_commits(arguments: argparse.Namespace, steps: Steps) -> Report:
     keys = ("case", "old_us", "new_us", "ratio", "least", "largest", "to_first")
     rows = [dict(zip(keys, row, strict=True)) for row in zip([*CASES, START], *figures, strict=True)]
     columns = {
-        "case": "case", f"old, {names[0]} (µs)": "old_us .0f", f"new, {names[1]} (µs)": "new_us .0f",
-        **{key: f"{key} .2f" for key in keys[3:-1]}, f"new, to {next(iter(CASES))}": "to_first .2f",
-    }  # fmt: skip
+        "case": "case",
+        f"old, {names[0]} (µs)": "old_us .0f",
+        f"new, {names[1]} (µs)": "new_us .0f",
+        **{key: f"{key} .2f" for key in keys[3:-1]},
+        f"new, to {next(iter(CASES))}": "to_first .2f",
+    }
     title = f"\nprocessor time of a control period, and of a command; medians of {turns} turns\n"
     return Report([title, *tabulate(rows, columns)], rows)
 
@@ -101,9 +104,14 @@ def run_python(tree: Path, who: str, *words: str, python: str = sys.executable, 
     paths = os.pathsep.join([str(tree / "addon"), str(tree)])
     environment = {**os.environ, "PYTHONPATH": paths, "OPENBLAS_NUM_THREADS": "1", **change}
     done = subprocess.run(
-        [python, *words], cwd=tree, env=environment, capture_output=True, text=True, timeout=LONGEST,
+        [python, *words],
+        cwd=tree,
+        env=environment,
+        capture_output=True,
+        text=True,
+        timeout=LONGEST,
         check=False,
-    )  # fmt: skip
+    )
     if done.returncode:
         raise DigiclayError(f"{who} failed: {done.stderr.strip().rpartition(chr(10))[2][:200]}.")
     return done.stdout

@@ -24,10 +24,11 @@ Row = Mapping[str, Any]
 #: Okabe and Ito's palette: of the first and second line.
 BLUE, RED = LINES[:2]
 LOOK = STYLE | {
-    "font.size": 10, "axes.titlesize": 11, "figure.dpi": 150,
-    "axes.prop_cycle": f"cycler(linestyle=['-', '--', ':']) * "
-    f"cycler(color={[*LINES]}, marker={[*'os^DvX']})",
-}  # fmt: skip
+    "font.size": 10,
+    "axes.titlesize": 11,
+    "figure.dpi": 150,
+    "axes.prop_cycle": f"cycler(linestyle=['-', '--', ':']) * cycler(color={[*LINES]}, marker={[*'os^DvX']})",
+}
 #: Size of a panel of `Curves`, and height of the legend below, inches; most columns of both.
 PANEL, LEGEND, COLUMNS = (4.4, 3.6), 1.2, 3
 

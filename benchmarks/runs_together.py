@@ -26,8 +26,12 @@ STUDIES: dict[str, tuple[str, str, float, float]] = {
 }
 #: Columns of the tables: runs a second.
 COLUMNS = {
-    "": "what", "runs": "runs d", "alone": "alone .3g", "in one call": "together .3g", "times": "times .1f",
-}  # fmt: skip
+    "": "what",
+    "runs": "runs d",
+    "alone": "alone .3g",
+    "in one call": "together .3g",
+    "times": "times .1f",
+}
 
 
 def study(scene: Scene, name: str, count: int) -> list[Scene]:
@@ -47,9 +51,10 @@ def _compare(scene: Scene, name: str, count: int, repeats: int) -> list[Row]:
         "simulated": (lambda: run(bare), lambda: list(run_together(plain))),
         "recorded and judged": (lambda: evaluate(middle), lambda: list(measure_together(scenes))),
         "errors estimated too": (
-            lambda: evaluate(middle, errors=True), lambda: list(measure_together(scenes, errors=True)),
+            lambda: evaluate(middle, errors=True),
+            lambda: list(measure_together(scenes, errors=True)),
         ),
-    }  # fmt: skip
+    }
     rows: list[Row] = []
     for what, pair in works.items():
         one, all_runs = time_by_turns(pair, repeats)

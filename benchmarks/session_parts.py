@@ -191,25 +191,37 @@ PARTS = {
 #: Part of the core's files, by the beginning of their path. A function's time counts for its file's part;
 #: that of functions of other files (numpy's, small helpers) for their callers'.
 FILES = {
-    "model/trajectory": "contact", "model/touch": "contact", "model/fingertip": "contact",
-    "control/": "control", "model/sensors": "control",
-    "steppers/": "integrate", "model/": "integrate",
+    "model/trajectory": "contact",
+    "model/touch": "contact",
+    "model/fingertip": "contact",
+    "control/": "control",
+    "model/sensors": "control",
+    "steppers/": "integrate",
+    "model/": "integrate",
     "scene/recorder": "observe",
     "engine/": "the rest",
-}  # fmt: skip
+}
 CORE = Path(core.__file__).parent
 #: What can be left out, and its section of the scene.
 TERMS = {
-    "conduit": "conduit", "valve lag": "valve_lag", "dead time": "delay", "relaxation": "relaxation",
+    "conduit": "conduit",
+    "valve lag": "valve_lag",
+    "dead time": "delay",
+    "relaxation": "relaxation",
     "sensors": "sensors",
-}  # fmt: skip
+}
 #: Physics steps that are longer: they cost less too.
 LONGER = "physics step = control period"
 EFFECTS = {
-    "scene": "scene", "calls": "calls g", "µs a period": "seconds .0f 1e6", "bytes a pin": "bytes d",
-    "replayed, µm": "replayed_m .3g 1e6", "mN": "replayed_N .3g 1e3", "live, µm": "live_m .3g 1e6",
+    "scene": "scene",
+    "calls": "calls g",
+    "µs a period": "seconds .0f 1e6",
+    "bytes a pin": "bytes d",
+    "replayed, µm": "replayed_m .3g 1e6",
+    "mN": "replayed_N .3g 1e3",
+    "live, µm": "live_m .3g 1e6",
     "live, mN": "live_N .3g 1e3",
-}  # fmt: skip
+}
 
 
 def measure(arguments: argparse.Namespace, steps: Steps) -> Report:
@@ -323,6 +335,11 @@ def _compare(scene: Scene, full: list[Floats], repeats: int) -> dict[str, Any]:
         for run in (solve(scene, full[2]), solve(scene))
     )
     return {
-        "calls": statistics.median(calls), "seconds": spent / scene.periods, "bytes": 8 * system.rows.count,
-        "replayed_m": replayed[0], "replayed_N": replayed[1], "live_m": live[0], "live_N": live[1],
-    }  # fmt: skip
+        "calls": statistics.median(calls),
+        "seconds": spent / scene.periods,
+        "bytes": 8 * system.rows.count,
+        "replayed_m": replayed[0],
+        "replayed_N": replayed[1],
+        "live_m": live[0],
+        "live_N": live[1],
+    }

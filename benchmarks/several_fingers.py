@@ -146,8 +146,10 @@ def measure_cost(method: str, count: int, repeats: int) -> list[float]:
     works = []
     for fingers in COUNTS:
         depth = PRESSED if method else 39.0
-        ways = [[(0.0, x, y, 41.0), (0.3, x, y, depth), (1.0, x, y, depth), (3.0, x + 10, y + 3, depth)]
-                for x, y in PLACES[:fingers]]  # fmt: skip
+        ways = [
+            [(0.0, x, y, 41.0), (0.3, x, y, depth), (1.0, x, y, depth), (3.0, x + 10, y + 3, depth)]
+            for x, y in PLACES[:fingers]
+        ]
         scene = make_scene(method, ways, 25)
         works.append(partial(simulate, assemble(scene), scene, count))
     return [spent / count for spent in time_by_turns(works, repeats)]
@@ -155,15 +157,20 @@ def measure_cost(method: str, count: int, repeats: int) -> list[float]:
 
 #: Columns of the tables.
 COST = {
-    "method": "method", "one, µs": "one_s .0f 1e6",
+    "method": "method",
+    "one, µs": "one_s .0f 1e6",
     **{f"{count} fingers, times": f"times_{count} .1f" for count in COUNTS[1:]},
-}  # fmt: skip
+}
 NEAR = {
-    "two fingertips, mm apart": "case", "method": "method",
-    "RFD alone, mN": "alone_N .0f 1e3", "other": "alone_other_N .0f 1e3",
-    "together, mN": "together_N .0f 1e3", "other's": "together_other_N .0f 1e3",
-    "largest force, N": "force_N .2f", "in contact, of alone, %": "contact .0f 100",
-}  # fmt: skip
+    "two fingertips, mm apart": "case",
+    "method": "method",
+    "RFD alone, mN": "alone_N .0f 1e3",
+    "other": "alone_other_N .0f 1e3",
+    "together, mN": "together_N .0f 1e3",
+    "other's": "together_other_N .0f 1e3",
+    "largest force, N": "force_N .2f",
+    "in contact, of alone, %": "contact .0f 100",
+}
 
 
 def measure(arguments: argparse.Namespace, steps: Steps) -> list[Report]:

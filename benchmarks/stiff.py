@@ -156,8 +156,11 @@ def scene(case: Case, stepper: str, step: float, period: float) -> Scene:
     rest = sections.get("actuator", {}).get("rest_height", 40e-3)
     sections["recorder"] = "absent"
     sections["simulation"] = {
-        "stepper": stepper, "physics_step": step, "control_period": period, "duration": DURATION,
-    }  # fmt: skip
+        "stepper": stepper,
+        "physics_step": step,
+        "control_period": period,
+        "duration": DURATION,
+    }
     trajectories = [
         {
             "interpolation": "linear" if case.straight else "smooth",
@@ -181,9 +184,13 @@ FINE, ROUGH = 0.2e-3, 0.5e-3
 BOUNDED = ("bernoulli", "richardson", "adaptive")
 #: Columns of the table of costs; 'times' is over the easy case.
 COSTS = {
-    "case": "case", "force, N": "force .2g", "reference, µm": "off .1g 1e6", "numpy calls": "calls g",
-    "times": "ratio .2f", "ill-conditioned": "why",
-}  # fmt: skip
+    "case": "case",
+    "force, N": "force .2g",
+    "reference, µm": "off .1g 1e6",
+    "numpy calls": "calls g",
+    "times": "ratio .2f",
+    "ill-conditioned": "why",
+}
 #: From this height error on, m, a run's own estimate has to show that it is wrong.
 WRONG = 1e-4
 
@@ -358,12 +365,16 @@ def measure(arguments: argparse.Namespace, steps: Steps) -> Report:
             lines.append([name if stepper == steppers[0] else "", stepper, *(run.cell for run in outcomes)])
             rows += [
                 {
-                    "case": name, "stepper": stepper, "step_ms": step * 1e3, "error_um": run.error * 1e6,
-                    "own_estimate_um": run.estimate * 1e6, "stopped": run.stopped,
+                    "case": name,
+                    "stepper": stepper,
+                    "step_ms": step * 1e3,
+                    "error_um": run.error * 1e6,
+                    "own_estimate_um": run.estimate * 1e6,
+                    "stopped": run.stopped,
                     "reference_error_um": off * 1e6,
                 }
                 for step, run in zip(STEPS, outcomes, strict=True)
-            ]  # fmt: skip
+            ]
             if stepper == "bernoulli":
                 broken += _list_broken(name, outcomes, off)
         # The calls of pairs, which several fingers have, are not counted in full.

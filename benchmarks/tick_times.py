@@ -133,12 +133,17 @@ def _time_parts() -> Iterator[defaultdict[str, float]]:
 
     with ExitStack() as left:
         for module, name, part in (
-            (tick, "_read_changes", "read"), (sculpting, "advance", "simulate"),
-            (accuracy, "note", "monitor"), (accuracy, "catch_up", "monitor"),
-            (accuracy, "begin_stretch", "monitor"), (snapshot, "dump", "pack"),
-            (tick, "_move_fingers", "finger"), (tick, "_evaluate", "evaluate"), (live_beds, "write", "store"),
+            (tick, "_read_changes", "read"),
+            (sculpting, "advance", "simulate"),
+            (accuracy, "note", "monitor"),
+            (accuracy, "catch_up", "monitor"),
+            (accuracy, "begin_stretch", "monitor"),
+            (snapshot, "dump", "pack"),
+            (tick, "_move_fingers", "finger"),
+            (tick, "_evaluate", "evaluate"),
+            (live_beds, "write", "store"),
             (view, "show_state", "show"),
-        ):  # fmt: skip
+        ):
             timed = partial(add_time, part, getattr(module, name))
             left.enter_context(patch.object(module, name, timed))
         # Every control period that is due is simulated, however little of the machine others leave, and all
@@ -216,11 +221,15 @@ def measure(arguments: argparse.Namespace, steps: Steps) -> Report:
         parts = list_parts(draw_circles(*bed[:4], count))
         of_bed = [
             {
-                "rows": bed.rows, "columns": bed.columns, "pitch_m": bed.pitch, "ticks": count, "part": name,
+                "rows": bed.rows,
+                "columns": bed.columns,
+                "pitch_m": bed.pitch,
+                "ticks": count,
+                "part": name,
                 **dict(zip(keys, np.quantile(times, SHARES), strict=True)),
             }
             for name, times in parts.items()
-        ]  # fmt: skip
+        ]
         spent = parts["whole tick"]
         name = f"{bed.rows} x {bed.columns} at {1e3 * bed.pitch:g} mm, {count} ticks"
         kept_to = 100.0 * np.mean(spent < bed.goal)
@@ -266,9 +275,12 @@ VIEWPORT = ((25, 25, 5e-3), (100, 100, 10e-3), (250, 400, 40e-3))
 FEW, MANY, SPAN = 40, 200, 33e-3
 #: Parts of the report, each of some of `PARTS`.
 STAGES = {
-    "read": ("read",), "simulate": ("simulate", "monitor"), "keep": ("pack", "finger", "store"),
-    "write": ("show",), "evaluate": ("evaluate",),
-}  # fmt: skip
+    "read": ("read",),
+    "simulate": ("simulate", "monitor"),
+    "keep": ("pack", "finger", "store"),
+    "write": ("show",),
+    "evaluate": ("evaluate",),
+}
 #: Size of the circle the pressed fingertip draws, m, and how deep below the pins at rest, m.
 CIRCLE, PRESSED = 8e-3, 5e-3
 #: How often memory is read in as many ticks as are timed; each time garbage is collected.
@@ -287,10 +299,13 @@ def measure_viewport(arguments: argparse.Namespace, steps: Steps) -> Report:
         for bed in steps.through(VIEWPORT, lambda bed: f"{bed[0] * bed[1]} pins")
     ]
     first = {
-        "pins": "pins d", **{name: f"{name}_s .2f 1e3" for name in STAGES}, "tick": "tick_s .2f 1e3",
-        "goal": "goal g 1e3", "95 % within": "tick_95_s .2f 1e3",
+        "pins": "pins d",
+        **{name: f"{name}_s .2f 1e3" for name in STAGES},
+        "tick": "tick_s .2f 1e3",
+        "goal": "goal g 1e3",
+        "95 % within": "tick_95_s .2f 1e3",
         "memory grown, kB": "growth_bytes .1f 1e-3",
-    }  # fmt: skip
+    }
     skins = {
         "pins alone" if shown == "pins" else f"{shown}, {kind}": f"{shown}_{kind}_s .2f 1e3"
         for shown, kind in SHOWN

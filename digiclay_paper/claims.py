@@ -26,10 +26,13 @@ def claims(results: Results) -> list[Claim]:
     """Return all claims, in the order of the paper."""
     near, far = (f"{distance * MM:g}" for distance in AHEAD)
     words = {
-        "slow": results.slowness.lstrip(","), "radius": f"{evidence.find_radius(results) * MM:g}",
-        "speed": f"{PAPER_SPEED * MM:g} mm/s", "press": f"a quick press of {PRESSED * MM:g} mm",
-        "near": near, "far": far,
-    }  # fmt: skip
+        "slow": results.slowness.lstrip(","),
+        "radius": f"{evidence.find_radius(results) * MM:g}",
+        "speed": f"{PAPER_SPEED * MM:g} mm/s",
+        "press": f"a quick press of {PRESSED * MM:g} mm",
+        "near": near,
+        "far": far,
+    }
     judged = []
     for claim in TEXTS["claim"]:
         shown = getattr(evidence, claim["judge"])(results)

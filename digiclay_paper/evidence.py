@@ -149,9 +149,10 @@ DEVIATIONS = {
 }
 #: Of them, what is compared in the paper's windows, too.
 WINDOWED = {
-    "rfd": ("RFD", 1.0, "N"), "force_deviation": ("total force", 1.0, "N"),
+    "rfd": ("RFD", 1.0, "N"),
+    "force_deviation": ("total force", 1.0, "N"),
     "height_deviation": ("height under the fingertip", MM, "mm"),
-}  # fmt: skip
+}
 
 
 def deviations(results: Results) -> Evidence:

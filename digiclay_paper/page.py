@@ -66,11 +66,21 @@ def format_page(results: Results, judged: list[Claim], pictures: Mapping[str, st
     ]
     arrows = [_row(arrow, "its own force") for arrow in BY_FORCE]
     arrows += [_row(arrow, "the nearest cell under the fingertip") for arrow in BY_PLACE]
-    return Path(__file__).with_name("paper.md").read_text(encoding="utf-8").format(
-        version=__version__, took=took, criterion=results.criterion, claims="\n".join(rows),
-        figures="\n\n".join(figures), methods="\n".join(compare_methods(results)), arrows="\n".join(arrows),
-        spring="; ".join(f"{_word(mode)} ({MEANINGS[mode]})" for mode in VIRTUAL_SPRING),
-    )  # fmt: skip
+    return (
+        Path(__file__)
+        .with_name("paper.md")
+        .read_text(encoding="utf-8")
+        .format(
+            version=__version__,
+            took=took,
+            criterion=results.criterion,
+            claims="\n".join(rows),
+            figures="\n\n".join(figures),
+            methods="\n".join(compare_methods(results)),
+            arrows="\n".join(arrows),
+            spring="; ".join(f"{_word(mode)} ({MEANINGS[mode]})" for mode in VIRTUAL_SPRING),
+        )
+    )
 
 
 def _row(arrow: Arrow, by: str) -> str:
@@ -140,14 +150,19 @@ def _numbers(results: Results) -> dict[str, Any]:
         "sections": {
             method: {
                 one.name: {
-                    "rms": one.rms, "largest": one.largest, "rim": one.rim, "rim_by_pins": one.pins,
-                    "relief": one.relief, "level": one.level, "meets": one.meets(LIMITS),
+                    "rms": one.rms,
+                    "largest": one.largest,
+                    "rim": one.rim,
+                    "rim_by_pins": one.pins,
+                    "relief": one.relief,
+                    "level": one.level,
+                    "meets": one.meets(LIMITS),
                 }
                 for one in sections(results.session[method])
             }
             for method in methods
         },
-    }  # fmt: skip
+    }
     return {name: _plain(value) for name, value in numbers.items()}
 
 

@@ -103,8 +103,14 @@ def blisters(results: Results) -> Any:
         first.plot([], [], **DASHED, label="bed at rest")
         first.plot([], [], color=INK, linewidth=1.2, label="fingertip")
         first.plot([], [], "o", color=INK, label="cell that feels it")
-        figure.legend(*first.get_legend_handles_labels(), loc="upper right", ncols=5,
-                      bbox_to_anchor=(0.99, 0.998), handlelength=1.6, columnspacing=1.2)  # fmt: skip
+        figure.legend(
+            *first.get_legend_handles_labels(),
+            loc="upper right",
+            ncols=5,
+            bbox_to_anchor=(0.99, 0.998),
+            handlelength=1.6,
+            columnspacing=1.2,
+        )
     return figure
 
 
@@ -247,8 +253,15 @@ def tracking(results: Results) -> Any:
         first.plot([], [], "o", color=INK, markerfacecolor="white", label="without contact, or lost")
         first.plot([], [], **DASHED, label="criterion")
         first.plot([], [], **DOTTED, label="the paper's 15 mm/s")
-        figure.legend(*first.get_legend_handles_labels(), loc="upper left", ncols=6, fontsize=10,
-                      bbox_to_anchor=(0.005, 0.93), handlelength=1.2, columnspacing=0.8)  # fmt: skip
+        figure.legend(
+            *first.get_legend_handles_labels(),
+            loc="upper left",
+            ncols=6,
+            fontsize=10,
+            bbox_to_anchor=(0.005, 0.93),
+            handlelength=1.2,
+            columnspacing=0.8,
+        )
     return figure
 
 

@@ -16,9 +16,10 @@ METHODS = ("virtual_master", "cell_states")
 THIRD = "hybrid"
 COMPARED = (*METHODS, THIRD)
 NAMES = {
-    "virtual_master": "Method I, virtual master", "cell_states": "Method II, cell states",
+    "virtual_master": "Method I, virtual master",
+    "cell_states": "Method II, cell states",
     THIRD: "Method III, hybrid",
-}  # fmt: skip
+}
 #: Finger over the bed at rest: for a blister 15 mm high (the pins press 1.5 mm into it), and in a valley, m.
 TALL, SINK = 13.5e-3, -10e-3
 #: How deep the first press goes: less never reaches the trigger, because the pulp relaxes, m.

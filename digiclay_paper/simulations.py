@@ -40,8 +40,10 @@ from .scenes import METHODS, QUICKER, SINK, TALL, THIRD, Device
 #: Along the ridge and along the valley, s.
 ALONG_RIDGE, ALONG_VALLEY = (5.0, 10.0), (18.0, 25.0)
 WINDOWS = {
-    "both": (ALONG_RIDGE, ALONG_VALLEY), "ridge alone": (ALONG_RIDGE,), "valley alone": (ALONG_VALLEY,),
-}  # fmt: skip
+    "both": (ALONG_RIDGE, ALONG_VALLEY),
+    "ridge alone": (ALONG_RIDGE,),
+    "valley alone": (ALONG_VALLEY,),
+}
 
 
 def measure_windows(done: Result) -> dict[str, dict[str, float | None]]:
@@ -104,9 +106,13 @@ def dragged(scene: Scene, way: speed_limits.Drag, speed: float = PAPER_SPEED) ->
     seen &= place[line, 0] < 0.5 * way.length + AHEAD[0]
     over = part["height"][:, line] - scene.actuator.rest_height
     measured = Dragged(
-        follows, float(total.mean()), float(total.std()), float(following.mean()),
-        done.figures["ridge_unevenness"], float(over[seen].mean()) if np.any(seen) else None,
-    )  # fmt: skip
+        follows,
+        float(total.mean()),
+        float(total.std()),
+        float(following.mean()),
+        done.figures["ridge_unevenness"],
+        float(over[seen].mean()) if np.any(seen) else None,
+    )
     return measured, done
 
 
@@ -223,15 +229,24 @@ def _track(results: Results, method: str, extent: Extent, announce: Announce) ->
 
     for name, way in WAYS.items():
         results.fastest[method, name] = speed_limits.find_largest_speed(
-            scene, way, results.criterion,
-            low=extent.drags[0], high=extent.drags[1], resolution=extent.resolution, report=tried,
-        )  # fmt: skip
+            scene,
+            way,
+            results.criterion,
+            low=extent.drags[0],
+            high=extent.drags[1],
+            resolution=extent.resolution,
+            report=tried,
+        )
     results.tracks[method].sort(key=lambda one: one.speed)
     results.lifting[method] = speed_limits.find_largest_speed(
-        scene, speed_limits.Lift(), results.criterion,
-        low=extent.lifts[0], high=extent.lifts[1], resolution=extent.resolution,
+        scene,
+        speed_limits.Lift(),
+        results.criterion,
+        low=extent.lifts[0],
+        high=extent.lifts[1],
+        resolution=extent.resolution,
         report=lambda one: announce(f"lift at {one.speed * 1e3:.1f} mm/s, {method}"),
-    )  # fmt: skip
+    )
 
 
 def sessions(results: Results, announce: Announce, session: str = SESSION) -> None:
@@ -287,7 +302,10 @@ def _swing(
     wanted = find_set_point(case.set_point, np.count_nonzero(after["mode"] == Mode.FORCE_FOLLOW, axis=1))
     settled = summary.measure_settling_time(after["time"], after["total_force"] / wanted, 1.0, 0.1)
     swing = Swing(
-        gain, position_gain, summary.measure_amplitude(late["total_force"]),
-        summary.measure_frequency(late["time"], late["total_force"]), settled,
-    )  # fmt: skip
+        gain,
+        position_gain,
+        summary.measure_amplitude(late["total_force"]),
+        summary.measure_frequency(late["time"], late["total_force"]),
+        settled,
+    )
     return swing._replace(settling=None) if swing.sustained else swing, done, quick

@@ -176,9 +176,12 @@ class Doors(AbstractContextManager["Doors"]):
         path = os.pathsep.join(filter(None, [*sorted(folders), os.environ.get("PYTHONPATH", "")]))
         self._process = subprocess.Popen(
             [sys.executable, "-m", f"{__package__}.door_process"],
-            stdin=subprocess.PIPE, stdout=subprocess.PIPE, bufsize=0, env={**os.environ, "PYTHONPATH": path},
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            bufsize=0,
+            env={**os.environ, "PYTHONPATH": path},
             start_new_session=True,  # Ctrl-C on a terminal is for the session
-        )  # fmt: skip
+        )
         assert self._process.stdin is not None
         with suppress(BrokenPipeError):  # its answer says why
             self._process.stdin.write(json.dumps(self._settings).encode() + b"\n")

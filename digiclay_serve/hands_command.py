@@ -47,7 +47,9 @@ def add(commands: Any) -> None:
     """Add the command."""
     options: Options = {
         "--from SOURCE": {
-            "dest": "source", "choices": sorted(PORTS), "default": "hts",
+            "dest": "source",
+            "choices": sorted(PORTS),
+            "default": "hts",
             "help": "hts: Hand Tracking Streamer, the default; tuio: a touch pad",
         },
         "--to ADDRESS": (None, f"of 'digiclay serve': ws://HOST:PORT or osc://HOST:PORT; default: {TO}", TO),
@@ -59,7 +61,7 @@ def add(commands: Any) -> None:
         "--depth MM": (millimeters, "depth of a finger on a pad at full pressure, mm; default: 20", 20e-3),
         "--record FILE": (Path, "write what is received, with its times"),
         "--play FILE": (Path, "take a recording in place of a device"),
-    }  # fmt: skip
+    }
     purpose = "move the fingertips of a server by tracked hands or a touch pad"
     add_options(add_command(commands, "hands", purpose, EXAMPLES, carry_out=carry_out), options)
 

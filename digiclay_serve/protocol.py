@@ -166,10 +166,17 @@ def describe_bed(scene: Scene, system: System, limits: Limits) -> Bed:
     layout, grid = scene.layout, system.grid
     listed = grid.positions if grid.count <= MOST_POSITIONS else grid.positions[:0]
     return Bed(
-        scene.name, layout.rows, layout.columns, layout.pitch, system.cell.actuator.stroke, system.period,
-        tuple((float(x), float(y)) for x, y in listed), limits.force, limits.speed,
+        scene.name,
+        layout.rows,
+        layout.columns,
+        layout.pitch,
+        system.cell.actuator.stroke,
+        system.period,
+        tuple((float(x), float(y)) for x, y in listed),
+        limits.force,
+        limits.speed,
         system.fingers,
-    )  # fmt: skip
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -288,9 +295,11 @@ def _list_numbers(finger: dict[str, Any]) -> list[object]:
 
 #: Keys of requests beside type and version.
 KEYS = {
-    "pose": ("position", "orientation", "number"), "poses": ("fingers", "alive", "number"),
-    "reset": (), "status": (),
-}  # fmt: skip
+    "pose": ("position", "orientation", "number"),
+    "poses": ("fingers", "alive", "number"),
+    "reset": (),
+    "status": (),
+}
 
 
 def _check_keys(message: dict[str, Any], allowed: set[str]) -> None:
@@ -361,15 +370,23 @@ def format_frame(frame: Frame) -> str:
     """Write a frame in JSON."""
     fingers = [
         {"id": identity, "force": force, "position": pose[:3], "orientation": pose[3:]}
-        for identity, force, pose in frame.fingers if identity >= 0
-    ]  # fmt: skip
+        for identity, force, pose in frame.fingers
+        if identity >= 0
+    ]
     return format_message(
-        "state", period=frame.period, number=frame.number, time=frame.time, total_force=frame.total_force,
-        position=frame.pose[:3].tolist(), orientation=frame.pose[3:].tolist(),
-        heights=frame.heights.tolist(), forces=frame.forces.tolist(), flags=name_flags(frame.flags),
+        "state",
+        period=frame.period,
+        number=frame.number,
+        time=frame.time,
+        total_force=frame.total_force,
+        position=frame.pose[:3].tolist(),
+        orientation=frame.pose[3:].tolist(),
+        heights=frame.heights.tolist(),
+        forces=frame.forces.tolist(),
+        flags=name_flags(frame.flags),
         **({"fingers": fingers} if frame.fingers else {}),
         **dict(zip(("height_error", "force_error"), frame.errors or (None, None), strict=True)),
-    )  # fmt: skip
+    )
 
 
 def _check_version(version: object) -> None:

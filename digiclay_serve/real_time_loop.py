@@ -166,10 +166,16 @@ def run_session(
     gc.unfreeze()
     _hand_over(session, writer)
     figures = {
-        "period": period, "periods": schedule.planned, "left_out": schedule.left_out,
-        "missed": elapsed.count_above(period), "elapsed": elapsed.describe(), "processor": spent.describe(),
-        "lateness": lateness.describe(), "flagged": dict(flagged), **_find_effort(session),
-    }  # fmt: skip
+        "period": period,
+        "periods": schedule.planned,
+        "left_out": schedule.left_out,
+        "missed": elapsed.count_above(period),
+        "elapsed": elapsed.describe(),
+        "processor": spent.describe(),
+        "lateness": lateness.describe(),
+        "flagged": dict(flagged),
+        **_find_effort(session),
+    }
     return replace(session, recording=None), figures
 
 

@@ -92,10 +92,17 @@ def _begin_at_rest(
             poses[row, 2] = PARKED
     kept = live_session.Moment(0, snapshot.dump(system, state), poses)
     return Session(
-        scene=scene, system=system, state=state, poses=poses, kept=kept, limits=limits, tracking=tracking,
+        scene=scene,
+        system=system,
+        state=state,
+        poses=poses,
+        kept=kept,
+        limits=limits,
+        tracking=tracking,
         monitor=monitor,
-        tracks=begin_tracks(poses), relaxed=np.zeros((len(poses), _read_pulp(scene)[1].size)),
-    )  # fmt: skip
+        tracks=begin_tracks(poses),
+        relaxed=np.zeros((len(poses), _read_pulp(scene)[1].size)),
+    )
 
 
 def lacks_pose(session: Session, order: Order, silence: float) -> bool:
@@ -175,9 +182,9 @@ def follow(session: Session, targets: Floats, number: int, count: int, clear: fl
     goals = live_session.clamp_pose(targets, system.cell.actuator.stroke)
     way = session.limits.speed * system.period * count
     start = session.poses
-    ends = np.array([
-        _limit_way(*each, way, clear) for each in zip(start.tolist(), goals.tolist(), strict=True)
-    ])  # fmt: skip
+    ends = np.array(
+        [_limit_way(*each, way, clear) for each in zip(start.tolist(), goals.tolist(), strict=True)]
+    )
     path = np.array([start, ends]) if count == 1 else live_session.interpolate_path(start, ends, count)
     try:
         after = live_session.follow_path(session, path)

@@ -93,9 +93,15 @@ def begin_tracks(poses: Floats) -> Tracks:
     """Return the tracks of fingertips (f, 7) that nobody has named."""
     count = len(poses)
     return Tracks(
-        np.full(count, -1), np.zeros(count), poses, poses, poses, np.zeros((count, 3)), np.zeros(count),
+        np.full(count, -1),
+        np.zeros(count),
+        poses,
+        poses,
+        poses,
+        np.zeros((count, 3)),
+        np.zeros(count),
         np.zeros(count, bool),
-    )  # fmt: skip
+    )
 
 
 def name_fingers(tracks: Tracks, named: Sequence[tuple[int, Sequence[float]]]) -> Tracks:
@@ -116,18 +122,25 @@ def name_fingers(tracks: Tracks, named: Sequence[tuple[int, Sequence[float]]]) -
     taken = {one: known[one] if one in known else next(free, None) for one in rows}
     here, there = given[:, :2].tolist(), tracked[:, :2].tolist()
     found = {
-        one: slot for one, slot in taken.items() if slot is not None
-        and (one not in known or math.dist(here[rows[one]], there[slot]) <= most[slot])
-    }  # fmt: skip
+        one: slot
+        for one, slot in taken.items()
+        if slot is not None and (one not in known or math.dist(here[rows[one]], there[slot]) <= most[slot])
+    }
     slots = [*found.values()]
     fresh[slots] = ids[slots] < 0
     ids[slots], unnamed[slots], tracked[slots] = [*found], 0.0, given[[rows[one] for one in found]]
     was = fresh[:, None]
     return replace(
-        tracks, identities=ids, unnamed=unnamed, tracked=tracked, there=tracks.there & ~fresh,
-        before=np.where(was, tracked, tracks.before), filtered=np.where(was, tracked, tracks.filtered),
-        speed=np.where(was, 0.0, tracks.speed), slip=np.where(fresh, math.inf, tracks.slip),
-    )  # fmt: skip
+        tracks,
+        identities=ids,
+        unnamed=unnamed,
+        tracked=tracked,
+        there=tracks.there & ~fresh,
+        before=np.where(was, tracked, tracks.before),
+        filtered=np.where(was, tracked, tracks.filtered),
+        speed=np.where(was, 0.0, tracks.speed),
+        slip=np.where(fresh, math.inf, tracks.slip),
+    )
 
 
 def _put_back_exchanged(
@@ -187,9 +200,15 @@ def advance(tracks: Tracks, tracking: Tracking, felt: Felt, time: float) -> tupl
     away = felt.poses.copy()
     away[:, 2] = PARKED
     after = replace(
-        tracks, identities=ids, unnamed=unnamed, before=poses, filtered=filtered, speed=speed, slip=slip,
+        tracks,
+        identities=ids,
+        unnamed=unnamed,
+        before=poses,
+        filtered=filtered,
+        speed=speed,
+        slip=slip,
         there=there,
-    )  # fmt: skip
+    )
     return after, np.where(there[:, None], goal, away)
 
 

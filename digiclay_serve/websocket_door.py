@@ -72,11 +72,22 @@ async def open_websocket(link: DoorLink, host: str, port: int) -> AsyncIterator[
     """Open the door at a port, 0: chosen by the system, and give the port; OSError if it cannot be used."""
     door = _WebSocketDoor(link)
     async with serve(
-        door.handle, host, port, process_request=door.admit, create_connection=door.connect,
+        door.handle,
+        host,
+        port,
+        process_request=door.admit,
+        create_connection=door.connect,
         compression=None,
-        max_size=LARGEST_REQUEST, max_queue=16, write_limit=UNSENT, open_timeout=OPENING,
-        ping_interval=PING, ping_timeout=PING, close_timeout=2.0, server_header=None, backlog=1024,
-    ) as server:  # fmt: skip
+        max_size=LARGEST_REQUEST,
+        max_queue=16,
+        write_limit=UNSENT,
+        open_timeout=OPENING,
+        ping_interval=PING,
+        ping_timeout=PING,
+        close_timeout=2.0,
+        server_header=None,
+        backlog=1024,
+    ) as server:
         yield server.sockets[0].getsockname()[1]
 
 

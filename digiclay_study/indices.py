@@ -53,9 +53,13 @@ def compute_indices(values: Floats, parameters: int, seed: int, *, second: bool)
     if not np.ptp(values) > 1e-9 * np.max(np.abs(values)):
         return None
     result = sobol.analyze(
-        describe_problem(parameters), values, calc_second_order=second, num_resamples=RESAMPLES,
-        conf_level=CONFIDENCE, seed=seed,
-    )  # fmt: skip
+        describe_problem(parameters),
+        values,
+        calc_second_order=second,
+        num_resamples=RESAMPLES,
+        conf_level=CONFIDENCE,
+        seed=seed,
+    )
     return {name: (result[key], result[f"{key}_conf"]) for name, key in ORDERS.items() if key in result}
 
 

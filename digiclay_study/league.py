@@ -18,22 +18,42 @@ CONFIDENCE = 0.95
 KIND = f"{CONFIDENCE:.0%} interval of the mean, Student's t over the seeds"
 #: Measures of a league, which are means over the trajectories.
 MEANS = (
-    "rfd", "rfd_jnd_least", "rfd_jnd_most", "lag_mean", "ridge_unevenness", "ridge_unevenness_touch",
-    "relief_rms", "contact_loss_share",
-)  # fmt: skip
+    "rfd",
+    "rfd_jnd_least",
+    "rfd_jnd_most",
+    "lag_mean",
+    "ridge_unevenness",
+    "ridge_unevenness_touch",
+    "relief_rms",
+    "contact_loss_share",
+)
 #: Measures of a league, in the order of its columns; those of `LIMITS` are speeds.
 MEASURES: dict[str, Metric] = {
     name: {**METRICS, **METHOD, **ERRORS}.get(name) or Metric("m/s", "", name.replace("-", " "), "mm/s")
     for name in (
-        "rfd", "rfd_jnd_least", "rfd_jnd_most", "lag_mean", "ridge_unevenness", "ridge_unevenness_touch",
-        "relief_rms", "max_total_force", "losses", "contact_loss_share", *LIMITS, "period_cost", "cost_ratio",
+        "rfd",
+        "rfd_jnd_least",
+        "rfd_jnd_most",
+        "lag_mean",
+        "ridge_unevenness",
+        "ridge_unevenness_touch",
+        "relief_rms",
+        "max_total_force",
+        "losses",
+        "contact_loss_share",
+        *LIMITS,
+        "period_cost",
+        "cost_ratio",
         *ERRORS,
     )
-}  # fmt: skip
+}
 #: Other measures over the trajectories: the largest, the number, and the usual one.
 REDUCED: dict[str, Callable[[list[float]], float]] = {
-    "max_total_force": max, "losses": sum, "period_cost": median, **dict.fromkeys(ERRORS, max),
-}  # fmt: skip
+    "max_total_force": max,
+    "losses": sum,
+    "period_cost": median,
+    **dict.fromkeys(ERRORS, max),
+}
 
 #: Method, trajectory and seed of a trial.
 Cell = tuple[str, str, int]

@@ -96,9 +96,14 @@ def _lift(x: float, y: float, height: float, turn: Turn = LEVEL, press: float = 
 
 
 def _drag(
-    x: float, y: float, height: float, speed: float, hold: float = 0.5, turn: Turn = LEVEL,
+    x: float,
+    y: float,
+    height: float,
+    speed: float,
+    hold: float = 0.5,
+    turn: Turn = LEVEL,
     press: float = 3.0,
-) -> list[Pose]:  # fmt: skip
+) -> list[Pose]:
     """Return a lift at (x, y), and a drag along x to -x, mm and mm/s, with turn, pitch and roll, rad."""
     poses = _lift(x, y, height, turn, press)
     end = poses[-1][0] + abs(2.0 * x) / speed
@@ -202,11 +207,24 @@ QUICK = ("ridge-25", "surface", "lift")
 OUTCOMES: dict[str, Metric] = {
     name: {**METRICS, **METHOD, **ERRORS}[name]
     for name in (
-        "set_point", "rfd", "rfd_jnd_least", "rfd_jnd_most", "lag_mean", "lag_max", "ridge_unevenness",
-        "ridge_unevenness_touch", "relief_rms", "relief_largest", "max_total_force", "contact_loss_share",
-        "losses", "speed_limit", "period_cost", *ERRORS,
+        "set_point",
+        "rfd",
+        "rfd_jnd_least",
+        "rfd_jnd_most",
+        "lag_mean",
+        "lag_max",
+        "ridge_unevenness",
+        "ridge_unevenness_touch",
+        "relief_rms",
+        "relief_largest",
+        "max_total_force",
+        "contact_loss_share",
+        "losses",
+        "speed_limit",
+        "period_cost",
+        *ERRORS,
     )
-}  # fmt: skip
+}
 
 
 class _StoppedError(Exception):

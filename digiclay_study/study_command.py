@@ -56,10 +56,13 @@ def add(commands: Any) -> None:
     purpose = "find which parameters matter for which metric"
     parser = add_command(commands, "study", purpose, EXAMPLES, description, carry_out=carry_out)
     add_subject(parser, METRICS)
-    add_options(parser, {
-        "--samples N": (_read_samples, "a power of two; default: 64", 64),
-        "--second": "indices of pairs of parameters, too",
-    })  # fmt: skip
+    add_options(
+        parser,
+        {
+            "--samples N": (_read_samples, "a power of two; default: 64", 64),
+            "--second": "indices of pairs of parameters, too",
+        },
+    )
 
 
 def _read_samples(text: str) -> int:
@@ -175,9 +178,16 @@ def _summarize(findings: Findings) -> Iterator[str]:
 
 #: Of the table of the outputs.
 HEAD = (
-    "output", "unit", "unchanged scene", "mean", "standard deviation", "least", "largest", "without a value",
+    "output",
+    "unit",
+    "unchanged scene",
+    "mean",
+    "standard deviation",
+    "least",
+    "largest",
+    "without a value",
     "fingertip lost",
-)  # fmt: skip
+)
 
 
 def format_index_table(findings: Findings) -> str:

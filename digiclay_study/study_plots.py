@@ -53,9 +53,13 @@ SHOWN = 0.85
 
 
 def draw_front(
-    names: Sequence[str], values: Floats, sound: NDArray[np.bool_], front: NDArray[np.intp], chosen: int,
+    names: Sequence[str],
+    values: Floats,
+    sound: NDArray[np.bool_],
+    front: NDArray[np.intp],
+    chosen: int,
     title: str,
-) -> Figure:  # fmt: skip
+) -> Figure:
     """Draw the trials over two outputs; the first one upwards, the second one to the right."""
     units = [read_unit(FIGURES[name].unit, values[sound, number]) for number, name in enumerate(names)]
     shown = values * [factor for factor, _ in units]

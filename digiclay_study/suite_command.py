@@ -34,15 +34,18 @@ PICTURES = ("rfd.svg", "measures.svg")
 
 def add_suite(parser: argparse.ArgumentParser) -> None:
     """Add the options of a suite."""
-    add_options(parser.add_argument_group("benchmark of methods (--suite)"), {
-        "--suite": f"many trajectories with repeated noise; default scene {SCENE}",
-        "--trajectories T,...": f"some of {', '.join(GROUPS)}; default: all",
-        "--repeats N": (whole_number(1, 100), "number of seeds of the noise; default: 5"),
-        "--first-seed N": (whole_number(0, 2**31), "default: 1"),
-        "--noise FORCE": 'noise of the force sensors; default: "2 mN"',
-        "--drags N": (whole_number(1, 200), "number of random drags; default: 20"),
-        "--quick": f"{', '.join(QUICK)}, 2 seeds: for a first look",
-    })  # fmt: skip
+    add_options(
+        parser.add_argument_group("benchmark of methods (--suite)"),
+        {
+            "--suite": f"many trajectories with repeated noise; default scene {SCENE}",
+            "--trajectories T,...": f"some of {', '.join(GROUPS)}; default: all",
+            "--repeats N": (whole_number(1, 100), "number of seeds of the noise; default: 5"),
+            "--first-seed N": (whole_number(0, 2**31), "default: 1"),
+            "--noise FORCE": 'noise of the force sensors; default: "2 mN"',
+            "--drags N": (whole_number(1, 200), "number of random drags; default: 20"),
+            "--quick": f"{', '.join(QUICK)}, 2 seeds: for a first look",
+        },
+    )
     add_pool(parser)
 
 
@@ -61,19 +64,26 @@ def run_suite(arguments: argparse.Namespace, methods: Sequence[str], words: Sequ
     plan = make_plan(arguments, methods)
     out: Path = arguments.out or Path(f"{plan.title}_suite")
     description = {
-        "digiclay": __version__, "methods": list(plan.methods), "trajectories": list(plan.groups),
-        "seeds": list(plan.seeds), "points": len(plan.points), "scenes": plan.identity,
-    }  # fmt: skip
+        "digiclay": __version__,
+        "methods": list(plan.methods),
+        "trajectories": list(plan.groups),
+        "seeds": list(plan.seeds),
+        "points": len(plan.points),
+        "scenes": plan.identity,
+    }
 
     def describe(there: Mapping[str, Any]) -> str:
         return f"{there.get('points', '?')} trials, digiclay {there.get('digiclay', '?')}"
 
     return run_series(
-        arguments, "suite", len(plan.points), open_points(out, "suite", description, describe),
+        arguments,
+        "suite",
+        len(plan.points),
+        open_points(out, "suite", description, describe),
         lambda evaluation: evaluation.finish([(point,) for point in plan.points], KEYS),
         lambda records: _write(out, plan, records, _format_own_command(arguments, plan, words)),
         noun="trials",
-    )  # fmt: skip
+    )
 
 
 def make_plan(arguments: argparse.Namespace, methods: Sequence[str]) -> Plan:
@@ -92,12 +102,16 @@ def make_plan(arguments: argparse.Namespace, methods: Sequence[str]) -> Plan:
     scenes = {
         (method, seed): load(
             path,
-            [*settings, Setting(METHOD, method, "--methods"), noise,
-             Setting("sensors.seed", str(seed), "--first-seed")],
+            [
+                *settings,
+                Setting(METHOD, method, "--methods"),
+                noise,
+                Setting("sensors.seed", str(seed), "--first-seed"),
+            ],
         )
         for method in methods
         for seed in seeds
-    }  # fmt: skip
+    }
     if not all(scene.fingers for scene in scenes.values()):
         raise ParameterError("scene", "fingers", "must be at least 1", "0")
     sensors = next(iter(scenes.values())).sensors

@@ -39,9 +39,17 @@ def _processor() -> str:
 
 #: Columns of the table in a terminal.
 PRINTED = (
-    "rfd", "lag_mean", "ridge_unevenness", "relief_rms", "max_total_force", "losses", *LIMITS, "cost_ratio",
-    "height_error", "force_error",
-)  # fmt: skip
+    "rfd",
+    "lag_mean",
+    "ridge_unevenness",
+    "relief_rms",
+    "max_total_force",
+    "losses",
+    *LIMITS,
+    "cost_ratio",
+    "height_error",
+    "force_error",
+)
 #: Where errors are estimated.
 JUDGED = "Errors: the largest of the trials with the first seed, estimated, but for speed limits."
 #: Heading of the last column of the league.

@@ -45,11 +45,14 @@ def add(commands: Any) -> None:
     parser = add_command(commands, "tune", purpose, EXAMPLES, description, carry_out=carry_out)
     add_subject(parser, METRICS)
     chosen = "what is chosen on the front: knee, or the metric that is to be least; default: knee"
-    add_options(parser, {
-        "--population N": (whole_number(4, 4096), "runs a generation; default: 64", 64),
-        "--generations N": (whole_number(1, 4096), "default: 10", 10),
-        "--choose M": (None, chosen, KNEE),
-    })  # fmt: skip
+    add_options(
+        parser,
+        {
+            "--population N": (whole_number(4, 4096), "runs a generation; default: 64", 64),
+            "--generations N": (whole_number(1, 4096), "default: 10", 10),
+            "--choose M": (None, chosen, KNEE),
+        },
+    )
 
 
 def carry_out(arguments: argparse.Namespace) -> int:

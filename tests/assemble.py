@@ -106,18 +106,27 @@ def make_system(
     """
     master = control if isinstance(control, VirtualMaster) else None
     given = {
-        "actuator": Actuator(), "supply": Supply(), "fluid": Fluid(), "valve": Valve(), "conduit": Conduit(),
+        "actuator": Actuator(),
+        "supply": Supply(),
+        "fluid": Fluid(),
+        "valve": Valve(),
+        "conduit": Conduit(),
         "valve_lag": ValveLag(),
-    }  # fmt: skip
+    }
     finger = {"fingertip": Fingertip(), "contact": Contact(), "relaxation": Relaxation()}
     assert parts.keys() <= given.keys() | finger.keys(), f"no such part among {parts.keys()}"
     fingers = (Finger(trajectory=Path.press(40e-3), **finger),)
     bed = layout or Layout()
     scene = Scene(
-        **given, layout=bed, delay=Delay(dead_time), control=master,
-        blister=(blister or fitting(bed)) if master else None, simulation=Simulation(period, step, stepper),
-        recorder=None, fingers=fingers,
-    )  # fmt: skip
+        **given,
+        layout=bed,
+        delay=Delay(dead_time),
+        control=master,
+        blister=(blister or fitting(bed)) if master else None,
+        simulation=Simulation(period, step, stepper),
+        recorder=None,
+        fingers=fingers,
+    )
     scene = scene.with_sections(**parts)
     more = (replace(scene.fingers[0], **own) for own in others)
     system = assemble(replace(scene, fingers=(*scene.fingers, *more)))

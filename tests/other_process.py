@@ -24,10 +24,15 @@ def dead():
 def start(script, *arguments, env=None, **options):
     """Start Python on a script that may import the package."""
     return subprocess.Popen(
-        [sys.executable, "-c", script, *arguments], text=True, encoding="utf-8", stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-        env={**os.environ, "PYTHONPATH": PACKAGES, **(env or {})}, **options,
-    )  # fmt: skip
+        [sys.executable, "-c", script, *arguments],
+        text=True,
+        encoding="utf-8",
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        env={**os.environ, "PYTHONPATH": PACKAGES, **(env or {})},
+        **options,
+    )
 
 
 def finish(process):

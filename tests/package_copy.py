@@ -21,9 +21,13 @@ def copy_package(folder):
 def run_python(copy, *arguments):
     """Run Python on the copy; return what it printed."""
     done = subprocess.run(
-        [sys.executable, *arguments], env={"PYTHONPATH": str(copy / "addon"), "PATH": ""},
-        capture_output=True, text=True, check=False, timeout=TIMEOUT,
-    )  # fmt: skip
+        [sys.executable, *arguments],
+        env={"PYTHONPATH": str(copy / "addon"), "PATH": ""},
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=TIMEOUT,
+    )
     assert done.returncode == 0, done.stderr
     return done.stdout
 

@@ -14,18 +14,35 @@ ALPHA = np.tile([0.0, 32768 / 65535, 1.0, 1.0], (3, 1))
 #: rounded several times.
 STEPS = {"16": 1.0, "32": 1.0, "64": 1.0, "4": 65535 / 15, "8": 65535 / 255, "k": 4 * 65535 / 255}
 READ = {
-    "gray16.png": "16", "gray16_interlaced.png": "16", "gray4.png": "4", "palette.png": "8",
-    "gray_alpha8.png": "8", "gray_alpha16.png": "16", "gray_alpha16_interlaced.png": "16",
-    "rgb16.png": "16", "rgb16_interlaced.png": "16", "rgba8.png": "8", "rgba16.png": "16",
-    "rgb16_deflated.tif": "16", "rgb16_tiled.tif": "16", "rgba16_big_endian.tif": "16",
-    "rgba16_associated.tif": "16", "gray32.tif": "32", "gray_float64.tif": "64", "rgb8_planes.tif": "8",
-    "cmyk8.tif": "k", "cmyk.jpg": "k",
-}  # fmt: skip
+    "gray16.png": "16",
+    "gray16_interlaced.png": "16",
+    "gray4.png": "4",
+    "palette.png": "8",
+    "gray_alpha8.png": "8",
+    "gray_alpha16.png": "16",
+    "gray_alpha16_interlaced.png": "16",
+    "rgb16.png": "16",
+    "rgb16_interlaced.png": "16",
+    "rgba8.png": "8",
+    "rgba16.png": "16",
+    "rgb16_deflated.tif": "16",
+    "rgb16_tiled.tif": "16",
+    "rgba16_big_endian.tif": "16",
+    "rgba16_associated.tif": "16",
+    "gray32.tif": "32",
+    "gray_float64.tif": "64",
+    "rgb8_planes.tif": "8",
+    "cmyk8.tif": "k",
+    "cmyk.jpg": "k",
+}
 #: Read outside Blender only, and in Blender only.
 OUTSIDE = {"gray16.pgm": "16", "gray16_text.pgm": "16"}
 BLENDER = {
-    "rgb16_planes.tif": "16", "gray_alpha16.tif": "16", "rgb_float32.tif": "16", "cmyk16.tif": "16",
-}  # fmt: skip
+    "rgb16_planes.tif": "16",
+    "gray_alpha16.tif": "16",
+    "rgb_float32.tif": "16",
+    "cmyk16.tif": "16",
+}
 
 
 def find_brightness(name):
@@ -73,6 +90,11 @@ def write_geotiff(path, kind, absent, *, big=False):
 
 
 NO_DATA = [
-    ("f4", "-9999"), ("f4", "nan"), ("f4", "-3.4028234663852886e+38"), ("i2", "-32768"), ("i2", "0"),
-    ("u2", "65535"), ("i4", "-2147483648"),
-]  # fmt: skip
+    ("f4", "-9999"),
+    ("f4", "nan"),
+    ("f4", "-3.4028234663852886e+38"),
+    ("i2", "-32768"),
+    ("i2", "0"),
+    ("u2", "65535"),
+    ("i4", "-2147483648"),
+]

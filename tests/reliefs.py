@@ -25,9 +25,14 @@ def heighten(system, relief):
 
 
 def make_orders(
-    periods, start, end, y, radius, settle = 60,
-    verb = Verb.AVERAGE,
-):  # fmt: skip
+    periods,
+    start,
+    end,
+    y,
+    radius,
+    settle=60,
+    verb=Verb.AVERAGE,
+):
     """Return the orders of a stroke along a row, m, at full strength, and of a wait (control periods)."""
     rows = np.zeros((periods + settle, ORDER))
     rows[:periods, 0] = np.linspace(start, end, periods)

@@ -58,13 +58,16 @@ def list_declarations():
     """Return default, unit and bounds of every parameter of a scene, by section, method and name."""
     return {
         f"{section} {method} {name}": [
-            getattr(kind(), name), known.unit, dict(known.list_bounds()), list(known.choices)
+            getattr(kind(), name),
+            known.unit,
+            dict(known.list_bounds()),
+            list(known.choices),
         ]
         for section in SECTIONS
         for method in (METHODS if section == "control" else ("",))
         for kind in [import_parameters(section, method or "virtual_master")]
         for name, known in list_quantities(kind).items()
-    }  # fmt: skip
+    }
 
 
 def go_on(file):

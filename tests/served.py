@@ -19,8 +19,13 @@ from tests.timeouts import TIMEOUT
 ROOT = Path(__file__).parents[1]
 TOKEN = "a-token-of-tests"
 #: A bed of a few pins, and a blister that fits it.
-SMALL = ("layout.rows=9", "layout.columns=9", "blister.radius=5e-3", "blister.edge_radius=8e-3",
-         "blister.flat_radius=2e-3")  # fmt: skip
+SMALL = (
+    "layout.rows=9",
+    "layout.columns=9",
+    "blister.radius=5e-3",
+    "blister.edge_radius=8e-3",
+    "blister.flat_radius=2e-3",
+)
 
 
 @dataclass(frozen=True)
@@ -81,11 +86,16 @@ def serve(folder, *options, rate=200):
     command += ["--osc-port", "0", "--token", TOKEN, "--report", "report.json", *options]
     path = os.pathsep.join([str(ROOT / "addon"), str(ROOT)])
     process = subprocess.Popen(
-        command, cwd=folder, env={**os.environ, "PYTHONPATH": path}, text=True, encoding="utf-8",
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+        command,
+        cwd=folder,
+        env={**os.environ, "PYTHONPATH": path},
+        text=True,
+        encoding="utf-8",
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
         # Its end by SIGHUP is tested, also below a nohup, which would have it ignored.
         preexec_fn=partial(signal.signal, signal.SIGHUP, signal.SIG_DFL),
-    )  # fmt: skip
+    )
     try:
         assert process.stdout is not None
         said = "".join(process.stdout.readline() for _ in range(3))

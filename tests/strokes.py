@@ -34,9 +34,7 @@ def queue(session, ends, brush, depth=15.0, share=1.0):
     )
     for part in np.arange(1, 31) / 30:
         at = tuple(np.interp(part * way[-1], way, places[:, axis]) for axis in (0, 1))
-        session = change_stroke(
-            session, number, lambda stroke, at=at: draw(stroke, *at, depth * 1e-3, share)
-        )  # fmt: skip
+        session = change_stroke(session, number, lambda stroke, at=at: draw(stroke, *at, depth * 1e-3, share))
     return let_go(session, number)
 
 
@@ -68,9 +66,13 @@ def measure_spikes(formed):
     for reach in (1, 2):
         padded = np.pad(formed, reach, mode="edge")
         steps = range(-reach, reach + 1)
-        around = np.array([
-            padded[reach + i : reach + i + rows, reach + j : reach + j + columns]
-            for i in steps for j in steps if max(abs(i), abs(j)) == reach
-        ])  # fmt: skip
+        around = np.array(
+            [
+                padded[reach + i : reach + i + rows, reach + j : reach + j + columns]
+                for i in steps
+                for j in steps
+                if max(abs(i), abs(j)) == reach
+            ]
+        )
         worst = max(worst, float((formed - around.max(0)).max()), float((around.min(0) - formed).max()))
     return worst

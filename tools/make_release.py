@@ -59,9 +59,15 @@ def carry_out(command: list[str | Path], folder: Path, added: dict[str, str], um
     name = " ".join(map(str, command[1:4]))
     with tempfile.TemporaryFile() as output:
         process = subprocess.Popen(
-            command, cwd=folder, env=os.environ | added, umask=umask, start_new_session=True,
-            stdin=subprocess.DEVNULL, stdout=output, stderr=subprocess.STDOUT,
-        )  # fmt: skip
+            command,
+            cwd=folder,
+            env=os.environ | added,
+            umask=umask,
+            start_new_session=True,
+            stdin=subprocess.DEVNULL,
+            stdout=output,
+            stderr=subprocess.STDOUT,
+        )
         try:
             status, started = None, time.monotonic()
             while status is None:

@@ -36,8 +36,11 @@ def list_changes() -> dict[str, int]:
     """Return the files that differ from the last commit, each with the hash of its content."""
     listed = subprocess.run(
         ["git", "-c", "safe.directory=*", "ls-files", "-mo", "--exclude-standard"],
-        cwd=ROOT, capture_output=True, text=True, check=True,
-    )  # fmt: skip
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
     paths = {name: ROOT / name for name in listed.stdout.splitlines()}
     return {name: hash(path.read_bytes()) for name, path in paths.items() if path.is_file()}
 

@@ -43,8 +43,9 @@ LONGEST = 1800.0
 def list_modules() -> dict[str, Path]:
     """Return the files of the core that are changed, by package and module."""
     files = (path for package in PACKAGES for path in sorted((CORE / package).glob("*.py")))
-    return {f"{path.parent.name}.{path.stem}": path for path in files
-            if path.stem not in ("__init__", *DECLARING)}  # fmt: skip
+    return {
+        f"{path.parent.name}.{path.stem}": path for path in files if path.stem not in ("__init__", *DECLARING)
+    }
 
 
 def find_silent(source: str) -> list[tuple[tuple[int, int], tuple[int, int]]]:

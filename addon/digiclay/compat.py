@@ -27,9 +27,19 @@ RELATIVE_PATH = {"PATH_SUPPORTS_BLEND_RELATIVE"} if bpy.app.version >= (4, 5) el
 FORMER_INPUTS = {"Color by Force": "Colour by Force", "Top Color at (N)": "Top Colour at (N)"}
 #: What a scene of ours can be made of, in the order it is taken apart.
 KINDS = (
-    "scenes", "objects", "collections", "meshes", "curves", "fonts", "lights",
-    "cameras", "materials", "worlds", "node_groups", "images",
-)  # fmt: skip
+    "scenes",
+    "objects",
+    "collections",
+    "meshes",
+    "curves",
+    "fonts",
+    "lights",
+    "cameras",
+    "materials",
+    "worlds",
+    "node_groups",
+    "images",
+)
 
 
 def shader_nodes(owner: Any) -> Any:

@@ -13,9 +13,14 @@ from .settings.declared import choice, flag, integer, text, title
 CORNERS = ("top_left", "top_right", "bottom_left", "bottom_right")
 #: Those that are drawn first, in their order.
 SHOWN = (
-    "redraw_rate", "most_periods", "palette", "take_press_tool", "light_relief", "show_cursor_text",
+    "redraw_rate",
+    "most_periods",
+    "palette",
+    "take_press_tool",
+    "light_relief",
+    "show_cursor_text",
     "overlay_corner",
-)  # fmt: skip
+)
 
 
 def redraw_views(preferences: Any, context: Any) -> None:
@@ -49,41 +54,64 @@ class Preferences(bpy.types.AddonPreferences):
     bl_idname = __package__
 
     redraw_rate: integer(
-        "Redraw Rate (Hz)", "Largest redraw rate of a live session, in Hz; drawing takes most of the time",
-        default=30, min=1, max=240, soft_min=10, soft_max=60,
-    )  # fmt: skip
+        "Redraw Rate (Hz)",
+        "Largest redraw rate of a live session, in Hz; drawing takes most of the time",
+        default=30,
+        min=1,
+        max=240,
+        soft_min=10,
+        soft_max=60,
+    )
     most_periods: integer(
-        "Periods per Redraw", "Control periods simulated between two redraws at most. A machine that does "
+        "Periods per Redraw",
+        "Control periods simulated between two redraws at most. A machine that does "
         "not manage them runs the session slower than real time instead of stalling",
-        default=20, min=1, max=1000, soft_max=100,
-    )  # fmt: skip
+        default=20,
+        min=1,
+        max=1000,
+        soft_max=100,
+    )
     palette: choice(
-        "Mode Colors", "Colors of the modes; a choice recolors the beds of the open file",
-        items=[(name, *words) for name, words in palettes.WORDS.items()], default=palettes.DEFAULT,
+        "Mode Colors",
+        "Colors of the modes; a choice recolors the beds of the open file",
+        items=[(name, *words) for name, words in palettes.WORDS.items()],
+        default=palettes.DEFAULT,
         update=lambda preferences, context: palettes.set_palette(preferences.palette),
-    )  # fmt: skip
+    )
     take_press_tool: flag(
         "Take the Press Tool", "The start of a session takes the Press tool in hand", default=True
     )
     light_relief: flag(
-        "Light for Sculpting", "Adding a bed and the start of a session light a 3D view with a matcap and "
-        "cavity, once a workspace, unless its shading was changed", default=True,
-    )  # fmt: skip
+        "Light for Sculpting",
+        "Adding a bed and the start of a session light a 3D view with a matcap and "
+        "cavity, once a workspace, unless its shading was changed",
+        default=True,
+    )
     show_cursor_text: flag(
         "Text at the Cursor", "The Press tool writes size, brush and amount beside the cursor", default=True
     )
     overlay_corner: choice(
-        "Overlay Corner", "Corner of the 3D view with the overlay of a session",
-        items=[(name, title(name), "") for name in CORNERS], default="top_left", update=redraw_views,
-    )  # fmt: skip
+        "Overlay Corner",
+        "Corner of the 3D view with the overlay of a session",
+        items=[(name, title(name), "") for name in CORNERS],
+        default="top_left",
+        update=redraw_views,
+    )
     run_own_methods: flag(
-        "Run Own Methods", "Run all Python files of a folder, now and whenever Blender starts: "
-        "the control methods in them are offered in Laboratory > Control", default=False, update=take_methods,
-    )  # fmt: skip
+        "Run Own Methods",
+        "Run all Python files of a folder, now and whenever Blender starts: "
+        "the control methods in them are offered in Laboratory > Control",
+        default=False,
+        update=take_methods,
+    )
     methods_folder: text(
-        "Own Methods", "Folder with Python files of control methods; a change turns Run Own Methods off",
-        default="", subtype="DIR_PATH", options=RELATIVE_PATH, update=take_folder,
-    )  # fmt: skip
+        "Own Methods",
+        "Folder with Python files of control methods; a change turns Run Own Methods off",
+        default="",
+        subtype="DIR_PATH",
+        options=RELATIVE_PATH,
+        update=take_folder,
+    )
 
     def draw(self, context: Any) -> None:
         """Draw the preferences."""

@@ -30,9 +30,14 @@ def solve_pin(problem: Problem, pin: int, method: str, tolerance: float) -> Iter
         for start, end, segment in law.pieces(period):
             with np.errstate(all="ignore"):  # errors that underflow
                 solved = solve_ivp(
-                    partial(rates, segment=segment), (start, end), state.ravel(), method,
-                    rtol=tolerance, atol=tolerance * 1e-2, max_step=law.period / STEPS,
-                )  # fmt: skip
+                    partial(rates, segment=segment),
+                    (start, end),
+                    state.ravel(),
+                    method,
+                    rtol=tolerance,
+                    atol=tolerance * 1e-2,
+                    max_step=law.period / STEPS,
+                )
             if not solved.success:
                 raise ArithmeticError(f"no reference at {start:g} s: {solved.message}")
             state = solved.y[:, -1].reshape(state.shape)
@@ -56,8 +61,9 @@ def make(problem: Problem) -> dict[str, Any]:
         "method": f"each pin alone: DOP853, relative tolerance 2.3e-14, {STEPS} steps a period at least",
         "check": "every fourth judged pin: RK45, 1e-13",
         "apart": {"height": apart[0], "force": apart[1]},
-        "heights": exact[0].tolist(), "forces": exact[1].tolist(),
-    }  # fmt: skip
+        "heights": exact[0].tolist(),
+        "forces": exact[1].tolist(),
+    }
 
 
 def write(problem: Problem) -> None:

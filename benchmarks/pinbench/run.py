@@ -28,9 +28,13 @@ REPEATS, LONG, LONGEST = 3, 1.0, 6.0
 #: Errors of height and of force at which the fastest are compared, m and N: where pins cannot move, of force.
 LEVELS = {"height_error": (1e-5, 1e-6, 1e-7, 1e-8, 1e-9), "force_error": (1e-3, 1e-4, 1e-5, 1e-6, 1e-7)}
 RUNS = {
-    "problem": "problem", "method": "method", "step, s, or tolerance": "setting", "height error, nm":
-    "height_error .3g 1e9", "force error, µN": "force_error .3g 1e6", "CPU, µs a period": "seconds .4g 1e6",
-}  # fmt: skip
+    "problem": "problem",
+    "method": "method",
+    "step, s, or tolerance": "setting",
+    "height error, nm": "height_error .3g 1e9",
+    "force error, µN": "force_error .3g 1e6",
+    "CPU, µs a period": "seconds .4g 1e6",
+}
 
 
 @dataclass(frozen=True)
@@ -164,10 +168,15 @@ def list_answers(answers: Sequence[Answer]) -> Iterator[str]:
         yield "(x) is the time of digiclay's fastest over that of the fastest other engine.\n"
         head = ["problem", *(f"{level * factor:g} {unit}" for level in LEVELS[quantity])]
         rows = [
-            [name, *(compare([a for a in answers if a.problem == name and getattr(a, quantity) <= level])
-                     for level in LEVELS[quantity])]
+            [
+                name,
+                *(
+                    compare([a for a in answers if a.problem == name and getattr(a, quantity) <= level])
+                    for level in LEVELS[quantity]
+                ),
+            ]
             for name in dict.fromkeys(answer.problem for answer in answers)
-        ]  # fmt: skip
+        ]
         yield from table(head, rows)
 
 

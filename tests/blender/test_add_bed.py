@@ -113,8 +113,10 @@ def test_a_bed_has_the_plan_and_the_fingertip_of_its_kind(name):
 def test_beds_for_a_person_are_made_for_hands_and_one_that_a_script_does_not_name_is_the_paper_s():
     made = [properties.scene_of(add(**named)) for named in ({}, {"bed": "design"}, {"bed": "fine"})]
     assert [(scene.preset, scene.method) for scene in made] == [
-        ("paper", "virtual_master"), ("design", "hybrid"), ("design", "hybrid"),
-    ]  # fmt: skip
+        ("paper", "virtual_master"),
+        ("design", "hybrid"),
+        ("design", "hybrid"),
+    ]
     plain = properties.scene_of(add(bed="design", method="elastic", preset="fast"))
     assert (plain.preset, plain.method) == ("fast", "elastic")
 

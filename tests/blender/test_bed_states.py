@@ -63,15 +63,35 @@ WRITTEN = "take.toml", "bed.stl"
 BAKED = {"digiclay.bake_free"}
 #: What needs a hand, a view, a session, or the folder of a run.
 ELSEWHERE = {
-    "import_scene.digital_clay_run", "digiclay.pick_pins", "digiclay.methods_reload", "digiclay.press",
-    "digiclay.press_size", "digiclay.press_depth", "digiclay.press_strength", "digiclay.press_brush",
-    "digiclay.press_brush_save", "digiclay.press_center", "digiclay.press_keys",
+    "import_scene.digital_clay_run",
+    "digiclay.pick_pins",
+    "digiclay.methods_reload",
+    "digiclay.press",
+    "digiclay.press_size",
+    "digiclay.press_depth",
+    "digiclay.press_strength",
+    "digiclay.press_brush",
+    "digiclay.press_brush_save",
+    "digiclay.press_center",
+    "digiclay.press_keys",
     "digiclay.press_locks_invert",
-    "digiclay.press_locks_clear", "digiclay.press_shape", "digiclay.press_line", "digiclay.session",
-    "digiclay.session_go_on", "digiclay.finish_strokes", "digiclay.session_escape", "digiclay.leave_mode",
-    "digiclay.session_pause", "digiclay.session_step", "digiclay.session_stop", "digiclay.session_rewind",
-    "digiclay.follow_server", "digiclay.leave_server", "digiclay.take_record", "digiclay.take_keep",
-}  # fmt: skip
+    "digiclay.press_locks_clear",
+    "digiclay.press_shape",
+    "digiclay.press_line",
+    "digiclay.session",
+    "digiclay.session_go_on",
+    "digiclay.finish_strokes",
+    "digiclay.session_escape",
+    "digiclay.leave_mode",
+    "digiclay.session_pause",
+    "digiclay.session_step",
+    "digiclay.session_stop",
+    "digiclay.session_rewind",
+    "digiclay.follow_server",
+    "digiclay.leave_server",
+    "digiclay.take_record",
+    "digiclay.take_keep",
+}
 
 
 def link(bed: Any) -> Any:

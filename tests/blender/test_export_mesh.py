@@ -58,9 +58,12 @@ def open_edges(thing: bpy.types.Object) -> int:
 
 
 IMPORTERS = {
-    "stl": ("wm", "stl_import"), "stl_ascii": ("wm", "stl_import"), "obj": ("wm", "obj_import"),
-    "ply": ("wm", "ply_import"), "glb": ("import_scene", "gltf"),
-}  # fmt: skip
+    "stl": ("wm", "stl_import"),
+    "stl_ascii": ("wm", "stl_import"),
+    "obj": ("wm", "obj_import"),
+    "ply": ("wm", "ply_import"),
+    "glb": ("import_scene", "gltf"),
+}
 
 
 @pytest.mark.parametrize("kind", ["solid", "surface", "pins", "features"])

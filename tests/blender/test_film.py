@@ -47,9 +47,14 @@ def history():
     finger = np.zeros((201, 7))
     finger[:, 2], finger[:, 3:] = 0.050, LEVEL
     return {
-        "time": time, "position": bed.positions, "height": 0.04 - 0.2 * rise, "mode": mode.astype(np.int8),
-        "force": rise, "total_force": rise.sum(axis=1), "fingertip": finger,
-    }  # fmt: skip
+        "time": time,
+        "position": bed.positions,
+        "height": 0.04 - 0.2 * rise,
+        "mode": mode.astype(np.int8),
+        "force": rise,
+        "total_force": rise.sum(axis=1),
+        "fingertip": finger,
+    }
 
 
 def frames_of(path: Path, folder: Path) -> tuple[float, list[np.ndarray]]:

@@ -96,8 +96,14 @@ def test_every_bed_is_inside_the_frame_and_at_its_margins(rows, columns, arrange
     half = stage.half_frame(scene)
     placed = seen[:, :2] / -seen[:, 2:] / (2 * np.array(half)) + 0.5
     left, right, below, above = stage.MARGINS
-    gaps = np.array([placed[:, 0].min() - left, 1 - right - placed[:, 0].max(),
-                     placed[:, 1].min() - below, 1 - above - placed[:, 1].max()])  # fmt: skip
+    gaps = np.array(
+        [
+            placed[:, 0].min() - left,
+            1 - right - placed[:, 0].max(),
+            placed[:, 1].min() - below,
+            1 - above - placed[:, 1].max(),
+        ]
+    )
     # Camera matrices are float32. One direction fills its share of the frame, the other is centered.
     assert gaps.min() == pytest.approx(0.0, abs=1e-4)
     assert gaps.min() > -1e-4

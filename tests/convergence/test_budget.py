@@ -18,9 +18,17 @@ from tests.assemble import record, sample
 
 #: A sample of each method, arrangement and use of a shape.
 NAMES = (
-    "tap", "dome_peaked", "crater_breached", "plastic_press", "elastic_press", "viscous_press",
-    "force_display", "shape_display", "push_pull", "staggered_bed",
-)  # fmt: skip
+    "tap",
+    "dome_peaked",
+    "crater_breached",
+    "plastic_press",
+    "elastic_press",
+    "viscous_press",
+    "force_display",
+    "shape_display",
+    "push_pull",
+    "staggered_bed",
+)
 #: What is checked of each session, s: the first touches, and what follows from them.
 CUT = 0.7
 BUDGET = 20e-6

@@ -137,12 +137,16 @@ def draw_scene(random: np.random.Generator, stepper: str) -> Scene:
     fingers = [{"trajectory": draw_path(random)} for _ in range(random.choice([1, 1, 1, 1, 2, 3]))]
     step = float(random.choice([5e-3, 5e-3, 2.5e-3]))
     tolerance = {"tolerance": 10.0 ** random.uniform(-7.0, -5.0)} if stepper == "adaptive" else {}
-    return resolve({
-        "layout": {"rows": 11, "columns": 11}, "finger": fingers, "recorder": {},
-        "control": {"method": str(random.choice(FORMING))},
-        "simulation": {"physics_step": step, "duration": DRAWN, "stepper": stepper, **tolerance},
-        **(TURBULENT if random.random() < 0.1 else {}),
-    })  # fmt: skip
+    return resolve(
+        {
+            "layout": {"rows": 11, "columns": 11},
+            "finger": fingers,
+            "recorder": {},
+            "control": {"method": str(random.choice(FORMING))},
+            "simulation": {"physics_step": step, "duration": DRAWN, "stepper": stepper, **tolerance},
+            **(TURBULENT if random.random() < 0.1 else {}),
+        }
+    )
 
 
 #: Steppers that may leave their regions of stability.
@@ -187,11 +191,15 @@ def draw_level_scene(random: np.random.Generator, stepper: str) -> Scene:
     """Return a random scene of a level finger on a smooth path, which `test_independent` integrates."""
     path = draw_path(random)
     waypoints = [{name: way[name] for name in ("time", "position")} for way in path["waypoints"]]
-    return resolve({
-        "layout": {"rows": 10, "columns": 10}, "trajectory": {"waypoints": waypoints}, "recorder": {},
-        "control": {"method": str(random.choice(FORMING))},
-        "simulation": {"duration": DRAWN, "stepper": stepper},
-    })  # fmt: skip
+    return resolve(
+        {
+            "layout": {"rows": 10, "columns": 10},
+            "trajectory": {"waypoints": waypoints},
+            "recorder": {},
+            "control": {"method": str(random.choice(FORMING))},
+            "simulation": {"duration": DRAWN, "stepper": stepper},
+        }
+    )
 
 
 #: Errors of SciPy's integration itself, m and N.

@@ -90,9 +90,15 @@ def integrate(p: Numbers, curve: CubicHermiteSpline, system: System, run: Record
 
 
 def advance(
-    p: Numbers, curve: CubicHermiteSpline, x: Floats, y: Floats, full: Floats, command: Floats,
-    start: float, end: float,
-) -> None:  # fmt: skip
+    p: Numbers,
+    curve: CubicHermiteSpline,
+    x: Floats,
+    y: Floats,
+    full: Floats,
+    command: Floats,
+    start: float,
+    end: float,
+) -> None:
     """Integrate the cells that something happens to from `start` to `end`, in place; all others relax."""
     lowest = np.minimum(underside(p, curve(start), x, y), underside(p, curve(end), x, y))
     near = full[0] + MARGIN > lowest

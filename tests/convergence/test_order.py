@@ -55,9 +55,13 @@ PROBLEMS = {**SMOOTH, **FREE, **KINKED}
 def bed(stepper: str, steps: int, commands: list[float], parts: dict[str, object]) -> System:
     """Return a single cell under scripted commands, from 40 mm."""
     return one_cell(
-        stepper=stepper, period=PERIOD, step=PERIOD / steps, dead_time=0.0,
-        control=scripted(lambda t, x, y: commands[round(t / PERIOD)]), **parts,
-    )  # fmt: skip
+        stepper=stepper,
+        period=PERIOD,
+        step=PERIOD / steps,
+        dead_time=0.0,
+        control=scripted(lambda t, x, y: commands[round(t / PERIOD)]),
+        **parts,
+    )
 
 
 def away(finger: Motion | None) -> Motion:

@@ -103,9 +103,12 @@ def test_pins_that_cannot_move_carry_the_convolution_of_their_press() -> None:
     touch = (start[3] - problem.file["pin"]["rest_height"]) / speed
     pace, time = law.exponent * speed, 0.1 - touch
     nu = law.rates[:, 0]
-    lost = law.shares * nu * law.unit * (
-        (np.exp(pace * time) - np.exp(-nu * time)) / (pace + nu) + np.expm1(-nu * time) / nu
-    )  # fmt: skip
+    lost = (
+        law.shares
+        * nu
+        * law.unit
+        * ((np.exp(pace * time) - np.exp(-nu * time)) / (pace + nu) + np.expm1(-nu * time) / nu)
+    )
     exact = law.unit * np.expm1(pace * time) - lost.sum()
     judged, at = problem.judged.index(20), problem.pins.tolist().index(middle)
     assert problem.file["reference"]["forces"][judged][at] == pytest.approx(exact, rel=1e-12)
@@ -151,8 +154,10 @@ def test_the_fastest_is_compared_with_digiclay() -> None:
         for engine, seconds in (("fast", 1.0), ("own", 2.0))
     )
     assert [run.compare(fit) for fit in ([own, fast], [own], [])] == [
-        "fast 1000000 (2.00)", "own 2000000", "-",
-    ]  # fmt: skip
+        "fast 1000000 (2.00)",
+        "own 2000000",
+        "-",
+    ]
 
 
 def test_an_engine_that_diverges_has_infinite_errors_and_is_never_the_fastest() -> None:

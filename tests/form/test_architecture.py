@@ -124,8 +124,12 @@ def package_imports(package: Path) -> dict[str, set[str]]:
 def tracked(*patterns: str) -> list[Path]:
     listed = subprocess.run(
         ["git", "-c", "safe.directory=*", "ls-files", "-co", "--exclude-standard", "-z", "--", *patterns],
-        cwd=ROOT, capture_output=True, text=True, check=True, timeout=TIMEOUT,
-    )  # fmt: skip
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=True,
+        timeout=TIMEOUT,
+    )
     found = [ROOT / name for name in listed.stdout.split("\0") if name]
     assert found, f"git lists no file for {patterns}"
     return [path for path in found if path.is_file()]

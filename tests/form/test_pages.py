@@ -164,9 +164,13 @@ def find_refused_commands(page: Path, text: str) -> list[str]:
 
 
 CHECKS = (
-    find_sentences, find_undated, find_dead_links, find_absent_modules, find_absent_names,
+    find_sentences,
+    find_undated,
+    find_dead_links,
+    find_absent_modules,
+    find_absent_names,
     find_refused_commands,
-)  # fmt: skip
+)
 #: A page with one fault of each kind, in the order of the checks.
 WRONG = """\
 # Why is it wet?

@@ -19,15 +19,27 @@ LONGEST = 64
 TAGS = {"3D View", "Add Mesh", "Animation", "Import-Export", "Mesh", "Modeling", "Physics", "Sculpt"}
 #: Licenses that the platform accepts for code and, CC0, for assets.
 LICENSES = {"GPL-2.0-or-later", "GPL-3.0-or-later", "LGPL-2.1-or-later", "LGPL-3.0-or-later", "CC0-1.0"} | {
-    "BSD-1-Clause", "BSD-2-Clause", "BSD-3-Clause", "BSL-1.0", "MIT", "MIT-0", "MPL-2.0", "Pixar", "Zlib",
-}  # fmt: skip
+    "BSD-1-Clause",
+    "BSD-2-Clause",
+    "BSD-3-Clause",
+    "BSL-1.0",
+    "MIT",
+    "MIT-0",
+    "MPL-2.0",
+    "Pixar",
+    "Zlib",
+}
 #: What the platform's reviewers refuse: threads, beside which Blender crashes, and text that is executed.
 THREADS = {"threading", "_thread", "concurrent", "multiprocessing", "asyncio"}
 EXECUTED = {"exec", "eval"}
 #: What reaches other machines needs the permission `network`.
 NETWORK = {"asyncio", "distributed", "ftplib", "http", "pythonosc", "requests", "socket", "socketserver"} | {
-    "ssl", "telnetlib", "urllib.request", "websockets", "xmlrpc",
-}  # fmt: skip
+    "ssl",
+    "telnetlib",
+    "urllib.request",
+    "websockets",
+    "xmlrpc",
+}
 #: What an extension must never do: install, update itself, write into its own folder, patch others.
 FORBIDDEN = re.compile(
     r"\bpip\b.*\binstall\b.*subprocess|ensurepip|sys\.path\.(append|insert|extend)|sys\.path\[:0\]"

@@ -14,9 +14,19 @@ FOLDERS = ("operators", "panels", "press", "overlay", "live")
 WORD = re.compile(r"[A-Za-z]{3,}")
 #: Beginnings of what is no language: names of Blender, lines of a preset, features as files name them.
 NAMES = (
-    "3D View", "Object Mode", "Error: ", "wm = ", "settings", "DIGICLAY_PT_part_", "use_",
-    "session:", "shape:", ", crest ", "    {} mm²", "Lengths in ",
-)  # fmt: skip
+    "3D View",
+    "Object Mode",
+    "Error: ",
+    "wm = ",
+    "settings",
+    "DIGICLAY_PT_part_",
+    "use_",
+    "session:",
+    "shape:",
+    ", crest ",
+    "    {} mm²",
+    "Lengths in ",
+)
 
 
 def source() -> Iterator[tuple[str, ast.Module]]:

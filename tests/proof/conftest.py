@@ -46,8 +46,12 @@ def meshes(paper: Path) -> Path:
 def told(*command: str | Path) -> str:
     done = subprocess.run(
         [str(part) for part in command],
-        stdout=subprocess.PIPE, stderr=subprocess.STDOUT, check=False,
-        text=True, errors="replace", timeout=TIMEOUT,
-    )  # fmt: skip
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        check=False,
+        text=True,
+        errors="replace",
+        timeout=TIMEOUT,
+    )
     assert done.returncode == 0, done.stdout
     return done.stdout

@@ -44,9 +44,11 @@ def start(here: Path) -> Iterator[Start]:
 
     def start(*arguments: str, addon: Path = ADDON, bare: bool = False, **settings: str) -> Any:
         process = subprocess.Popen(
-            [sys.executable, *["-S"] * bare, "-m", *arguments], stderr=subprocess.PIPE, text=True,
+            [sys.executable, *["-S"] * bare, "-m", *arguments],
+            stderr=subprocess.PIPE,
+            text=True,
             env={**os.environ, "PYTHONPATH": str(addon), **settings},
-        )  # fmt: skip
+        )
         running.append(process)
         return process
 
@@ -89,10 +91,13 @@ def test_a_point_that_no_process_of_this_machine_survives_fails_alone(here: Path
     # The system kills a process that has run for so many seconds: a point of hours, each time it is begun.
     done = subprocess.run(
         [sys.executable, "-m", "digiclay", "sweep", "my.toml", *varied, "--workers", "2", "--out", "o"],
-        capture_output=True, text=True, check=False, timeout=TIMEOUT,
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=TIMEOUT,
         env={**os.environ, "PYTHONPATH": str(ADDON)},
         preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_CPU, (4, 4)),
-    )  # fmt: skip
+    )
     rule = "A worker died twice of this (signal 9), perhaps for lack of memory"
     failed = sorted(line for line in done.stderr.splitlines() if rule in line)
     assert [line.partition(": A")[0] for line in failed] == ["failed: point 1", "failed: point 3"]

@@ -61,8 +61,11 @@ def test_a_step_whose_task_fails_stops_those_that_need_it(tmp_path: Path) -> Non
     template, program = tmp_path / "out" / "openjd.json", f"Python={sys.executable}"
     done = subprocess.run(
         [sys.executable, "-m", "openjd", "run", template, "-p", program],
-        capture_output=True, text=True, check=False, timeout=TIMEOUT,
-    )  # fmt: skip
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=TIMEOUT,
+    )
     said = done.stdout + done.stderr
     assert done.returncode != 0
     assert re.findall(r"Running step '(.*)'", said) == ["tap-short: run"]

@@ -9,21 +9,44 @@ import trimesh
 from .conftest import told
 
 SOLIDS = [
-    "bilinear/surface.stl", "bilinear/surface.ascii.stl", "bilinear/pins.stl", "bilinear/pins.ascii.stl",
-    "bilinear/features.stl", "smooth/surface.stl", "smooth/boss_1.stl", "smooth/boss_2.stl",
-    "smooth/crease_1.stl", "membrane/surface.stl", "membrane/boss_1.stl", "membrane/crease_1.stl",
-]  # fmt: skip
+    "bilinear/surface.stl",
+    "bilinear/surface.ascii.stl",
+    "bilinear/pins.stl",
+    "bilinear/pins.ascii.stl",
+    "bilinear/features.stl",
+    "smooth/surface.stl",
+    "smooth/boss_1.stl",
+    "smooth/boss_2.stl",
+    "smooth/crease_1.stl",
+    "membrane/surface.stl",
+    "membrane/boss_1.stl",
+    "membrane/crease_1.stl",
+]
 SLICED = [
-    "bilinear/surface.stl", "bilinear/surface.3mf", "bilinear/surface.obj", "bilinear/pins.3mf",
-    "smooth/surface.stl", "membrane/surface.3mf", "smooth/boss_1.stl", "smooth/boss_2.stl",
+    "bilinear/surface.stl",
+    "bilinear/surface.3mf",
+    "bilinear/surface.obj",
+    "bilinear/pins.3mf",
+    "smooth/surface.stl",
+    "membrane/surface.3mf",
+    "smooth/boss_1.stl",
+    "smooth/boss_2.stl",
     "smooth/crease_1.3mf",
-]  # fmt: skip
+]
 FORMATS = ("stl", "ascii.stl", "obj", "ply", "glb", "3mf")
 FAULTS = (
-    "Facets with 1 disconnected edge", "Facets with 2 disconnected edges", "Facets with 3 disconnected edges",
-    "Total disconnected facets", "Degenerate facets", "Edges fixed", "Facets removed", "Facets added",
-    "Facets reversed", "Backwards edges", "Normals fixed",
-)  # fmt: skip
+    "Facets with 1 disconnected edge",
+    "Facets with 2 disconnected edges",
+    "Facets with 3 disconnected edges",
+    "Total disconnected facets",
+    "Degenerate facets",
+    "Edges fixed",
+    "Facets removed",
+    "Facets added",
+    "Facets reversed",
+    "Backwards edges",
+    "Normals fixed",
+)
 #: How the slicer tells of repairs, of what it left out, and of what cannot be printed.
 COMPLAINTS = re.compile(
     r"warning|error|repair|edges_fixed|degenerate|facets_(removed|added|reversed)|backwards|manifold = no",

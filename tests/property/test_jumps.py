@@ -40,11 +40,17 @@ beds = st.builds(
     pitch=st.sampled_from([2e-3, 2.3e-3, 3.1e-3]),
     arrangement=st.sampled_from(["aligned", "staggered", "hexagonal"]),
 )
-parts = st.sampled_from([
-    {}, {"relaxation": None}, {"valve_lag": None, "conduit": None}, {"contact": Contact(exponent=2e4)},
-    {"fluid": Fluid(viscosity=1.6e-9)}, {"actuator": Actuator(bore=0.2e-3)},
-    {"contact": Contact(stiffness=2.5e6)},
-])  # fmt: skip
+parts = st.sampled_from(
+    [
+        {},
+        {"relaxation": None},
+        {"valve_lag": None, "conduit": None},
+        {"contact": Contact(exponent=2e4)},
+        {"fluid": Fluid(viscosity=1.6e-9)},
+        {"actuator": Actuator(bore=0.2e-3)},
+        {"contact": Contact(stiffness=2.5e6)},
+    ]
+)
 Spot = tuple[int, float, float, float]
 #: From the issue: 100 mm sideways within 5 ms, at a depth of 4 mm.
 SIDEWAYS = [(20, 100.0, 0.0, -4.0), (5, 0.0, 0.0, -4.0), (50, 0.0, 0.0, -4.0)]
@@ -104,9 +110,13 @@ def assert_within_reach(system: System, height: Floats, *fingers: Trajectory) ->
 
 
 def assert_withstands(
-    bed: Layout, hand: list[list[Spot]], turn: tuple[float, ...], period: float, stepper: str,
+    bed: Layout,
+    hand: list[list[Spot]],
+    turn: tuple[float, ...],
+    period: float,
+    stepper: str,
     **changes: object,
-) -> None:  # fmt: skip
+) -> None:
     system = make_system(
         bed, stepper=stepper, period=period, step=period, control=scripted(half_shut), **changes
     )
@@ -124,9 +134,13 @@ def assert_withstands(
 @example(DOWN, LEVEL, Layout(5, 5), {}, 5e-3, "bernoulli")
 @example(UP, LEVEL, Layout(5, 5), {}, 5e-3, "bernoulli")
 def test_no_jump_moves_what_is_shut_or_takes_a_pin_where_none_can_be(
-    spots: list[Spot], turn: tuple[float, ...], bed: Layout, changes: dict[str, object], period: float,
+    spots: list[Spot],
+    turn: tuple[float, ...],
+    bed: Layout,
+    changes: dict[str, object],
+    period: float,
     stepper: str,
-) -> None:  # fmt: skip
+) -> None:
     assert_withstands(bed, [spots], turn, period, stepper, **changes)
 
 
@@ -146,9 +160,14 @@ BESIDE = [(1, -46.0, 1.0, -3.5), (75, -46.0, 1.0, -3.5), (2, 1.0, 1.0, -3.5), (5
     [PRESSED, BESIDE, DOWN], LEVEL, Layout(5, 5), {}, {"contact": Contact(exponent=2e4)}, 5e-3, "bernoulli"
 )
 def test_no_jump_of_several_fingers_takes_a_pin_where_none_can_be(
-    hand: list[list[Spot]], turn: tuple[float, ...], bed: Layout, changes: dict[str, object],
-    own: dict[str, object], period: float, stepper: str,
-) -> None:  # fmt: skip
+    hand: list[list[Spot]],
+    turn: tuple[float, ...],
+    bed: Layout,
+    changes: dict[str, object],
+    own: dict[str, object],
+    period: float,
+    stepper: str,
+) -> None:
     others = [own, {}][: len(hand) - 1]
     assert_withstands(bed, hand, turn, period, stepper, others=others, **changes)
 
@@ -185,9 +204,12 @@ def test_no_pin_goes_farther_than_its_own_valve_lets_it_under_the_largest_load(
     # A valve that does not lag, and one opening all along: what flows under the largest load is known.
     opening *= 10.0**-smaller
     system = one_cell(
-        dead_time=0.0, step=5e-3, valve_lag=None, fluid=Fluid(viscosity=viscosity),
+        dead_time=0.0,
+        step=5e-3,
+        valve_lag=None,
+        fluid=Fluid(viscosity=viscosity),
         control=scripted(lambda t, x, y: opening),
-    )  # fmt: skip
+    )
     finger, cell = way(spots), system.cell
     run = jumped(system, finger)
     for i, start in enumerate(run.time[:-1]):

@@ -47,9 +47,12 @@ NUMBERS = st.one_of(
     st.floats(), st.integers(), st.sampled_from([1e-9, 1e-6, 1e-3, 0.5, 1e3, 10**309, -(10**400), True])
 )
 OTHERS = st.one_of(
-    st.text(max_size=3), st.lists(NUMBERS, max_size=4), st.dictionaries(st.just("a"), NUMBERS), st.none(),
+    st.text(max_size=3),
+    st.lists(NUMBERS, max_size=4),
+    st.dictionaries(st.just("a"), NUMBERS),
+    st.none(),
     st.sampled_from(["1e400 mm", "5e-324 mm", "-1 mm", "nan s", "inf Pa", "1 parsec", "absent", "é" * 50]),
-)  # fmt: skip
+)
 #: Types of arrays that no file of ours has.
 TYPES = st.sampled_from(
     ["M8[s]", "m8[s]", "c16", "U3", "S2", "?", "i8", "u1", "f4", "f2", "f16", ">f8", "V8", "f4,i4"]

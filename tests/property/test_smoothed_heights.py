@@ -42,9 +42,14 @@ def test_smoothed_heights_keep_sum_range_and_what_is_outside_and_are_never_rough
     height = np.random.default_rng(seed).uniform(0.0, STROKE, grid.count)
     cells, none = np.arange(grid.count), np.zeros(grid.count)
     seen = Measurement(
-        grid.compute_basis(cells), height, none, height.copy(), np.zeros(grid.count, np.int8),
-        np.empty((0, grid.count)), cells,
-    )  # fmt: skip
+        grid.compute_basis(cells),
+        height,
+        none,
+        height.copy(),
+        np.zeros(grid.count, np.int8),
+        np.empty((0, grid.count)),
+        cells,
+    )
     (control,) = order_periods(Uncontrolled(), grid, CELL, 5e-3, Orders(np.array([order])))
     _, commands = control.command(None, seen)
     target, (x, y, radius, *_) = commands.target, order

@@ -18,9 +18,12 @@ from tests.renew import GOLDEN, collect_golden, run_golden
 #: N and mm: hundreds of times what rounding does, a tenth or less of what a part in 1e9 does.
 FORCE, HEIGHT, WEIGHED = {"abs": 1e-11}, {"abs": 1e-10}, {"rel": 1e-12}
 TOLERANCES = {
-    "forces": FORCE, "heights": HEIGHT, "weighed": WEIGHED, "scripted_heights": HEIGHT,
+    "forces": FORCE,
+    "heights": HEIGHT,
+    "weighed": WEIGHED,
+    "scripted_heights": HEIGHT,
     "scripted_forces": FORCE,
-}  # fmt: skip
+}
 
 
 @pytest.fixture(scope="module")

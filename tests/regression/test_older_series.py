@@ -10,9 +10,18 @@ from digiclay.cli import main
 
 SAMPLES = Path(__file__).parents[1] / "samples" / "series"
 SWEEP = [
-    "sweep", "my.toml", "--vary", "control.force_gain=1:5:5", "--vary", "layout.rows=3,4",
-    "--metric", "rfd,lag,height_error", "--out", "sweep", "--quiet",
-]  # fmt: skip
+    "sweep",
+    "my.toml",
+    "--vary",
+    "control.force_gain=1:5:5",
+    "--vary",
+    "layout.rows=3,4",
+    "--metric",
+    "rfd,lag,height_error",
+    "--out",
+    "sweep",
+    "--quiet",
+]
 BATCH = ["batch", "jobs.toml", "--out", "batch", "--quiet"]
 
 

@@ -70,9 +70,14 @@ def run_release(
     folder: Path, version: str = __version__, umask: int = 0o022, **added: str
 ) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
-        release_command(folder, version), cwd=folder.parent, env=ENVIRONMENT | added, umask=umask,
-        capture_output=True, text=True, timeout=TIMEOUT,
-    )  # fmt: skip
+        release_command(folder, version),
+        cwd=folder.parent,
+        env=ENVIRONMENT | added,
+        umask=umask,
+        capture_output=True,
+        text=True,
+        timeout=TIMEOUT,
+    )
 
 
 def leftovers(folder: Path) -> list[str]:

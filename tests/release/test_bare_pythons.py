@@ -42,8 +42,12 @@ class BarePython:
         environment = {name: value for name, value in os.environ.items() if not name.startswith("PYTHON")}
         return subprocess.run(
             [self.folder / "bin" / words[0], *words[1:]],
-            cwd=cwd, env=environment | {"PYTHONPATH": path}, capture_output=True, text=True, timeout=limit,
-        )  # fmt: skip
+            cwd=cwd,
+            env=environment | {"PYTHONPATH": path},
+            capture_output=True,
+            text=True,
+            timeout=limit,
+        )
 
 
 def read_pins(name: str) -> dict[str, str]:

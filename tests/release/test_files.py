@@ -74,6 +74,9 @@ def test_the_paper_is_found_in_the_wheel(wheel: Path, tmp_path: Path) -> None:
     done = subprocess.run(
         [sys.executable, "-P", "-m", "digiclay", "paper", "--help"],
         env=os.environ | {"PYTHONPATH": str(tmp_path / "installed")},
-        cwd=tmp_path, capture_output=True, text=True, timeout=TIMEOUT,
-    )  # fmt: skip
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        timeout=TIMEOUT,
+    )
     assert (done.returncode, "reproduce the paper" in done.stdout.lower()) == (0, True), done.stderr

@@ -28,8 +28,12 @@ def imported(*settings: str) -> set[str]:
     """Run a short session with some settings; return the core's modules it imported."""
     done = subprocess.run(
         [sys.executable, "-W", "error", "-c", RUN, *settings],
-        cwd=ADDON, capture_output=True, text=True, check=False, timeout=TIMEOUT,
-    )  # fmt: skip
+        cwd=ADDON,
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=TIMEOUT,
+    )
     assert done.returncode == 0, done.stderr
     return set(done.stdout.split())
 

@@ -72,9 +72,11 @@ def rise_within(method: str, way: str) -> float:
 
 #: Off each side but the one that the other tests are about.
 TURNED = [
-    ("straight", "turned about"), ("over a corner", "mirrored"), ("slanting", "turned again"),
+    ("straight", "turned about"),
+    ("over a corner", "mirrored"),
+    ("slanting", "turned again"),
     ("nearly along the rim", "turned"),
-]  # fmt: skip
+]
 
 
 @pytest.mark.parametrize(("way", "image"), TURNED)

@@ -28,10 +28,17 @@ def browser() -> Iterator[Any]:
     options = webdriver.ChromeOptions()
     options.binary_location = program
     for option in (
-        "headless=new", "no-sandbox", "disable-gpu", "disable-dev-shm-usage", "window-size=1400,900",
-        "disable-background-networking", "disable-component-update", "no-first-run",
-        "host-resolver-rules=MAP * ~NOTFOUND", "proxy-server=127.0.0.1:9",
-    ):  # fmt: skip
+        "headless=new",
+        "no-sandbox",
+        "disable-gpu",
+        "disable-dev-shm-usage",
+        "window-size=1400,900",
+        "disable-background-networking",
+        "disable-component-update",
+        "no-first-run",
+        "host-resolver-rules=MAP * ~NOTFOUND",
+        "proxy-server=127.0.0.1:9",
+    ):
         options.add_argument(f"--{option}")
     options.set_capability("goog:loggingPrefs", {"performance": "ALL", "browser": "ALL"})
     opened = webdriver.Chrome(options=options, service=webdriver.ChromeService(driver))

@@ -81,9 +81,16 @@ def execute(command: str, folder: Path) -> str:
     paths = os.pathsep.join((str(ROOT), str(ROOT / "addon")))
     environment = {**os.environ, "PYTHONPATH": paths, "MPLBACKEND": "agg", "COLUMNS": "80"}
     done = subprocess.run(
-        [found or program, *words], cwd=folder, env=environment, stdin=subprocess.DEVNULL,
-        capture_output=True, text=True, errors="replace", timeout=LONGEST, check=False,
-    )  # fmt: skip
+        [found or program, *words],
+        cwd=folder,
+        env=environment,
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+        errors="replace",
+        timeout=LONGEST,
+        check=False,
+    )
     return f"{command}: status {done.returncode}: {done.stderr[-400:]}" if done.returncode else ""
 
 

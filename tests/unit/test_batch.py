@@ -76,8 +76,11 @@ def test_every_scene_meets_every_method_and_every_setting():
     for jobs in (made, read_jobs(SAMPLES.parent / "batches" / "first.toml").jobs):
         assert [job.error for job in jobs] == [""] * 8
     assert [(job.scene.method, job.scene.control.force_setpoint) for job in made[:4] if job.scene] == [
-        ("virtual_master", 0.3), ("virtual_master", 0.6), ("cell_states", 0.3), ("cell_states", 0.6),
-    ]  # fmt: skip
+        ("virtual_master", 0.3),
+        ("virtual_master", 0.6),
+        ("cell_states", 0.3),
+        ("cell_states", 0.6),
+    ]
 
 
 def test_a_scene_beside_the_jobs_file_is_found_from_any_folder(tmp_path, monkeypatch):

@@ -145,9 +145,12 @@ def spiked(*places):
 
 
 def queue_smooth(
-    session, first, last, share = 1.0,
-    symmetry = "NONE",
-):  # fmt: skip
+    session,
+    first,
+    last,
+    share=1.0,
+    symmetry="NONE",
+):
     """Queue a stroke of half a second from place to place, mm."""
     (x, y), (to_x, to_y) = first, last
     session, number = queue_stroke(

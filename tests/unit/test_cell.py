@@ -68,9 +68,13 @@ def test_a_free_cell_has_the_printed_speed_at_full_valve_exactly_that_of_the_bou
 def test_a_pin_under_a_still_finger_comes_to_the_balance_force(start, pulp, count, error, stepper, step):
     # The finger stays with its underside at 48 mm; whatever the start, P_s A_a balances it in the end.
     system = one_cell(
-        actuator=Actuator(rest_height=start), relaxation=pulp, contact=Contact(stiffness=1000.0),
-        control=RAISE, stepper=stepper, step=step,
-    )  # fmt: skip
+        actuator=Actuator(rest_height=start),
+        relaxation=pulp,
+        contact=Contact(stiffness=1000.0),
+        control=RAISE,
+        stepper=stepper,
+        step=step,
+    )
     run = record(system, path((0.0, 0.0, 0.0, 48.0)), count)
     assert run.force[-1, 0] == pytest.approx(BALANCE, rel=error)
 

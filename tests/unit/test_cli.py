@@ -262,8 +262,9 @@ def test_what_is_written_before_a_signal_is_not_denied(here, monkeypatch, capfd)
     monkeypatch.setattr(export, "write", interrupted)
     code = call("export my --format obj,ply")
     assert (code, capfd.readouterr()) == (
-        130, (f"{Path('my', 'surface.obj')} (y up)\n", "Stopped; no file is half-written.\n"),
-    )  # fmt: skip
+        130,
+        (f"{Path('my', 'surface.obj')} (y up)\n", "Stopped; no file is half-written.\n"),
+    )
 
 
 @pytest.mark.parametrize("said, cores", [("", "1"), ("3", "3")])

@@ -222,8 +222,10 @@ def test_errors_of_points_whose_contact_a_step_may_hide_are_doubted(step, errors
     (done,) = [run(point.scene).estimate_errors() for point in points[:1] if point.scene]
     doubt = done.metrics.get("errors_in_doubt", "")
     assert (doubt != "", "or more" in done.summary(), doubt in done.summary()) == (
-        step == "20 ms", step == "20 ms", True
-    )  # fmt: skip
+        step == "20 ms",
+        step == "20 ms",
+        True,
+    )
 
 
 @pytest.mark.parametrize("errors", [False, True])
@@ -284,9 +286,13 @@ TUNING = ["tune", "my.toml", *VARIED.split(), "--metric", "rfd,highest", "--quie
 def cluster_here(workers):
     """Return a scheduler with workers, on threads of this process."""
     return LocalCluster(
-        n_workers=workers, threads_per_worker=2, processes=False, protocol="tcp://", host="127.0.0.1",
+        n_workers=workers,
+        threads_per_worker=2,
+        processes=False,
+        protocol="tcp://",
+        host="127.0.0.1",
         dashboard_address=":0",
-    )  # fmt: skip
+    )
 
 
 @pytest.fixture(scope="module")

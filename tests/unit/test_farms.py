@@ -89,9 +89,11 @@ def test_an_openjd_template_has_these_tasks_in_an_order_that_respects_the_steps(
         assert max(map(len, names)) == LONGEST
         return
     values = preprocess_job_parameters(
-        job_template=template, job_parameter_values={"Blender": "/p"},
-        job_template_dir=here / "out", current_working_dir=here,
-    )  # fmt: skip
+        job_template=template,
+        job_parameter_values={"Blender": "/p"},
+        job_template_dir=here / "out",
+        current_working_dir=here,
+    )
     job = create_job(job_template=template, job_parameter_values=values)
     assert {name: one.value for name, one in values.items()} == {"Series": str(here / "out"), "Blender": "/p"}
     wanted, seen = planned(), []

@@ -202,6 +202,10 @@ def test_a_pin_that_is_not_felt_does_not_count(shallow):
 
 def test_the_overlay_says_when_no_finger_presses_so_hard():
     assert [force_message(force) for force in (0.7, 2.0, 2.5, 476.0, 1e66)] == [
-        "0.70 N", "2.00 N", "2.5 N: beyond 2 N", "476 N: no finger", "1e+66 N: no finger",
-    ]  # fmt: skip
+        "0.70 N",
+        "2.00 N",
+        "2.5 N: beyond 2 N",
+        "476 N: no finger",
+        "1e+66 N: no finger",
+    ]
     assert force_message(0.7, beyond=True) == "0.70 N: beyond 3 mm"

@@ -192,8 +192,10 @@ def test_only_what_processes_of_this_machine_have_left_that_are_gone_is_taken_aw
         f".o.{os.getpid()}@{find_host()}.part",  # this one lives
         f".o.{gone}@elsewhere.part",  # nobody knows
         f".p.{gone}.part",  # another one's
-        ".o.part", "o.1.part", f".o.{gone}.doc",
-    ]  # fmt: skip
+        ".o.part",
+        "o.1.part",
+        f".o.{gone}.doc",
+    ]
     for name in left + kept:
         Path("d", name).mkdir(parents=True)
     # Another process has got its number since.

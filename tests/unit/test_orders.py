@@ -30,10 +30,7 @@ STROKE = make_orders(100, -9e-3, 9e-3, -3e-3, RADIUS)
 
 
 @cache
-def bed(
-    arrangement="aligned", method="virtual_master", size=13, period=5e-3,
-    *, shape=False
-):  # fmt: skip
+def bed(arrangement="aligned", method="virtual_master", size=13, period=5e-3, *, shape=False):
     layout = {"rows": size, "columns": size, "arrangement": arrangement}
     control = "absent" if method == "absent" else {"method": method}
     simulation = {"control_period": period}
@@ -152,8 +149,10 @@ def test_periods_without_an_order_or_with_locks_that_are_gone_are_those_of_the_m
     path[:, 0, 2] = np.linspace(46e-3, 36e-3, 121)
     nothing = Orders(np.zeros((120, 5)))
     for before, orders in (
-        ((None, None), None), ((None, None), nothing), ((lock(Verb.LOCK), lock(Verb.UNLOCK)), None)
-    ):  # fmt: skip
+        ((None, None), None),
+        ((None, None), nothing),
+        ((lock(Verb.LOCK), lock(Verb.UNLOCK)), None),
+    ):
         state = begin(system)
         for one in before:
             state = go_on(system, state, 1, one)
@@ -251,13 +250,15 @@ def test_a_locked_pin_stays_whatever_the_method_and_orders_command(method, shape
     before = state.row(0)
     everywhere = np.full(system.grid.count, 45e-3)
     orders = Orders(
-        np.concatenate([
-            repeat_order(80, Verb.SMOOTH, radius=20e-3, strength=1.0),
-            repeat_order(40, Verb.ERASE, radius=20e-3, strength=1.0),
-            repeat_order(40, Verb.PLACE),
-        ]),
+        np.concatenate(
+            [
+                repeat_order(80, Verb.SMOOTH, radius=20e-3, strength=1.0),
+                repeat_order(40, Verb.ERASE, radius=20e-3, strength=1.0),
+                repeat_order(40, Verb.PLACE),
+            ]
+        ),
         (everywhere,),
-    )  # fmt: skip
+    )
     for part in (None, orders):
         *_, state = simulate_path(system, state, path, part)
         assert_array_equal(state.row(0)[locked], before[locked])
@@ -283,10 +284,21 @@ def test_a_pin_locked_on_its_way_stops_there_and_stays_there_when_it_is_unlocked
 
 #: Rows of orders: x, y and radius, m, strength and verb.
 FAULTY = [
-    "nan 0 1e-2 1 0", "0 inf 1e-2 1 0", "0 0 -1e-2 1 0", "0 0 1e-9 1 0", "0 0 1e9 1 0", "0 0 1e-2 101 0",
-    "0 0 1e-2 -0.1 0", "0 0 1e-2 1 0.5", "0 0 1e-2 1 7", "0 0 1e-2 1 -1", f"1 0 0 0 {Verb.PLACE:d}",
-    f"-1 0 0 0 {Verb.PLACE:d}", f"0.5 0 0 0 {Verb.PLACE:d}", f"nan 0 0 0 {Verb.PLACE:d}",
-]  # fmt: skip
+    "nan 0 1e-2 1 0",
+    "0 inf 1e-2 1 0",
+    "0 0 -1e-2 1 0",
+    "0 0 1e-9 1 0",
+    "0 0 1e9 1 0",
+    "0 0 1e-2 101 0",
+    "0 0 1e-2 -0.1 0",
+    "0 0 1e-2 1 0.5",
+    "0 0 1e-2 1 7",
+    "0 0 1e-2 1 -1",
+    f"1 0 0 0 {Verb.PLACE:d}",
+    f"-1 0 0 0 {Verb.PLACE:d}",
+    f"0.5 0 0 0 {Verb.PLACE:d}",
+    f"nan 0 0 0 {Verb.PLACE:d}",
+]
 SOUND = [f"0 0 0 0 {Verb.PLACE:d}", "0 0 1e-6 0 0", f"1e3 -1e3 1e3 100 {Verb.INVERT:d}", "0 0 0 0 0"]
 
 

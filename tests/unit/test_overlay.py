@@ -16,7 +16,7 @@ from digiclay.overlay.picture import (
     move_apart,
     round_axis,
     scale_curve,
-)  # fmt: skip
+)
 from digiclay.overlay.sections import COMPACT, FULL, TAKEN, Readings, find_room, lay_out, place_label
 from hypothesis import given
 from hypothesis import strategies as st

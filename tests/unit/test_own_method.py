@@ -86,9 +86,13 @@ def test_an_installed_package_offers_a_method_by_its_name(here, monkeypatch):
     write_text(here / "padpackage.py", PAD + "\n# another\n")
     with pytest.raises(MethodError, match=r"The method pad must be that of pads 1.2 here too"):
         pickle.loads(packed)
-    monkeypatch.setattr("importlib.metadata.entry_points", lambda **_: [
-        EntryPoint("pad", "one:Pad", method_loader.GROUP), EntryPoint("pad", "two:Pad", method_loader.GROUP)
-    ])  # fmt: skip
+    monkeypatch.setattr(
+        "importlib.metadata.entry_points",
+        lambda **_: [
+            EntryPoint("pad", "one:Pad", method_loader.GROUP),
+            EntryPoint("pad", "two:Pad", method_loader.GROUP),
+        ],
+    )
     with pytest.raises(MethodError, match=r"one installed package \(got one:Pad, two:Pad\)"):
         load_method("pad")
 

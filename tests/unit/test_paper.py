@@ -287,9 +287,13 @@ def session(method, followers):
     tip[:, 2] = REST + np.concatenate([RIDGE * line, lift, VALLEY * line])
     place = assemble(scene).grid.positions
     history = {
-        "total_force": np.full(97, 0.4), "set_point": np.full(97, 0.4), "following": np.full(97, followers),
-        "fingertip": tip, "position": place, "height": np.full((1, len(place)), REST),
-    }  # fmt: skip
+        "total_force": np.full(97, 0.4),
+        "set_point": np.full(97, 0.4),
+        "following": np.full(97, followers),
+        "fingertip": tip,
+        "position": place,
+        "height": np.full((1, len(place)), REST),
+    }
     return session_of(scene, history)
 
 

@@ -34,9 +34,16 @@ def _drag(rows, columns, arrangement):
     near = np.exp(-np.sum((fingertip[:, None, :2] - place) ** 2, axis=2) / 0.004**2)
     force = 0.4 * touching[:, None] * near / near.sum(axis=1, keepdims=True)
     height = 0.04 + 0.01 * np.maximum.accumulate(near * touching[:, None], axis=0)
-    return {"time": time, "height": height, "force": force, "command": np.zeros_like(force),
-            "mode": np.full(force.shape, Mode.FORCE_FOLLOW, np.int8), "fingertip": fingertip,
-            "total_force": force.sum(axis=1), "position": place}  # fmt: skip
+    return {
+        "time": time,
+        "height": height,
+        "force": force,
+        "command": np.zeros_like(force),
+        "mode": np.full(force.shape, Mode.FORCE_FOLLOW, np.int8),
+        "fingertip": fingertip,
+        "total_force": force.sum(axis=1),
+        "position": place,
+    }
 
 
 def drag(rows=12, columns=14, arrangement="aligned"):
@@ -75,9 +82,11 @@ def test_every_axis_has_its_unit_and_every_curve_its_name(session, surface):
     found = {part.get_label(): (part.get_xlabel(), part.get_ylabel()) for part in drawn}
     plan = ("x (mm)", "y (mm)")
     assert found == {
-        "heights": ("", "height (mm)"), "force": ("time (s)", "force (N)"), "map": plan,
+        "heights": ("", "height (mm)"),
+        "force": ("time (s)", "force (N)"),
+        "map": plan,
         "scale": ("", "height (mm)"),
-    }  # fmt: skip
+    }
     names = words(axes(session, "heights")) + words(axes(session, "force"))
     assert names == [*"ABCDEF", "total force", "set point 0.37 N", "in contact"]
 

@@ -28,8 +28,10 @@ from tests.assemble import over_middle, table
 WAY = over_middle((0, 0.041), (0.1, 0.038), (0.2, 0.041))
 SMALL = {"radius": 6e-3, "edge_radius": 9e-3, "flat_radius": 3e-3}
 TABLE = {
-    "layout": {"rows": 3, "columns": 4}, "blister": SMALL, "trajectory": {"waypoints": WAY},
-}  # fmt: skip
+    "layout": {"rows": 3, "columns": 4},
+    "blister": SMALL,
+    "trajectory": {"waypoints": WAY},
+}
 
 
 def scene(**sections):
@@ -44,9 +46,13 @@ def result():
 def test_a_history_has_the_arrays_and_shapes_it_is_known_by(result):
     cells = dict.fromkeys(("height", "force", "command", "mode"), (41, 12))
     assert {name: array.shape for name, array in result.history.items()} == {
-        "time": (41,), **cells, "fingertip": (41, 7), "total_force": (41,), "position": (12, 2),
+        "time": (41,),
+        **cells,
+        "fingertip": (41, 7),
+        "total_force": (41,),
+        "position": (12, 2),
         "beyond_a_finger": (41,),  # only in a run that leaves the range of the contact law
-    }  # fmt: skip
+    }
     assert result.history["mode"].dtype == np.int8
     wanted = scene().section("trajectory").trajectory().poses(result.history["time"])
     assert np.array_equal(result.history["fingertip"], wanted)

@@ -13,7 +13,7 @@ from digiclay.core.scene.schema import (
     SECTIONS,
     UNASKED,
     Simulation,
-)  # fmt: skip
+)
 from digiclay.core.scene.toml_table import PRESETS, format_scene, resolve
 
 from tests.assemble import table

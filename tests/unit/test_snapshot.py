@@ -197,9 +197,10 @@ def test_heights_are_carried_over_to_other_parts_within_the_stroke():
     system, data = kept()
     before = load(system, data).row(0)
     for tables in (
-        {"control": {"method": "plastic"}}, {"relaxation": "absent"},
-        {"simulation": {"control_period": "10 ms"}}
-    ):  # fmt: skip
+        {"control": {"method": "plastic"}},
+        {"relaxation": "absent"},
+        {"simulation": {"control_period": "10 ms"}},
+    ):
         other = bed(**tables)
         state = transfer_heights(other, data)
         assert np.array_equal(state.row(0), before)
@@ -237,8 +238,11 @@ def test_a_memory_comes_back_in_its_types_with_its_arrays():
     assert back.table.tolist() == [[0.1, 2.0]]
     assert [*back[:2], back.count] == [Color.BLUE, Inner(-math.inf, True), 7]
     assert [type(item) for item in (back.color, back.inner.edge, back.inner.felt, back.count)] == [
-        Color, float, bool, int,
-    ]  # fmt: skip
+        Color,
+        float,
+        bool,
+        int,
+    ]
 
 
 @pytest.mark.parametrize(

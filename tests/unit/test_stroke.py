@@ -67,10 +67,7 @@ def path(stroke, at=AT, chunk=4000, bed=HEIGHT):
     return stroke, poses[:, 0]
 
 
-def lead(
-    stroke, at, chunk=4000, bed=HEIGHT,
-    creep=0.0
-):  # fmt: skip
+def lead(stroke, at, chunk=4000, bed=HEIGHT, creep=0.0):
     """Let fingers at poses (m, 7) go on along a stroke that has begun; return their poses (t, m, 7)."""
     poses, part, forces = [at], at[None], np.zeros(len(at))
     while not stroke.done and (len(part) > 1 or len(poses) == 1) and len(poses) < 4000:
@@ -410,24 +407,41 @@ HOME = ("HOME", "RELEASE")
 #: The event that begins a stroke, and others in it, of which the last alone may tell the release.
 STROKES = {
     "moves and wheel in the second stroke leave it pressed": (
-        ("PRESS", UP), ("MOUSEMOVE", DOWN), ("TIMER", UP), ("WHEELUPMOUSE", DOWN), ("TIMER_REPORT", UP),
+        ("PRESS", UP),
+        ("MOUSEMOVE", DOWN),
+        ("TIMER", UP),
+        ("WHEELUPMOUSE", DOWN),
+        ("TIMER_REPORT", UP),
     ),
     "the next move tells a release that a pie menu takes": (
-        ("PRESS", UP), ("MOUSEMOVE", DOWN), ("Z", DOWN), ("TIMER", DOWN), ("TIMER", KEY), ("TIMER", KEY_UP),
+        ("PRESS", UP),
+        ("MOUSEMOVE", DOWN),
+        ("Z", DOWN),
+        ("TIMER", DOWN),
+        ("TIMER", KEY),
+        ("TIMER", KEY_UP),
         ("MOUSEMOVE", UP),
     ),
     "a timer after another key tells it": (("PRESS", UP), ("TIMER", KEY), ("TIMER", UP)),
     "a move tells it after the first press of all: no other release can be named": (
-        ("PRESS", HOME), ("TIMER", HOME), ("MOUSEMOVE", UP),
+        ("PRESS", HOME),
+        ("TIMER", HOME),
+        ("MOUSEMOVE", UP),
     ),
     # A drag is a move: it names the press itself, and a move copied from Blender's record what was before.
     "a stroke begun by a drag learns from a timer what was before": (
-        ("CLICK_DRAG", DOWN), ("MOUSEMOVE", UP), ("TIMER", UP), ("TIMER_REPORT", UP),
+        ("CLICK_DRAG", DOWN),
+        ("MOUSEMOVE", UP),
+        ("TIMER", UP),
+        ("TIMER_REPORT", UP),
     ),
     "then a move after another key tells it": (
-        ("CLICK_DRAG", DOWN), ("TIMER", UP), ("TIMER", KEY), ("MOUSEMOVE", UP),
+        ("CLICK_DRAG", DOWN),
+        ("TIMER", UP),
+        ("TIMER", KEY),
+        ("MOUSEMOVE", UP),
     ),
-}  # fmt: skip
+}
 LEFT_PRESSED = ("leave it pressed", "what was before")
 
 

@@ -145,9 +145,11 @@ def test_a_folder_of_another_study_is_refused(whole, here, refused):
     shutil.copytree(whole, here / "out")
     before = files(here / "out")
     for change, said in (
-        (command("--second --samples 4"), "samples 8"), (command("--second --seed 2"), "seed 1"),
-        (["--second", "--set", "layout.pitch=2.9 mm"], "with another scene"), ([], "orders first, second")
-    ):  # fmt: skip
+        (command("--second --samples 4"), "samples 8"),
+        (command("--second --seed 2"), "seed 1"),
+        (["--second", "--set", "layout.pitch=2.9 mm"], "with another scene"),
+        ([], "orders first, second"),
+    ):
         refused([*QUIET, *change], f"out holds another study ({said}): choose another folder with --out.\n")
     assert files(here / "out") == before
 

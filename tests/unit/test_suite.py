@@ -236,9 +236,12 @@ def test_a_relief_of_two_fingers_is_that_of_both_and_an_error_under_either_is_fo
         for own in np.moveaxis(tips, 1, 0)
     )
     history = {
-        "fingertip": tips, "position": place, "finger_force": np.full((61, 2), 0.4),
-        "force": np.zeros((61, len(place))), "mode": np.full((61, len(place)), Mode.FORCE_FOLLOW),
-    }  # fmt: skip
+        "fingertip": tips,
+        "position": place,
+        "finger_force": np.full((61, 2), 0.4),
+        "force": np.zeros((61, len(place))),
+        "mode": np.full((61, len(place)), Mode.FORCE_FOLLOW),
+    }
     for cell in (6 * 25 + 12, 18 * 25 + 12):
         off = np.where(np.arange(len(place)) == cell, 1e-3, 0.0)
         found = measure_relief(scene, {**history, "height": (rest + nominal + off)[None]}, 1e-3)

@@ -48,10 +48,14 @@ def kept(folder):
 
 
 READ = {
-    "a.b=1:10:4": ("1", "4", "7", "10"), "a.b=0.1:0.3:3": ("0.1", "0.2", "0.3"), "a.b=3:1:3": ("3", "2", "1"),
-    "a.b=1:100:3:log": ("1", "10", "100"), "a.b=2 mm:4 mm:3": ("2 mm", "3 mm", "4 mm"),
-    "a.b=cone, gaussian": ("cone", "gaussian"), "preset=paper": ("paper",),
-}  # fmt: skip
+    "a.b=1:10:4": ("1", "4", "7", "10"),
+    "a.b=0.1:0.3:3": ("0.1", "0.2", "0.3"),
+    "a.b=3:1:3": ("3", "2", "1"),
+    "a.b=1:100:3:log": ("1", "10", "100"),
+    "a.b=2 mm:4 mm:3": ("2 mm", "3 mm", "4 mm"),
+    "a.b=cone, gaussian": ("cone", "gaussian"),
+    "preset=paper": ("paper",),
+}
 
 
 @pytest.mark.parametrize("said, words", READ.items())
@@ -114,9 +118,16 @@ def test_the_table_names_axes_and_metrics_with_their_si_units():
     axes = ["--vary", "layout.pitch=3 mm:3.5 mm:2", "--metric", "rfd,lag,contact_share"]
     main(["sweep", "my.toml", "--quiet", *axes, "--out", "out"])
     assert list(rows("out")[0]) == [
-        "layout.pitch (m)", "rfd (N)", "lag_mean (m)", "contact_share (1)", "run_time (s)",
-        "height_error (m)", "force_error (N)", "lost", "error",
-    ]  # fmt: skip
+        "layout.pitch (m)",
+        "rfd (N)",
+        "lag_mean (m)",
+        "contact_share (1)",
+        "run_time (s)",
+        "height_error (m)",
+        "force_error (N)",
+        "lost",
+        "error",
+    ]
     assert [line["layout.pitch (m)"] for line in rows("out")] == ["0.003", "0.0035"]
 
 
@@ -268,7 +279,7 @@ def finished(executor, task, todo, **known):
         submit(executor, task, [(point,) for point in todo], **{"stopped": lambda: False, **known}),
         lambda bundle, records: done.update({bundle[0].index: records[0]}),
         lambda bundle, why: done.update({bundle[0].index: {"error": why}}),
-    )  # fmt: skip
+    )
     return done
 
 
@@ -293,9 +304,11 @@ def test_a_piece_whose_task_fails_is_told_of_and_the_others_go_on_unless_the_wor
 
     with ThreadPoolExecutor(1) as threads:
         assert finished(threads, task, some(4)) == {
-            0: {"figures": {}}, 1: {"error": "killed too often"}, 2: {"error": "KeyError: 'own fault'"},
+            0: {"figures": {}},
+            1: {"error": "killed too often"},
+            2: {"error": "KeyError: 'own fault'"},
             3: {"figures": {}},
-        }  # fmt: skip
+        }
         with pytest.raises(OutputError, match=r"gone What is done is kept"):
             finished(threads, task, some(5)[4:])
 

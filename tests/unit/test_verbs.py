@@ -102,9 +102,13 @@ def test_one_stroke_erases_what_is_in_its_ring_and_a_weak_one_part_of_it(strengt
 
 
 OTHERS = [
-    ("lower", {"depth": 8e-3}), ("raise", {"height": 12e-3}), ("level", {}), ("smooth", {}), ("erase", {}),
+    ("lower", {"depth": 8e-3}),
+    ("raise", {"height": 12e-3}),
+    ("level", {}),
+    ("smooth", {}),
+    ("erase", {}),
     ("stamp", {"height": 10e-3}),
-]  # fmt: skip
+]
 
 
 @pytest.mark.parametrize(
@@ -126,9 +130,12 @@ def test_a_locked_pin_keeps_its_height_under_every_brush_and_no_finger_presses_i
 def test_locks_are_taken_off_by_ctrl_turned_over_and_cleared():
     session, counts = begin(), []
     for drawn in (
-        stroke("lock"), stroke("lock", ((12e-3, 0.0), (18e-3, 0.0)), ctrl=True),
-        stroke("invert_locks", CLICK), stroke("invert_locks", CLICK), stroke("clear_locks", CLICK)
-    ):  # fmt: skip
+        stroke("lock"),
+        stroke("lock", ((12e-3, 0.0), (18e-3, 0.0)), ctrl=True),
+        stroke("invert_locks", CLICK),
+        stroke("invert_locks", CLICK),
+        stroke("clear_locks", CLICK),
+    ):
         session = play(session, drawn)
         counts.append(int(locked(session).sum()))
     first, rest, turned, again, none = counts

@@ -198,9 +198,13 @@ def select(thing: Any) -> None:
 
 
 def grab(
-    offset: tuple[float, float, float], axis: str, steps: int = 6, look_as: str = "", end: str = "LEFTMOUSE",
+    offset: tuple[float, float, float],
+    axis: str,
+    steps: int = 6,
+    look_as: str = "",
+    end: str = "LEFTMOUSE",
     periods: int = 0,
-) -> Iterator[float | None]:  # fmt: skip
+) -> Iterator[float | None]:
     """Move what is selected with G along an axis, by an offset in mm, step by step, and confirm it.
 
     Sessions follow each step before the next, for so many control `periods` at least. With `look_as` what

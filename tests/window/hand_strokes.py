@@ -43,9 +43,14 @@ def drag(start: Pixel, end: Pixel, duration: float, rate: float) -> str:
 
 
 def line(
-    blender: Any, start: Place, end: Place, duration: float = 1.0, rate: float = 60, key: str = "",
+    blender: Any,
+    start: Place,
+    end: Place,
+    duration: float = 1.0,
+    rate: float = 60,
+    key: str = "",
     last: str = "mouseup 1",
-) -> subprocess.Popen[bytes]:  # fmt: skip
+) -> subprocess.Popen[bytes]:
     """Start a hand that draws a line over the bed, mm, with a key held down, and ends it by some words."""
     first, final = on_the_screen(blender, *start), on_the_screen(blender, *end)
     down, up = (f"keydown {key} sleep 0.2", f"keyup {key}") if key else ("", "")
@@ -186,10 +191,14 @@ def navigation(blender: Any) -> Iterator[float | None]:
     middle = (start[0] + end[0]) // 2, (start[1] + end[1]) // 2
     note(blender, "before orbit")
     process = hand(
-        to(start), "mousedown 1", drag(start, middle, 0.5, 60),
-        "mousedown 2 sleep 0.05", drag(middle, (middle[0] + 60, middle[1]), 0.3, 60), "mouseup 2 sleep 0.1",
+        to(start),
+        "mousedown 1",
+        drag(start, middle, 0.5, 60),
+        "mousedown 2 sleep 0.05",
+        drag(middle, (middle[0] + 60, middle[1]), 0.3, 60),
+        "mouseup 2 sleep 0.1",
         "click 4 sleep 0.2",
-    )  # fmt: skip
+    )
     yield from done(blender, process)
     note(blender, "in mid-stroke")
     yield from act(blender, drag(end, on_the_screen(blender, HALF, 0.0), 0.3, 60), "mouseup 1")

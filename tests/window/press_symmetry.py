@@ -50,10 +50,14 @@ def script(blender: Any) -> Iterator[float | None]:
     settings = brush(blender)
     settings.radial = 4
     for name, symmetry, way in (
-        ("one", "NONE", APART), ("radial", "RADIAL", APART), ("mirrored", "X", APART),
-        ("across alone", "NONE", ACROSS), ("across", "X", ACROSS),
-        ("along alone", "NONE", ALONG), ("along", "X", ALONG),
-    ):  # fmt: skip
+        ("one", "NONE", APART),
+        ("radial", "RADIAL", APART),
+        ("mirrored", "X", APART),
+        ("across alone", "NONE", ACROSS),
+        ("across", "X", ACROSS),
+        ("along alone", "NONE", ALONG),
+        ("along", "X", ALONG),
+    ):
         yield from begin(blender)
         settings.symmetry = symmetry
         process = line(blender, *way, 0.3, 125)

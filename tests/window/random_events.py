@@ -16,10 +16,16 @@ CHOICES = {
     "scale": 5, "workspace": 5, "scene": 5, "play": 6, "parameter": 5, "duplicate": 4, "save": 3, "load": 2,
 }  # fmt: skip
 KEYS: dict[str, tuple[str, dict[str, bool]]] = {
-    "undo": ("Z", {"ctrl": True}), "redo": ("Z", {"ctrl": True, "shift": True}), "edit": ("TAB", {}),
-    "delete": ("DEL", {}), "stop": ("ESC", {}), "pause": ("P", {}), "step": ("P", {"shift": True}),
-    "rewind": ("BACK_SPACE", {}), "reset": ("BACK_SPACE", {"shift": True}),
-}  # fmt: skip
+    "undo": ("Z", {"ctrl": True}),
+    "redo": ("Z", {"ctrl": True, "shift": True}),
+    "edit": ("TAB", {}),
+    "delete": ("DEL", {}),
+    "stop": ("ESC", {}),
+    "pause": ("P", {}),
+    "step": ("P", {"shift": True}),
+    "rewind": ("BACK_SPACE", {}),
+    "reset": ("BACK_SPACE", {"shift": True}),
+}
 
 
 class Events:

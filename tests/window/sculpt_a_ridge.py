@@ -132,10 +132,12 @@ def note(blender: Any, name: str) -> None:
     session, roles = blender.sessions()[0], blender.part("roles")
     bed = blender.beds()[0]
     blender.SEEN[name] = {
-        "numbers": list(session.numbers), "tips": list(roles.fingertips_of(bed)),
-        "poses": (1e3 * session.poses[:, :3]).tolist(), "waits": session.blocking_reason,
+        "numbers": list(session.numbers),
+        "tips": list(roles.fingertips_of(bed)),
+        "poses": (1e3 * session.poses[:, :3]).tolist(),
+        "waits": session.blocking_reason,
         "forces": session.state.finger_forces().tolist(),
-    }  # fmt: skip
+    }
 
 
 def list_hidden(blender: Any) -> list[int]:

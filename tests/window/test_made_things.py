@@ -50,8 +50,9 @@ AMOUNTS, HANDS = (2e-3, 4e-3, 8e-3, 15e-3), ((60.0, 1), (24.0, 5), (7.0, 1))
 CORE = 1.5e-3
 #: What Raise and Lower do in the cases.
 KINDS: dict[str, dict[str, Any]] = {
-    "lowered 6 mm": {"brush": "lower", "depth": 6e-3}, "raised 8 mm": {"brush": "raise", "height": 8e-3},
-}  # fmt: skip
+    "lowered 6 mm": {"brush": "lower", "depth": 6e-3},
+    "raised 8 mm": {"brush": "raise", "height": 8e-3},
+}
 
 
 def _bend(*places: Any) -> dict[str, Any]:
@@ -90,10 +91,13 @@ def measure_unevenness(made: Played) -> Floats:
     near, blister = measure_distances(made), made.session.scene.blister
     cells = near < blister.radius + made.session.scene.layout.pitch
     near, flat, radius = near[cells], blister.flat_radius, blister.radius
-    knots = np.concatenate([
-        np.linspace(0.0, flat, PARTS[0], endpoint=False), np.linspace(flat, radius, PARTS[1]),
-        [max(2.0 * radius - flat, near.max() * (1.0 + 1e-9))],
-    ])  # fmt: skip
+    knots = np.concatenate(
+        [
+            np.linspace(0.0, flat, PARTS[0], endpoint=False),
+            np.linspace(flat, radius, PARTS[1]),
+            [max(2.0 * radius - flat, near.max() * (1.0 + 1e-9))],
+        ]
+    )
     hats = np.array([np.interp(near, knots, row) for row in np.eye(len(knots))]).T
     height = made.formed[cells]
     return height - hats @ np.linalg.lstsq(hats, height, rcond=None)[0]
@@ -129,9 +133,11 @@ def list_reliefs() -> Iterator[dict[str, Any]]:
             )
             formed = measure_unevenness(made)
             yield {
-                "case": f"{name}, {kind}, at {angle:g} degrees", "rms": math.sqrt(np.mean(formed**2)),
-                "most": np.abs(formed).max(), "spike": find_spikes(made).max(),
-            }  # fmt: skip
+                "case": f"{name}, {kind}, at {angle:g} degrees",
+                "rms": math.sqrt(np.mean(formed**2)),
+                "most": np.abs(formed).max(),
+                "spike": find_spikes(made).max(),
+            }
 
 
 def list_differences() -> Iterator[dict[str, Any]]:

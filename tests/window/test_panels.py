@@ -7,8 +7,13 @@ from tests.window.blender_window import Seen
 PLAYED = {"script": "look_at_panels.py"}
 #: What Blender prints when a panel's draw fails, or asks for a property or a value there is not.
 COMPLAINTS = (
-    "rna_uiItemR", "property not found", "AttributeError", "unknown operator", "current value", "not found in"
-)  # fmt: skip
+    "rna_uiItemR",
+    "property not found",
+    "AttributeError",
+    "unknown operator",
+    "current value",
+    "not found in",
+)
 
 
 def test_every_panel_is_drawn_unfolded_without_a_complaint_and_a_bed_beside_it(seen: Seen) -> None:

@@ -181,8 +181,12 @@ HAND = list(range(1, 8))
 def test_fingertips_come_and_go_while_the_session_goes_on(seen: Seen) -> None:
     found = {name: seen[name]["numbers"] for name in ("two", "hand", "deleted", "hand again", "copied")}
     assert found == {
-        "two": [1, 2], "hand": HAND, "deleted": [1, 2], "hand again": HAND, "copied": [*HAND, 8],
-    }  # fmt: skip
+        "two": [1, 2],
+        "hand": HAND,
+        "deleted": [1, 2],
+        "hand again": HAND,
+        "copied": [*HAND, 8],
+    }
     assert [seen[name]["tips"] == seen[name]["numbers"] for name in found] == [True] * 5
     assert [seen[name]["waits"] for name in found] == [""] * 5
     assert seen["hand"]["hidden"] == []

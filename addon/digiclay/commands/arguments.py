@@ -61,10 +61,13 @@ SCENE_OPTIONS: Options = {
     "--stepper S": "stepper: the same as --set simulation.stepper=S",
     "--tolerance T": 'largest error of the heights, such as "1 um": chooses the adaptive stepper',
     "--set KEY=VALUE": {
-        "dest": "settings", "type": _setting, "action": "append", "default": [],
+        "dest": "settings",
+        "type": _setting,
+        "action": "append",
+        "default": [],
         "help": 'override a parameter, such as layout.pitch="4 mm" or conduit=absent; may be repeated',
     },
-}  # fmt: skip
+}
 
 
 def add_scene(parser: argparse.ArgumentParser, default: str = "", *, optional: bool = False) -> None:
@@ -129,9 +132,13 @@ def add_command(
 ) -> argparse.ArgumentParser:
     """Add a command; its own help begins with `description`, by default `help` as a sentence."""
     parser: argparse.ArgumentParser = commands.add_parser(
-        name, description=description or f"{help[0].upper()}{help[1:]}.", epilog=epilog,
-        formatter_class=Help, allow_abbrev=False, **({"help": help} if listed else {}),
-    )  # fmt: skip
+        name,
+        description=description or f"{help[0].upper()}{help[1:]}.",
+        epilog=epilog,
+        formatter_class=Help,
+        allow_abbrev=False,
+        **({"help": help} if listed else {}),
+    )
     parser.set_defaults(carry_out=carry_out)
     return parser
 

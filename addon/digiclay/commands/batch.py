@@ -40,27 +40,30 @@ in the JOBS file. Exit code 1: some jobs failed, the others are complete.
 CHUNK = 50
 #: Options that need --submit.
 FARM_OPTIONS = {
-    "--program PATH":
-        "with --submit: digiclay, its Python or Blender on the machines there; default: the one running",
+    "--program PATH": (
+        "with --submit: digiclay, its Python or Blender on the machines there; default: the one running"
+    ),
     "--chunk N": (read_count, f"with --submit: frames of a film that a task draws; default {CHUNK}"),
     "--quiet": QUIET,
-}  # fmt: skip
+}
 OPTIONS: Options = {
     "file JOBS": "a .toml file, or a sample's name",
     "--out DIR": (Path, "folder; default: the file's name in the working folder"),
     "--method M": {
-        "action": "append", "default": [],
+        "action": "append",
+        "default": [],
         "help": "one more method for all scenes, also one of your own, mine.py:Mine; may be repeated",
     },
     "--jobs N": (read_count, "number of processes; default: one a core"),
-}  # fmt: skip
+}
 #: Options of which one may be given.
 INSTEAD = {
     "--prepare": "write the files of the jobs, run none",
     "--submit FORMAT": (
-        FORMATS, f"write the files of the jobs and those of a render farm: {', '.join(FORMATS)}; run none",
+        FORMATS,
+        f"write the files of the jobs and those of a render farm: {', '.join(FORMATS)}; run none",
     ),
-}  # fmt: skip
+}
 #: Seconds between two pages that are written while jobs run, at least, and times that a page's writing takes.
 PAUSE, REST = 2.0, 10.0
 
@@ -170,9 +173,14 @@ def _finish(arguments: argparse.Namespace, folder: Folder, failed: dict[str, str
 def _start_job(folder: Folder, job: Job) -> JobProcess:
     """Run a job in a process of its own."""
     arguments = [
-        "job", str(folder.find_job(job).resolve()), "--out", str(folder.find_run(job).resolve()),
-        "--follow", "--since", repr(time.time()),
-    ]  # fmt: skip
+        "job",
+        str(folder.find_job(job).resolve()),
+        "--out",
+        str(folder.find_run(job).resolve()),
+        "--follow",
+        "--since",
+        repr(time.time()),
+    ]
     if job.scene is not None and (word := find_word(job.scene)):
         arguments += ["--method", word]
     return JobProcess(arguments, folder.find_log(job))

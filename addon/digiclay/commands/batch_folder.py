@@ -155,8 +155,10 @@ class Folder:
 def open_batch(path: Path, batch: JobSeries) -> Iterator[Folder]:
     """Make a batch's folder, or continue one; no other process may work in it meanwhile."""
     description = {
-        "batch": batch.name, "digiclay": __version__, "jobs": {job.name: job.error for job in batch.jobs},
-    }  # fmt: skip
+        "batch": batch.name,
+        "digiclay": __version__,
+        "jobs": {job.name: job.error for job in batch.jobs},
+    }
     with open_series(path, Kind("batch", MARK, (JOBS, RUNS, LOGS)), description):
         yield Folder(path, batch)
 

@@ -58,8 +58,15 @@ NOTED = ("figures", "beyond_a_finger")
 DEFAULT = ("virtual_master", "cell_states")
 #: Options that need --suite.
 SUITE_ONLY = (
-    "trajectories", "repeats", "first_seed", "noise", "drags", "quick", "workers", "scheduler",
-)  # fmt: skip
+    "trajectories",
+    "repeats",
+    "first_seed",
+    "noise",
+    "drags",
+    "quick",
+    "workers",
+    "scheduler",
+)
 
 
 def _add_suite(parser: argparse.ArgumentParser) -> None:
@@ -94,13 +101,14 @@ def _methods(text: str) -> tuple[str, ...]:
 
 OPTIONS = {
     "--methods M,...": (
-        _methods, "default virtual_master,cell_states; with --suite all that carry a blister",
+        _methods,
+        "default virtual_master,cell_states; with --suite all that carry a blister",
     ),
     "--speed": "also the largest tracking speeds",
     "--out DIR": (Path, "folder; default: SCENE_compare in the working folder"),
     "--overwrite": "replace another comparison in the folder",
     "--quiet": QUIET,
-}  # fmt: skip
+}
 
 
 @command(

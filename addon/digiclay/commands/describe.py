@@ -23,11 +23,21 @@ examples:
 """
 #: The places on the line from finger to pins, and the sections of the scene that fill them.
 PLACES = (
-    ("finger", "fingertip"), ("contact", "contact"), ("relaxation", "relaxation"), ("actuator", "actuator"),
-    ("supply", "supply"), ("fluid", "fluid"), ("valve", "valve"), ("conduit", "conduit"),
-    ("valve lag", "valve_lag"), ("dead time", "delay"), ("sensors", "sensors"), ("controller", "control"),
-    ("blister", "blister"), ("recorder", "recorder"),
-)  # fmt: skip
+    ("finger", "fingertip"),
+    ("contact", "contact"),
+    ("relaxation", "relaxation"),
+    ("actuator", "actuator"),
+    ("supply", "supply"),
+    ("fluid", "fluid"),
+    ("valve", "valve"),
+    ("conduit", "conduit"),
+    ("valve lag", "valve_lag"),
+    ("dead time", "delay"),
+    ("sensors", "sensors"),
+    ("controller", "control"),
+    ("blister", "blister"),
+    ("recorder", "recorder"),
+)
 #: Units people read: factor and name.
 READ = {"m": (1e3, "mm"), "s": (1e3, "ms"), "Pa": (1e-5, "bar"), "m2/s": (1e6, "mm2/s"), "m/s": (1e3, "mm/s")}
 

@@ -46,11 +46,14 @@ def add_series(parser: argparse.ArgumentParser, syntax: str, metrics: str, varie
     """Add SCENE and the options of what varies, by its `syntax`, what is measured, where, and how."""
     add_scene(parser)
     several = {"action": "append", "required": True, "help": f"{syntax}; may be repeated"}
-    add_options(parser, {
-        f"--vary KEY={varied}": several,
-        "--metric M,...": (None, f"metrics of tables and plots; default: {metrics}", metrics),
-        "--out DIR": {"type": Path, "required": True, "help": "the folder"},
-    })  # fmt: skip
+    add_options(
+        parser,
+        {
+            f"--vary KEY={varied}": several,
+            "--metric M,...": (None, f"metrics of tables and plots; default: {metrics}", metrics),
+            "--out DIR": {"type": Path, "required": True, "help": "the folder"},
+        },
+    )
     add_pool(parser)
     add_options(parser, {"--quiet": QUIET})
 

@@ -34,12 +34,14 @@ SURFACE = {
     # 0 stands for the default in files alone.
     "--resolution N": (whole_number(1, 64), "points a pitch; default: 1, or 4 for curved skins", 0),
     "--threshold L": (
-        millimeters, "least distance of a feature from the former surface, mm, or with a unit; "
-        f"default {USUAL.threshold * 1e3:g} mm", USUAL.threshold,
+        millimeters,
+        "least distance of a feature from the former surface, mm, or with a unit; "
+        f"default {USUAL.threshold * 1e3:g} mm",
+        USUAL.threshold,
     ),
     "--smallest N": (int, f"least number of pins of a feature; default {USUAL.smallest}", USUAL.smallest),
     "--former T": (None, "instant of the former surface, s, or 'rest'; default: the start", "0"),
-}  # fmt: skip
+}
 TIME = {"--time T": (seconds, "instant, s; default: the end")}
 
 
@@ -88,7 +90,8 @@ OPTIONS = {
     "--kind": (KINDS, f"{list_choices(KINDS)}; default solid", "solid"),
     **SURFACE,
     "--base-thickness L": (
-        millimeters, "base under the lowest point, mm, or with a unit; default: 3 mm",
+        millimeters,
+        "base under the lowest point, mm, or with a unit; default: 3 mm",
     ),
     "--separate": "one file a feature",
     "--unit": (UNITS, "unit of all formats but glb; default: mm", "mm"),
@@ -96,7 +99,7 @@ OPTIONS = {
     "--forward": (AXES, "forward axis of an obj, as --forward=-z; default: to --up", ""),
     **TIME,
     "--out DIR": (Path, "output folder; default: the run folder"),
-}  # fmt: skip
+}
 
 
 def file_names(kinds: Iterable[str], kind: str = "solid") -> list[str]:

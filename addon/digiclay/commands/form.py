@@ -41,14 +41,15 @@ OPTIONS = {
     "--finger": (
         (*GESTURES, "scene"),
         "press: into the highest part; pull: press, and draw a peak out of it (default); "
-        "away: no touch; scene: as the scene says", "pull",
+        "away: no touch; scene: as the scene says",
+        "pull",
     ),
     "--out DIR": (Path, "folder; default: the shape's name in the working folder"),
     "--overwrite": "replace an older run at the end",
     "--export F,...": (formats, "mesh formats; default stl", ["stl"]),
     **NO_ERRORS,
     "--quiet": QUIET,
-}  # fmt: skip
+}
 
 
 @command(
@@ -111,9 +112,10 @@ def _evaluate(result: Result, row: int, laid: Fitted) -> tuple[Result, list[str]
     raised, lowered = (float(np.maximum(way, 0.0).sum() * area) for way in (change, -change))
     figures = {"display_error": error, "raised_volume": raised, "lowered_volume": lowered}
     counts = {
-        "shape_covered": laid.covered, "shape_clipped": laid.too_low + laid.too_high,
+        "shape_covered": laid.covered,
+        "shape_clipped": laid.too_low + laid.too_high,
         "shape_overhanging": laid.overhanging,
-    }  # fmt: skip
+    }
     units = dict(zip(figures, ("m", "m3", "m3"), strict=True))
     metrics = {**result.metrics, **figures, **counts, "units": {**result.metrics["units"], **units}}
     lines = [

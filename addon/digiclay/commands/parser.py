@@ -15,11 +15,20 @@ from .stop import WRONG
 
 #: The commands by name, without those of other packages: only the one asked for is imported.
 COMMANDS = {
-    "run": "run.carry_out", "batch": "batch.carry_out", "job": "job.carry_out", "page": "job.write_page",
-    "form": "form.carry_out", "describe": "describe.carry_out", "export": "export.carry_out",
-    "features": "export.list_features", "plot": "render.plot", "render": "render.carry_out",
-    "sweep": "sweep.carry_out", "compare": "compare.carry_out", "new-method": "new_method.carry_out",
-}  # fmt: skip
+    "run": "run.carry_out",
+    "batch": "batch.carry_out",
+    "job": "job.carry_out",
+    "page": "job.write_page",
+    "form": "form.carry_out",
+    "describe": "describe.carry_out",
+    "export": "export.carry_out",
+    "features": "export.list_features",
+    "plot": "render.plot",
+    "render": "render.carry_out",
+    "sweep": "sweep.carry_out",
+    "compare": "compare.carry_out",
+    "new-method": "new_method.carry_out",
+}
 
 EXAMPLES = """\
 examples:

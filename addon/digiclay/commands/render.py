@@ -46,7 +46,8 @@ OPTIONS: Options = {
     # Scripts written for older versions have it so.
     "--colour": {"dest": "color", "choices": COLORS, "help": argparse.SUPPRESS},
     "--arrows": {
-        "action": argparse.BooleanOptionalAction, "help": "forces as arrows; default: in films only",
+        "action": argparse.BooleanOptionalAction,
+        "help": "forces as arrows; default: in films only",
     },
     "--rate N": (int, "frames a second of film; default 25"),
     "--frames N": (int, "frames of a rotation; default: 75"),
@@ -57,7 +58,7 @@ OPTIONS: Options = {
         "action": argparse.BooleanOptionalAction,
         "help": "plot of the force over time, a line a fingertip; default: in films",
     },
-}  # fmt: skip
+}
 #: What a picture is called by default.
 PICTURE = "pins.png"
 #: How a picture looks by default.

@@ -51,9 +51,11 @@ def within(scene: Scene, budget: float, *, quiet: bool) -> Fitted:
 def noted(fit: Fitted) -> dict[str, Any]:
     """Return what ``metrics.json`` holds of it."""
     lengths = {
-        "allowed": fit.budget, "measured": fit.error, "departure": fit.departure,
+        "allowed": fit.budget,
+        "measured": fit.error,
+        "departure": fit.departure,
         "own_error": fit.own_error,
-    }  # fmt: skip
+    }
     units = {**dict.fromkeys(lengths, "m"), "work": "1", "time": "1"}
     return {**lengths, "work": fit.work, "time": fit.time, "left_out": fit.left_out, "units": units}
 
@@ -110,7 +112,7 @@ OPTIONS: dict[str, Any] = {
     "--render": "also a picture, pins.png (needs bpy)",
     **NO_ERRORS,
     "--quiet": QUIET,
-}  # fmt: skip
+}
 
 
 @command(
@@ -217,9 +219,13 @@ def simulate(arguments: argparse.Namespace, scene: Scene, path: Path, stop: Stop
 
 
 def write_run(
-    arguments: argparse.Namespace, claim: Claim, result: Result, extras: Iterable[Extra], stop: Stop,
+    arguments: argparse.Namespace,
+    claim: Claim,
+    result: Result,
+    extras: Iterable[Extra],
+    stop: Stop,
     *notes: str,
-) -> int:  # fmt: skip
+) -> int:
     """Write the folder of a run with its extras, print, and return the exit code; `notes` come first."""
     skipped: list[Extra] = []
     wrong: list[Exception] = []

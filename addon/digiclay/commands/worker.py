@@ -76,9 +76,12 @@ class Process:
         apart: dict[str, Any] = {"creationflags": 0x200} if os.name == "nt" else {"start_new_session": True}
         with explain_os_error("A process cannot be started", DigiclayError):
             self.process = subprocess.Popen(
-                [*command, *arguments], stdin=subprocess.PIPE, env={**os.environ, **environment},
-                **streams, **apart,
-            )  # fmt: skip
+                [*command, *arguments],
+                stdin=subprocess.PIPE,
+                env={**os.environ, **environment},
+                **streams,
+                **apart,
+            )
         assert self.process.stdin is not None
         self.input = self.process.stdin
 

@@ -65,18 +65,25 @@ class Instant:
 
     @classmethod
     def at_rest(
-        cls, layout: Layout, actuator: Actuator | None = None,
+        cls,
+        layout: Layout,
+        actuator: Actuator | None = None,
         finger: Fingertip | tuple[Fingertip, ...] | None = None,
-    ) -> Instant:  # fmt: skip
+    ) -> Instant:
         """Return a bed nobody has touched yet, the fingertips above its center."""
         actuator, finger = actuator or Actuator(), finger or Fingertip()
         bed = make_grid(layout)
         rest, count = actuator.rest_height, len(finger) if isinstance(finger, tuple) else 1
         return cls(
-            bed.positions, np.full(bed.count, rest), np.full(bed.count, Mode.REST, np.int8),
-            np.zeros(bed.count), np.tile([0.0, 0.0, rest + CLEARANCE, *LEVEL], (count, 1)), layout.pitch,
-            actuator, finger,
-        )  # fmt: skip
+            bed.positions,
+            np.full(bed.count, rest),
+            np.full(bed.count, Mode.REST, np.int8),
+            np.zeros(bed.count),
+            np.tile([0.0, 0.0, rest + CLEARANCE, *LEVEL], (count, 1)),
+            layout.pitch,
+            actuator,
+            finger,
+        )
 
     @property
     def fingertips(self) -> Floats:

@@ -138,11 +138,19 @@ def bed_nodes(sources: Sources, deck: float, length: float, unit: float) -> Any:
     choice = node(tree, "GeometryNodeCollectionInfo", 4, 0, parts, name=SOURCES)
     level = _level_of_force(tree, settings.outputs[TOP_FORCE], len(Mode), 3)
     mode = attribute(tree, "mode", "INT", 2, 1)
-    instances = node(tree, "GeometryNodeInstanceOnPoints", 5, 0, {
-        "Points": cells, "Instance": choice.outputs["Instances"], "Pick Instance": True,
-        "Instance Index": switch(tree, "INT", 4, 1, settings.outputs[COLOR_BY_FORCE], mode, level),
-        "Scale": _stretch(tree, deck, length),
-    })  # fmt: skip
+    instances = node(
+        tree,
+        "GeometryNodeInstanceOnPoints",
+        5,
+        0,
+        {
+            "Points": cells,
+            "Instance": choice.outputs["Instances"],
+            "Pick Instance": True,
+            "Instance Index": switch(tree, "INT", 4, 1, settings.outputs[COLOR_BY_FORCE], mode, level),
+            "Scale": _stretch(tree, deck, length),
+        },
+    )
     pins_on, skin_on, both_on = _form_switches(tree, settings, 16)
     pins = switch(tree, "GEOMETRY", 6, 1, pins_on, None, instances.outputs["Instances"])
     drawn = _arrows_on_points(tree, sources.arrow, settings, pins, unit, 7)
@@ -224,16 +232,29 @@ def _arrows_on_points(tree: Any, arrow: Any, settings: Any, pins: Any, unit: flo
     """Add the nodes that draw the arrows beside the pins."""
     force = attribute(tree, "force", "FLOAT", 1, row + 1)
     pressed = node(
-        tree, "FunctionNodeCompare", 3, row - 0.4, {"A": force, "B": LEAST},
-        data_type="FLOAT", operation="GREATER_THAN",
-    )  # fmt: skip
+        tree,
+        "FunctionNodeCompare",
+        3,
+        row - 0.4,
+        {"A": force, "B": LEAST},
+        data_type="FLOAT",
+        operation="GREATER_THAN",
+    )
     shape = node(tree, "GeometryNodeObjectInfo", 3, row + 0.6, {"Object": arrow, "As Instance": True})
     per_newton = number(tree, "MULTIPLY", 1, row + 2, settings.outputs[ARROW_LENGTH], unit)
     size = number(tree, "MULTIPLY", 2, row + 1, force, per_newton)
-    instances = node(tree, "GeometryNodeInstanceOnPoints", 4, row, {
-        "Points": settings.outputs["Geometry"], "Selection": pressed.outputs["Result"],
-        "Instance": shape.outputs["Geometry"], "Scale": combine(tree, 3, row + 2, X=1.0, Y=1.0, Z=size),
-    })  # fmt: skip
+    instances = node(
+        tree,
+        "GeometryNodeInstanceOnPoints",
+        4,
+        row,
+        {
+            "Points": settings.outputs["Geometry"],
+            "Selection": pressed.outputs["Result"],
+            "Instance": shape.outputs["Geometry"],
+            "Scale": combine(tree, 3, row + 2, X=1.0, Y=1.0, Z=size),
+        },
+    )
     both = {"Geometry": [instances.outputs["Instances"], pins]}
     joined = node(tree, "GeometryNodeJoinGeometry", 5, row, both).outputs["Geometry"]
     return switch(tree, "GEOMETRY", 6, row - 1, settings.outputs[ARROWS], pins, joined)

@@ -29,9 +29,18 @@ TINTED = "skin_"
 FINGERS: tuple[Color, ...] = tuple(
     _hex(code)
     for code in (
-        "ea9580", "9500ff", "d4d400", "aaeaff", "aa4055", "2a6aaa", "ffffaa", "9580ea", "aa8000", "6abfd4",
+        "ea9580",
+        "9500ff",
+        "d4d400",
+        "aaeaff",
+        "aa4055",
+        "2a6aaa",
+        "ffffaa",
+        "9580ea",
+        "aa8000",
+        "6abfd4",
     )
-)  # fmt: skip
+)
 DEFAULT = "okabe_ito"
 #: sRGB of each mode.
 PALETTES: dict[str, dict[Mode, Color]] = {

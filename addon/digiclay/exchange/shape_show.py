@@ -88,9 +88,14 @@ def _show(bed: Any, scene: Scene, shape: Shape, laid: Fitted) -> tuple[Fitted, f
     # All that can fail is done: from here on the bed changes.
     properties.write_scene(bed, scene)
     began, problem = sculpting.begin_session(
-        bed.session_uid, bed.name, scene, poses, snapshot.dump(system, state), beds.read_tick(bed),
+        bed.session_uid,
+        bed.name,
+        scene,
+        poses,
+        snapshot.dump(system, state),
+        beds.read_tick(bed),
         tuple(fingertips_of(bed)),
-    )  # fmt: skip
+    )
     if problem:
         raise DigiclayError(f"{bed.name}: {problem}")
     beds.write(bed, began)

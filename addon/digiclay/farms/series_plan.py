@@ -132,17 +132,23 @@ def write_openjd(made: Submission) -> Written:
         "description": "A series of digiclay: runs, frames, films and the page.",
         "parameterDefinitions": [
             {
-                "name": "Series", "type": "PATH", "default": ".",
-                "objectType": "DIRECTORY", "dataFlow": "INOUT",
+                "name": "Series",
+                "type": "PATH",
+                "default": ".",
+                "objectType": "DIRECTORY",
+                "dataFlow": "INOUT",
                 "description": "The folder of the series, on a drive that all machines share.",
             },
             {
-                "name": program, "type": "PATH", "objectType": "FILE", "dataFlow": "NONE",
+                "name": program,
+                "type": "PATH",
+                "objectType": "FILE",
+                "dataFlow": "NONE",
                 "description": f"The path of {program}; it is started with: {' '.join([*leading, 'job'])}",
             },
         ],
         "steps": [_make_step(task, steps, program, leading) for task in made.tasks],
-    }  # fmt: skip
+    }
     name = "openjd.json"
     return {name: format_json(template).decode()}, [
         f"check: {made.show('openjd', 'check', made.find(name))}",
@@ -189,11 +195,15 @@ def write_flamenco(made: Submission) -> Written:
     places = {part.name: number for number, part in enumerate(parts)}
     plan = [
         {
-            "name": part.name, "type": "blender" if part.blender else "misc", "command": part.command,
-            "folder": part.folder, "options": part.options, "needs": [places[need] for need in part.needs],
+            "name": part.name,
+            "type": "blender" if part.blender else "misc",
+            "command": part.command,
+            "folder": part.folder,
+            "options": part.options,
+            "needs": [places[need] for need in part.needs],
         }
         for part in parts
-    ]  # fmt: skip
+    ]
     table = {
         "name": made.name,
         "type": SCRIPT.stem.replace("_", "-"),
@@ -233,8 +243,10 @@ def write_cuecmd(made: Submission) -> Written:
 
 #: The formats by their names.
 FORMATS: dict[str, Callable[[Submission], Written]] = {
-    "openjd": write_openjd, "flamenco": write_flamenco, "cuecmd": write_cuecmd,
-}  # fmt: skip
+    "openjd": write_openjd,
+    "flamenco": write_flamenco,
+    "cuecmd": write_cuecmd,
+}
 
 
 def join_words(words: Sequence[str], *, windows: bool) -> str:

@@ -94,14 +94,25 @@ class Action(Polled):
 
 
 def action(
-    idname: str, label: str, *needs: Callable[[Any], str], options: Iterable[str] = ("REGISTER", "UNDO"),
-    in_any_mode: bool = False, bases: tuple[type, ...] = (Action,), **properties: Any,
-) -> Callable[[Callable[[Any, Any], set[str] | None]], Any]:  # fmt: skip
+    idname: str,
+    label: str,
+    *needs: Callable[[Any], str],
+    options: Iterable[str] = ("REGISTER", "UNDO"),
+    in_any_mode: bool = False,
+    bases: tuple[type, ...] = (Action,),
+    **properties: Any,
+) -> Callable[[Callable[[Any, Any], set[str] | None]], Any]:
     """Return a decorator that makes an operator, with properties, of its `perform` and its docstring."""
     return declare(
-        (*bases, bpy.types.Operator), "perform", idname, label,
-        bl_options=set(options), needs=needs, in_any_mode=in_any_mode, __annotations__=properties,
-    )  # fmt: skip
+        (*bases, bpy.types.Operator),
+        "perform",
+        idname,
+        label,
+        bl_options=set(options),
+        needs=needs,
+        in_any_mode=in_any_mode,
+        __annotations__=properties,
+    )
 
 
 class FileAction(Action):

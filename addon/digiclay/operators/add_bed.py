@@ -111,26 +111,39 @@ class AddBed(Placed, Action, bpy.types.Operator):
     needs = inside_edit, no_collection
 
     bed: choice(
-        "Bed", "Number and distance of the pins, and size of fingertip and blister",
-        items=[(name, title(name), bed.use) for name, bed in BEDS.items()], default=UNNAMED, update=take_bed,
-    )  # fmt: skip
+        "Bed",
+        "Number and distance of the pins, and size of fingertip and blister",
+        items=[(name, title(name), bed.use) for name, bed in BEDS.items()],
+        default=UNNAMED,
+        update=take_bed,
+    )
     rows: integer("Rows", "Number of rows of pins", default=DEFAULT.rows, min=1, max=MOST)
     columns: integer("Columns", "Number of pins in a row", default=DEFAULT.columns, min=1, max=MOST)
     pitch: millimeters(
-        "Pitch", DEFAULT.pitch, "Distance between neighboring pins in a row, in mm",
-        min=0.5, soft_max=20.0, max=1000.0,
-    )  # fmt: skip
+        "Pitch",
+        DEFAULT.pitch,
+        "Distance between neighboring pins in a row, in mm",
+        min=0.5,
+        soft_max=20.0,
+        max=1000.0,
+    )
     arrangement: choice(
-        "Arrangement", "Offset of neighboring rows",
+        "Arrangement",
+        "Offset of neighboring rows",
         items=[(name, title(name), kind.meaning) for name, kind in ARRANGEMENTS.items()],
         default=DEFAULT.arrangement,
-    )  # fmt: skip
+    )
     method: choice("Method", "Control method of the cells", items=method_items(), default=next(iter(METHODS)))
     preset: choice("Preset", "Fluid, valves and all other parameters of a custom preset", items=offered)
     scale: number(
-        "Scale (cm/mm)", "Scale of the device: centimeters in Blender for a millimeter of the device",
-        default=1.0, min=0.001, soft_min=0.1, soft_max=10.0, max=1000.0,
-    )  # fmt: skip
+        "Scale (cm/mm)",
+        "Scale of the device: centimeters in Blender for a millimeter of the device",
+        default=1.0,
+        min=0.001,
+        soft_min=0.1,
+        soft_max=10.0,
+        max=1000.0,
+    )
 
     def invoke(self, context: Any, event: Any) -> set[str]:
         """Add the bed to design on unless another is chosen."""
@@ -254,9 +267,10 @@ class AddSceneAction(Placed, Action):
     needs = inside_edit, no_collection
 
     take: flag(
-        "Simulate as a Take", "Simulate the session of the scene and keep it as a take, for replay or bake",
+        "Simulate as a Take",
+        "Simulate the session of the scene and keep it as a take, for replay or bake",
         default=True,
-    )  # fmt: skip
+    )
 
     def add_scene(self, context: Any, scene: Scene) -> None:
         """Add the bed of a scene, its fingertips where their paths begin."""

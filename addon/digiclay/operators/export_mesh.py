@@ -44,13 +44,21 @@ class FindingOptions(Action):
     needs: Needs = (no_surface,)
 
     threshold: millimeters(
-        "Threshold", Finding().threshold, sentence(FINDING["threshold"].doc) + ", in mm",
-        min=0.001, max=100.0, precision=3,
-    )  # fmt: skip
+        "Threshold",
+        Finding().threshold,
+        sentence(FINDING["threshold"].doc) + ", in mm",
+        min=0.001,
+        max=100.0,
+        precision=3,
+    )
     smallest: integer(
-        "Smallest (pins)", sentence(FINDING["smallest"].doc), default=Finding().smallest, min=1,
-        max=1_000_000, soft_max=100,
-    )  # fmt: skip
+        "Smallest (pins)",
+        sentence(FINDING["smallest"].doc),
+        default=Finding().smallest,
+        min=1,
+        max=1_000_000,
+        soft_max=100,
+    )
 
     def finding(self) -> Finding:
         """Return what counts as a feature."""
@@ -61,22 +69,28 @@ class SurfaceOptions(FindingOptions):
     """Kind of mesh and skin."""
 
     kind: choice(
-        "Mesh", "Kind of mesh made of the formed surface",
+        "Mesh",
+        "Kind of mesh made of the formed surface",
         items=[(name, sentence(name), sentence(words)) for name, words in KINDS.items()],
         default=Model().kind,
-    )  # fmt: skip
+    )
     skin: choice(
-        "Skin", "Interpolation of the surface between the pins",
+        "Skin",
+        "Interpolation of the surface between the pins",
         items=[(name, sentence(name), sentence(words)) for name, words in SKINS.items()],
         default=Model().skin,
-    )  # fmt: skip
+    )
     resolution: integer(
         "Points a Pitch", sentence(MODEL["resolution"].doc), default=0, min=0, max=64, soft_max=16
     )
     base_thickness: millimeters(
-        "Base", Model().base_thickness, sentence(MODEL["base_thickness"].doc) + ", in mm",
-        min=0.01, max=1000.0, soft_max=50.0,
-    )  # fmt: skip
+        "Base",
+        Model().base_thickness,
+        sentence(MODEL["base_thickness"].doc) + ", in mm",
+        min=0.01,
+        max=1000.0,
+        soft_max=50.0,
+    )
 
     def model(self, bed: Any) -> Model:
         """Return what is to be made of a bed."""
@@ -183,10 +197,13 @@ ENTRIES: tuple[tuple[str, str, dict[str, Any]], ...] = (
     ("Pins, stepped (.stl)", "SORTSIZE", {"kind": "pins", "file_format": "stl"}),
     ("Surface with its features as groups (.obj)", "SURFACE_DATA", {"kind": "surface", "file_format": "obj"}),
     ("Surface with force and mode (.ply)", "POINTCLOUD_DATA", {"kind": "surface", "file_format": "ply"}),
-    ("Bosses and creases, a file each (.stl)", "MOD_BOOLEAN",
-     {"kind": "features", "file_format": "stl", "separate": True}),
+    (
+        "Bosses and creases, a file each (.stl)",
+        "MOD_BOOLEAN",
+        {"kind": "features", "file_format": "stl", "separate": True},
+    ),
     ("Solid for the web (.glb)", "WORLD", {"kind": "solid", "skin": "smooth", "file_format": "glb"}),
-)  # fmt: skip
+)
 
 #: Axes under the names of Blender's own exporter.
 AXIS_NAMES = {name.upper().replace("-", "NEGATIVE_"): name for name in AXES}
@@ -206,14 +223,17 @@ class ExportMesh(SurfaceOptions, bpy.types.Operator):
         default="*.stl;*.obj;*.ply;*.glb;*.3mf", options={"HIDDEN", "SKIP_PRESET"}
     )
     file_format: choice(
-        "Format", "Format of the file",
+        "Format",
+        "Format of the file",
         items=[(name, name.upper().replace("_", " "), sentence(words)) for name, words in FORMATS.items()],
         default="stl",
-    )  # fmt: skip
+    )
     unit: choice(
-        "Unit", "Length unit of the file; a GLB is always in meters",
-        items=[(name, name, f"Lengths in {name}") for name in UNITS], default="mm",
-    )  # fmt: skip
+        "Unit",
+        "Length unit of the file; a GLB is always in meters",
+        items=[(name, name, f"Lengths in {name}") for name in UNITS],
+        default="mm",
+    )
     forward_axis: choice("Forward Axis", "Forward axis of an OBJ", items=AXIS_ITEMS, default="NEGATIVE_Z")
     up_axis: choice("Up Axis", "Upward axis of an OBJ; slicers expect Z", items=AXIS_ITEMS, default="Y")
     separate: flag("A File Each", "Write each feature into a file of its own", default=False)

@@ -252,9 +252,10 @@ class TakeFinger(Action, bpy.types.Operator):
     needs = (no_finger,)
 
     kind: choice(
-        "Finger", "Form and size of the fingertip",
+        "Finger",
+        "Form and size of the fingertip",
         items=[(name, kind.label, kind.source) for name, kind in FINGERS.items()],
-    )  # fmt: skip
+    )
 
     @classmethod
     def description(cls, context: Any, chosen: Any) -> str:

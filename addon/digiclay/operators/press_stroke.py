@@ -60,26 +60,46 @@ class PressSettings:
     """Settings of the tool: properties of the operator, which the header shows and presets store."""
 
     brush: choice(
-        "Brush", "What a stroke does to the surface", items=brush.BRUSH_ITEMS, default="LOWER",
+        "Brush",
+        "What a stroke does to the surface",
+        items=brush.BRUSH_ITEMS,
+        default="LOWER",
         translation_context="Brush",
-    )  # fmt: skip
+    )
     depth: millimeters(
-        "Depth", 4e-3, "How far a stroke of Lower, or a stamp with Ctrl, goes below the surface, in mm",
-        min=0.1, max=1e3 * DEEPEST, soft_max=10.0, step=25,
-    )  # fmt: skip
+        "Depth",
+        4e-3,
+        "How far a stroke of Lower, or a stamp with Ctrl, goes below the surface, in mm",
+        min=0.1,
+        max=1e3 * DEEPEST,
+        soft_max=10.0,
+        step=25,
+    )
     height: millimeters(
-        "Height", 15e-3, "How far a stroke of Raise, or a stamp, goes above the surface, in mm",
-        min=0.1, max=1e3 * DEEPEST, soft_max=30.0, step=100,
-    )  # fmt: skip
+        "Height",
+        15e-3,
+        "How far a stroke of Raise, or a stamp, goes above the surface, in mm",
+        min=0.1,
+        max=1e3 * DEEPEST,
+        soft_max=30.0,
+        step=100,
+    )
     strength: number(
-        "Strength", "Share of the depth, of the height, or of the way to the level that a stroke reaches, "
-        "and strength of Smooth; pen pressure scales it further", default=1.0, min=0.01, max=1.0,
-        subtype="FACTOR", precision=2,
-    )  # fmt: skip
+        "Strength",
+        "Share of the depth, of the height, or of the way to the level that a stroke reaches, "
+        "and strength of Smooth; pen pressure scales it further",
+        default=1.0,
+        min=0.01,
+        max=1.0,
+        subtype="FACTOR",
+        precision=2,
+    )
     symmetry: choice(
-        "Symmetry", "Mirror images of a stroke, or turned ones: formed at the same time, as one undo step",
-        items=brush.SYMMETRY_ITEMS, default="NONE",
-    )  # fmt: skip
+        "Symmetry",
+        "Mirror images of a stroke, or turned ones: formed at the same time, as one undo step",
+        items=brush.SYMMETRY_ITEMS,
+        default="NONE",
+    )
     radial: integer("Radial Count", "Number of images", default=6, min=FEWEST, max=MOST)
     center_x: millimeters(
         "Center X", 0.0, "Center of the symmetry", soft_min=-100.0, soft_max=100.0, step=100
@@ -91,27 +111,36 @@ class PressSettings:
     stamp: choice("Stamp", "Shape that is stamped", items=brush.STAMP_ITEMS, default="heart")
     stamp_file: text("File", "Mesh, picture or .npy file that is stamped", subtype="FILE_PATH")
     accumulate: flag(
-        "Accumulate", "Where a stroke comes back to what it has formed, it counts from there once more",
+        "Accumulate",
+        "Where a stroke comes back to what it has formed, it counts from there once more",
         default=False,
-    )  # fmt: skip
+    )
     path: choice("Stroke", "Path of a stroke", items=brush.PATH_ITEMS, default="FREE")
     stabilizer: millimeters(
-        "Stabilizer", 0.0,
+        "Stabilizer",
+        0.0,
         "Length, in mm, by which a free stroke lags behind the mouse, so that it becomes smoother; "
         "its end is reached. 0: none",
-        min=0.0, max=50.0, soft_max=15.0, precision=1, step=50,
-    )  # fmt: skip
+        min=0.0,
+        max=50.0,
+        soft_max=15.0,
+        precision=1,
+        step=50,
+    )
     use_pressure: flag(
         "Pen Pressure", "Pen pressure scales depth, height and strength, up to their values", default=True
     )
     pressure_curve: choice(
-        "Pressure Curve", "Share of the values that a pen reaches with part of its pressure",
-        items=pointer.CURVE_ITEMS, default="LINEAR",
-    )  # fmt: skip
+        "Pressure Curve",
+        "Share of the values that a pen reaches with part of its pressure",
+        items=pointer.CURVE_ITEMS,
+        default="LINEAR",
+    )
     use_tilt: flag(
-        "Pen Tilt", "The fingertip leans with the pen, by up to 60 degrees, until the stroke ends",
+        "Pen Tilt",
+        "The fingertip leans with the pen, by up to 60 degrees, until the stroke ends",
         default=True,
-    )  # fmt: skip
+    )
 
 
 class Press(PressSettings, Modal, bpy.types.Operator):

@@ -67,9 +67,14 @@ class Shaped(Action):
         more |= {name: to_si(getattr(self, name), 3) for name in ("x", "y", "rise", "foot")}
         before, scale = bed.digiclay.shape, float(f"{self.scale:.7g}")
         return Shape(
-            file=file, fit=self.fit, scale=scale, relief=self.relief, **more,
-            refresh=before.refresh, surfaces=before.surfaces,
-        )  # fmt: skip
+            file=file,
+            fit=self.fit,
+            scale=scale,
+            relief=self.relief,
+            **more,
+            refresh=before.refresh,
+            surfaces=before.surfaces,
+        )
 
 
 def _updated_bed(context: Any) -> Any:

@@ -162,9 +162,12 @@ class ReplayTake(TimedAction, bpy.types.Operator):
 
     take: TAKE
     parts: integer(
-        "Finer Steps", "Number of parts of each physics step: 1 replays the take bit for bit", default=1,
-        min=1, max=MOST_PARTS,
-    )  # fmt: skip
+        "Finer Steps",
+        "Number of parts of each physics step: 1 replays the take bit for bit",
+        default=1,
+        min=1,
+        max=MOST_PARTS,
+    )
 
     def perform(self, context: Any) -> None:
         """Play it without showing anything but its end."""
@@ -239,9 +242,15 @@ class ReplayTake(TimedAction, bpy.types.Operator):
         # The session that would go on from here.
         numbers, tick_count = self._numbers, beds.read_tick(bed)
         begun = sculpting.begin_session(
-            bed.session_uid, bed.name, self._take.scene, self._take.poses[-1, : len(numbers)], state,
-            tick_count, numbers, running.name_fingers(numbers, system.fingers),
-        )  # fmt: skip
+            bed.session_uid,
+            bed.name,
+            self._take.scene,
+            self._take.poses[-1, : len(numbers)],
+            state,
+            tick_count,
+            numbers,
+            running.name_fingers(numbers, system.fingers),
+        )
         beds.write(bed, begun[0])
         view.show_state(bed, system, self._state)
         seconds = f"{self._take.duration:.1f} s"
@@ -266,9 +275,15 @@ class ReplayTake(TimedAction, bpy.types.Operator):
             try:
                 scene = properties.scene_of(bed)
                 before, _ = sculpting.begin_session(
-                    bed.session_uid, bed.name, scene, self._stood, beds.read_snapshot(bed), 0,
-                    tuple(fingertips_of(bed)), beds.read_numbers(bed),
-                )  # fmt: skip
+                    bed.session_uid,
+                    bed.name,
+                    scene,
+                    self._stood,
+                    beds.read_snapshot(bed),
+                    0,
+                    tuple(fingertips_of(bed)),
+                    beds.read_numbers(bed),
+                )
                 view.show_state(bed, before.system, before.state)
                 tick.place_fingers(context, bed, before)
             except DigiclayError as error:

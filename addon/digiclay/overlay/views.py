@@ -160,9 +160,10 @@ def find_taken(context: Any, bed: Any, room: Room) -> Room:
     numbers, boxes = numbers if len(numbers) > 1 else (), []
     if session is not None:
         told = replace(
-            read_session(bed, session, COLORS), fingers=tuple((number, BLACK) for number in numbers),
+            read_session(bed, session, COLORS),
+            fingers=tuple((number, BLACK) for number in numbers),
             finger_force=np.zeros((len(session.trace.time), len(numbers))),
-        )  # fmt: skip
+        )
         content = FULL if bed.digiclay_display.overlay_full else COMPACT
         boxes = lay_out(told, choose_colors(BLACK, WHITE), room, scale, content, corner).boxes
     return find_covered(room, scale, corner, boxes[0] if boxes else None, len(numbers))

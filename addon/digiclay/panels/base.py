@@ -50,9 +50,15 @@ def panel(
     """Return a decorator that makes a panel of its `draw`, a sub-panel of `parent` if that is given."""
 
     return declare(
-        (Panel, bpy.types.Panel), "draw", idname, label, bl_order=order, bl_parent_id=parent,
-        bl_options={"DEFAULT_CLOSED"} if closed else set(), with_bed=with_bed,
-    )  # fmt: skip
+        (Panel, bpy.types.Panel),
+        "draw",
+        idname,
+        label,
+        bl_order=order,
+        bl_parent_id=parent,
+        bl_options={"DEFAULT_CLOSED"} if closed else set(),
+        with_bed=with_bed,
+    )
 
 
 def menu(idname: str, label: str) -> Callable[[Callable[[Any, Any], None]], Any]:

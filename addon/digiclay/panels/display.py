@@ -89,54 +89,82 @@ class Display(bpy.types.PropertyGroup):
     """Display properties of a bed."""
 
     form: choice(
-        "Show", "What is seen of the bed, also in renders: pins, or the surface they form as a skin",
-        items=FORMS, get=lambda display: view.FORMS.index(view.read_form(display.id_data)),
+        "Show",
+        "What is seen of the bed, also in renders: pins, or the surface they form as a skin",
+        items=FORMS,
+        get=lambda display: view.FORMS.index(view.read_form(display.id_data)),
         set=_in_nodes(FORM, 0, lambda bed, code: view.set_form(bed, FORMS[code][0]))["set"],
-    )  # fmt: skip
+    )
     skin: choice(
-        "Skin", "How the skin runs between the pins",
-        items=SKINS, **_in_nodes(
-            MEMBRANE, 0, lambda bed, code: view.write_setting(bed, MEMBRANE, bool(code))
-        ),
-    )  # fmt: skip
+        "Skin",
+        "How the skin runs between the pins",
+        items=SKINS,
+        **_in_nodes(MEMBRANE, 0, lambda bed, code: view.write_setting(bed, MEMBRANE, bool(code))),
+    )
     tint: flag(
-        "Mode Tint", "Tint the skin by what the pins do: those that rest or hold are plain clay",
+        "Mode Tint",
+        "Tint the skin by what the pins do: those that rest or hold are plain clay",
         **_in_nodes(TINT, False),
-    )  # fmt: skip
+    )
     color: choice(
-        "Color", "Quantity shown by the color of a pin", items=COLORINGS,
+        "Color",
+        "Quantity shown by the color of a pin",
+        items=COLORINGS,
         **_in_nodes(COLOR_BY_FORCE, 0, _color),
-    )  # fmt: skip
+    )
     top_force: number(
-        "Top Color at (N)", "Force of the last color, in N", min=1e-3, max=1e3, soft_max=2.0, precision=3,
-        step=1, **_in_nodes(TOP_FORCE, heat.TOP),
-    )  # fmt: skip
+        "Top Color at (N)",
+        "Force of the last color, in N",
+        min=1e-3,
+        max=1e3,
+        soft_max=2.0,
+        precision=3,
+        step=1,
+        **_in_nodes(TOP_FORCE, heat.TOP),
+    )
     arrows: flag(
         "Force Arrows",
         "Draw the force on each pin as an arrow, with a transparent fingertip; also in renders",
         **_in_nodes(ARROWS, False, _arrows),
-    )  # fmt: skip
+    )
     arrow_length: number(
-        "Arrow Length (mm/N)", "Length of the arrow of 1 N, in mm of the device", min=0.1, max=1e5,
-        soft_min=10.0, soft_max=1000.0, precision=1, step=1000, **_in_nodes(ARROW_LENGTH, LENGTH),
-    )  # fmt: skip
+        "Arrow Length (mm/N)",
+        "Length of the arrow of 1 N, in mm of the device",
+        min=0.1,
+        max=1e5,
+        soft_min=10.0,
+        soft_max=1000.0,
+        precision=1,
+        step=1000,
+        **_in_nodes(ARROW_LENGTH, LENGTH),
+    )
     overlay: flag(
-        "Overlay", "While a session runs, show force and state in a corner of the 3D view", default=True,
+        "Overlay",
+        "While a session runs, show force and state in a corner of the 3D view",
+        default=True,
         update=lambda display, context: views.follow(),
-    )  # fmt: skip
+    )
     overlay_full: flag(
         "Overlay Details",
         "Show curves, heights of picked pins and modes in the overlay, not force and state alone",
         update=show_details,
-    )  # fmt: skip
+    )
     seconds: number(
-        "Past (s)", "Time span of the overlay's curves, in s", default=5.0, min=0.5, max=SPAN, precision=1,
+        "Past (s)",
+        "Time span of the overlay's curves, in s",
+        default=5.0,
+        min=0.5,
+        max=SPAN,
+        precision=1,
         step=50,
-    )  # fmt: skip
+    )
     picked: bpy.props.IntVectorProperty(
-        name="Picked Pins", description="Pins whose heights the overlay shows; -1 for none",
-        size=PICKED, default=[view.NO_PIN] * PICKED, min=view.NO_PIN,
-    )  # fmt: skip
+        name="Picked Pins",
+        description="Pins whose heights the overlay shows; -1 for none",
+        size=PICKED,
+        default=[view.NO_PIN] * PICKED,
+        min=view.NO_PIN,
+    )
 
 
 @panel("DIGICLAY_PT_show", "Show", 20, closed=False)

@@ -22,9 +22,15 @@ def popover(idname: str, label: str) -> Callable[[Callable[[Any, Any], None]], A
                 draw_settings(panel.layout.column(), settings)
 
         return declare(
-            (bpy.types.Panel,), "draw", idname, label, bl_space_type="VIEW_3D", bl_region_type="HEADER",
-            bl_ui_units_x=12, poll=classmethod(lambda cls, context: tool_settings(context) is not None),
-        )(wraps(draw_settings)(draw))  # fmt: skip
+            (bpy.types.Panel,),
+            "draw",
+            idname,
+            label,
+            bl_space_type="VIEW_3D",
+            bl_region_type="HEADER",
+            bl_ui_units_x=12,
+            poll=classmethod(lambda cls, context: tool_settings(context) is not None),
+        )(wraps(draw_settings)(draw))
 
     return make
 

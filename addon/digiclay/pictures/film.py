@@ -106,9 +106,13 @@ class Shots:
 
 @contextmanager
 def stage_film(
-    history: Mapping[str, NDArray[Any]], looks: Film, plotted: tuple[str, Floats], *,
-    set_point: float | None = None, **sizes: Any,
-) -> Iterator[Shots]:  # fmt: skip
+    history: Mapping[str, NDArray[Any]],
+    looks: Film,
+    plotted: tuple[str, Floats],
+    *,
+    set_point: float | None = None,
+    **sizes: Any,
+) -> Iterator[Shots]:
     """Set the stage for the frames of a film.
 
     `plotted`: what a force is called, and the force (t,), N, or the forces (t, f) of several fingertips.
@@ -122,11 +126,13 @@ def stage_film(
     with stage_bed("Digital Clay Film", first, looks, float(height.min())) as (scene, bed):
         left, right, below, above = stage.MARGINS
         front = stage.set_up(
-            scene, bed, first,
+            scene,
+            bed,
+            first,
             points=_visible_points(bed, history, rows, sizes),
             modes=[Mode(int(code)) for code in np.unique(history["mode"][used])],
             margins=(left, right, below + (SHARE if looks.strip else 0.0), above),
-        )  # fmt: skip
+        )
         time, (called, force) = history["time"], plotted
         chart = draw_force_plot(front, time[used], force[used], set_point, called) if looks.strip else None
 

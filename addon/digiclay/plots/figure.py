@@ -26,13 +26,27 @@ INK, SHADE = "#222222", "#F1EEE6"
 #: Line of what was asked for.
 DASHES = (0, (5, 3))
 STYLE: dict[str, Any] = {
-    "font.family": "DejaVu Sans", "font.size": 12, "axes.titlesize": 12, "axes.titlelocation": "left",
-    "text.color": INK, "axes.edgecolor": INK, "axes.labelcolor": INK, "xtick.color": INK, "ytick.color": INK,
-    "axes.spines.top": False, "axes.spines.right": False, "axes.axisbelow": True,
-    "axes.grid": True, "grid.color": "#E0DED8", "grid.linewidth": 0.8,
-    "lines.linewidth": 1.9, "lines.solid_capstyle": "round", "legend.frameon": False,
-    "figure.facecolor": "white", "figure.dpi": 160,
-}  # fmt: skip
+    "font.family": "DejaVu Sans",
+    "font.size": 12,
+    "axes.titlesize": 12,
+    "axes.titlelocation": "left",
+    "text.color": INK,
+    "axes.edgecolor": INK,
+    "axes.labelcolor": INK,
+    "xtick.color": INK,
+    "ytick.color": INK,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.axisbelow": True,
+    "axes.grid": True,
+    "grid.color": "#E0DED8",
+    "grid.linewidth": 0.8,
+    "lines.linewidth": 1.9,
+    "lines.solid_capstyle": "round",
+    "legend.frameon": False,
+    "figure.facecolor": "white",
+    "figure.dpi": 160,
+}
 
 
 @contextmanager

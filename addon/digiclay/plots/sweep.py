@@ -19,9 +19,14 @@ if TYPE_CHECKING:  # only named in annotations
 
 #: Units people read: factor and name.
 READ: dict[str, tuple[float, str]] = {
-    "m": (1e3, "mm"), "m3": (1e9, "mm³"), "Pa": (1e-5, "bar"), "m2/s": (1e6, "mm²/s"),
-    "kg/m3": (1.0, "kg/m³"), "m/s": (1e3, "mm/s"), "1": (1.0, ""),
-}  # fmt: skip
+    "m": (1e3, "mm"),
+    "m3": (1e9, "mm³"),
+    "Pa": (1e-5, "bar"),
+    "m2/s": (1e6, "mm²/s"),
+    "kg/m3": (1.0, "kg/m³"),
+    "m/s": (1e3, "mm/s"),
+    "1": (1.0, ""),
+}
 #: Cells of a heat map along a side whose values are still written into it.
 WRITTEN = 10
 #: Most labels on an axis.
@@ -105,9 +110,14 @@ def _write_values(axes: Axes, shown: Any) -> None:
         finite = np.isfinite(value)
         bright = not finite or high == low or (value - low) / (high - low) > 0.5
         axes.text(
-            column + 0.5, row + 0.5, f"{value:.3g}" if finite else "×", ha="center", va="center",
-            fontsize=9.5, color=INK if bright else "white",
-        )  # fmt: skip
+            column + 0.5,
+            row + 0.5,
+            f"{value:.3g}" if finite else "×",
+            ha="center",
+            va="center",
+            fontsize=9.5,
+            color=INK if bright else "white",
+        )
 
 
 def _shown(column: Column) -> tuple[Any, str]:
@@ -121,9 +131,15 @@ def _shown(column: Column) -> tuple[Any, str]:
 
 #: Metrics that are drawn.
 PANELS = (
-    "rfd_shaping", "force_deviation", "height_deviation", "ridge_error", "lag_max", "contact_loss_share",
-    "losses", "run_time",
-)  # fmt: skip
+    "rfd_shaping",
+    "force_deviation",
+    "height_deviation",
+    "ridge_error",
+    "lag_max",
+    "contact_loss_share",
+    "losses",
+    "run_time",
+)
 
 
 def comparison(

@@ -111,9 +111,26 @@ def find_installed(name: str) -> MethodSource | None:
 #: Names that are no parameters: in the section [control] of a scene file, among a method's functions, and
 #: among those of Blender's properties.
 TAKEN = (
-    "method", "begin", "blister", "build", "check", "command", "locate", "recovers", "rows", "set_point",
-    "bl_rna", "get", "id_data", "items", "keys", "name", "pop", "rna_type", "values",
-)  # fmt: skip
+    "method",
+    "begin",
+    "blister",
+    "build",
+    "check",
+    "command",
+    "locate",
+    "recovers",
+    "rows",
+    "set_point",
+    "bl_rna",
+    "get",
+    "id_data",
+    "items",
+    "keys",
+    "name",
+    "pop",
+    "rna_type",
+    "values",
+)
 Refuse = Callable[..., NoReturn]
 #: Types of a parameter's default.
 KINDS = (bool, int, float, str, tuple)
@@ -250,10 +267,15 @@ def add_class(name: str, source: MethodSource, kind: Any) -> OwnRow:
     check_class(source.label, kind)
     blister = getattr(kind, "blister", None)
     row = OwnRow(
-        module=source.module, parameters=kind.__name__, blister=None if blister is None else dict(blister),
-        recovers=bool(getattr(kind, "recovers", False)), by_set=True, digest=source.digest,
-        kind=kind, source=source,
-    )  # fmt: skip
+        module=source.module,
+        parameters=kind.__name__,
+        blister=None if blister is None else dict(blister),
+        recovers=bool(getattr(kind, "recovers", False)),
+        by_set=True,
+        digest=source.digest,
+        kind=kind,
+        source=source,
+    )
 
     def reduce(parameters: ControlParameters) -> tuple[Callable[..., Any], tuple[Any, ...]]:
         values = {one.name: getattr(parameters, one.name) for one in dataclasses.fields(parameters)}

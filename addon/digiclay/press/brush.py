@@ -59,10 +59,14 @@ def _same(first: Fingertip, other: Fingertip) -> bool:
 #: Names by which Blender knows the tool, and the operator whose properties are its settings.
 TOOL, OPERATOR = "digiclay.press_tool", "digiclay.press"
 #: Modal operators that change the settings, and draw them themselves.
-ADJUSTING = frozenset({
-    "DIGICLAY_OT_press_size", "DIGICLAY_OT_press_depth", "DIGICLAY_OT_press_strength",
-    "DIGICLAY_OT_press_center",
-})  # fmt: skip
+ADJUSTING = frozenset(
+    {
+        "DIGICLAY_OT_press_size",
+        "DIGICLAY_OT_press_depth",
+        "DIGICLAY_OT_press_strength",
+        "DIGICLAY_OT_press_center",
+    }
+)
 LABELS = {brush: brush.value.replace("_", " ").title() for brush in Brush}
 BRUSH_WORDS = {
     Brush.LOWER: "Press a valley of the given depth. With Ctrl: Raise",

@@ -93,9 +93,14 @@ def map_paths(change: Callable[[Floats], Floats], paths: Sequence[Floats]) -> li
 
 
 def draw_on_bed(
-    context: Any, bed: Any, paths: Sequence[Floats], text: str, xy: tuple[float, float],
-    color: Color = LIGHT, corner: tuple[float, float] = (0.0, 0.0),
-) -> None:  # fmt: skip
+    context: Any,
+    bed: Any,
+    paths: Sequence[Floats],
+    text: str,
+    xy: tuple[float, float],
+    color: Color = LIGHT,
+    corner: tuple[float, float] = (0.0, 0.0),
+) -> None:
     """Draw paths (k, 3), m, of a bed's space, and text beside a place; pixels from a corner of the region."""
     from ..overlay.draw import cursor
 

@@ -108,9 +108,10 @@ class PointerStroke(Parameters):
     def size_finger(self, usual: Fingertip) -> Fingertip:
         """Return the fingertip of the stroke; what it leaves open is that of the bed."""
         return Fingertip(
-            0.5 * self.length or usual.length, 0.5 * self.width or usual.width,
+            0.5 * self.length or usual.length,
+            0.5 * self.width or usual.width,
             0.5 * self.thickness or usual.height,
-        )  # fmt: skip
+        )
 
 
 @dataclass(frozen=True)

@@ -10,9 +10,14 @@ from .sculpting import Numbers, drop_strokes, queue_stroke, restore
 
 
 def take_up(
-    running: Running, kept: bytes | None, poses: Floats, was: Numbers, tick: int, ticks: list[int],
+    running: Running,
+    kept: bytes | None,
+    poses: Floats,
+    was: Numbers,
+    tick: int,
+    ticks: list[int],
     lines: list[str],
-) -> Running:  # fmt: skip
+) -> Running:
     """Return the session with what undo or redo has put into its bed, as `restore`.
 
     `ticks`: of its gestures. `lines`: strokes to be formed from there, by `strokes.drawn`. Those that the

@@ -172,28 +172,41 @@ GROUPS = {
 for axis in dataclasses.fields(Fingertip):
     GROUPS["fingertip"].__annotations__[WHOLE + axis.name] = whole_axis(axis)
 METHOD = {"name": "Method", "words": "Control method of the cells; a choice also sets its blister"}
-SETTINGS = make_group("settings", "Every parameter of a bed's scene.", {
-    "preset": choice(
-        "Preset", "Fluid and valves; a choice sets their parameters",
-        items=[(name, title(name), PRESET_WORDS.get(name, "")) for name in PRESETS], update=take_preset,
-    ),
-    "method": choice(**METHOD, items=method_items(), default="virtual_master", update=take_method),
-    "own_method": bpy.props.StringProperty(options={"HIDDEN"}, update=take_blister),
-    "chosen_method": choice(**METHOD, items=list_offered, get=place_of, set=choose),
-    "own_preset": text("Own Preset", "The custom preset that was applied last", options={"HIDDEN"}),
-    "size": number(
-        "Size (mm)", "Width of the fingertip, in mm; its length and height change in proportion",
-        get=lambda settings: 1e3 * devices.read_size(devices.find_first(settings.id_data)),
-        set=lambda settings, value: devices.set_size(devices.find_first(settings.id_data), 1e-3 * value),
-        min=1e3 * devices.SMALLEST, max=1e3 * devices.LARGEST, soft_max=60.0, step=50, precision=1,
-    ),
-    "blister_follows": flag(
-        "Blister Follows", "Keep the size of the blister in proportion to that of the fingertip", default=True
-    ),
-    "blister_suits": bpy.props.FloatProperty(options={"HIDDEN"}),
-    "notes": bpy.props.StringProperty(options={"HIDDEN"}),
-    **use_properties(),
-    **pointers({**GROUPS, "control": CONTROL}),
-})  # fmt: skip
+SETTINGS = make_group(
+    "settings",
+    "Every parameter of a bed's scene.",
+    {
+        "preset": choice(
+            "Preset",
+            "Fluid and valves; a choice sets their parameters",
+            items=[(name, title(name), PRESET_WORDS.get(name, "")) for name in PRESETS],
+            update=take_preset,
+        ),
+        "method": choice(**METHOD, items=method_items(), default="virtual_master", update=take_method),
+        "own_method": bpy.props.StringProperty(options={"HIDDEN"}, update=take_blister),
+        "chosen_method": choice(**METHOD, items=list_offered, get=place_of, set=choose),
+        "own_preset": text("Own Preset", "The custom preset that was applied last", options={"HIDDEN"}),
+        "size": number(
+            "Size (mm)",
+            "Width of the fingertip, in mm; its length and height change in proportion",
+            get=lambda settings: 1e3 * devices.read_size(devices.find_first(settings.id_data)),
+            set=lambda settings, value: devices.set_size(devices.find_first(settings.id_data), 1e-3 * value),
+            min=1e3 * devices.SMALLEST,
+            max=1e3 * devices.LARGEST,
+            soft_max=60.0,
+            step=50,
+            precision=1,
+        ),
+        "blister_follows": flag(
+            "Blister Follows",
+            "Keep the size of the blister in proportion to that of the fingertip",
+            default=True,
+        ),
+        "blister_suits": bpy.props.FloatProperty(options={"HIDDEN"}),
+        "notes": bpy.props.StringProperty(options={"HIDDEN"}),
+        **use_properties(),
+        **pointers({**GROUPS, "control": CONTROL}),
+    },
+)
 #: In the order they are registered: a group comes after those it points to.
 CLASSES = (*METHOD_GROUPS.values(), *GROUPS.values(), CONTROL, SETTINGS)

@@ -140,9 +140,15 @@ def begin(stroke: Stroke, height: Floats, turn: Floats, tracking: Tracking | Non
 
 
 def follow(
-    stroke: Stroke, device: Device, now: Floats, pose: Floats, count: int, period: float, force: float = 0.0,
+    stroke: Stroke,
+    device: Device,
+    now: Floats,
+    pose: Floats,
+    count: int,
+    period: float,
+    force: float = 0.0,
     hard: float = math.inf,
-) -> tuple[Stroke, Floats]:  # fmt: skip
+) -> tuple[Stroke, Floats]:
     """Advance the fingertip along a stroke that has begun; return it and the path (k + 1, 7), k <= count.
 
     The path ends where the hand has not drawn further, and where the fingertip begins something else: it

@@ -51,9 +51,11 @@ def _multiply(first: Floats, second: Floats) -> Floats:
     """Return the rotation of a second quaternion followed by a first one."""
     a, b, c, d = first.tolist()
     w, x, y, z = second.tolist()
-    return np.array([
-        a * w - b * x - c * y - d * z,
-        a * x + b * w + c * z - d * y,
-        a * y + c * w + d * x - b * z,
-        a * z + d * w + b * y - c * x,
-    ])  # fmt: skip
+    return np.array(
+        [
+            a * w - b * x - c * y - d * z,
+            a * x + b * w + c * z - d * y,
+            a * y + c * w + d * x - b * z,
+            a * z + d * w + b * y - c * x,
+        ]
+    )

@@ -234,19 +234,31 @@ class Stroke:
 
 
 def start(
-    number: int, x: float, y: float, depth: float, images: tuple[Image, ...] = ALONE,
-    brush: Brush = Brush.LOWER, share: float = 1.0, lean: tuple[float, float] = (0.0, 0.0),
-    *, accumulate: bool = False, stamp: HeightMap | None = None,
-) -> Stroke:  # fmt: skip
+    number: int,
+    x: float,
+    y: float,
+    depth: float,
+    images: tuple[Image, ...] = ALONE,
+    brush: Brush = Brush.LOWER,
+    share: float = 1.0,
+    lean: tuple[float, float] = (0.0, 0.0),
+    *,
+    accumulate: bool = False,
+    stamp: HeightMap | None = None,
+) -> Stroke:
     """Return the stroke of a mouse that goes down at a place, m; see `Sample`."""
     first = Sample(x, y, _limit_depth(depth), share, lean)
     return Stroke(number, (first,), brush, images, accumulate, stamp)
 
 
 def draw(
-    stroke: Stroke, x: float, y: float, depth: float, share: float = 1.0,
+    stroke: Stroke,
+    x: float,
+    y: float,
+    depth: float,
+    share: float = 1.0,
     lean: tuple[float, float] = (0.0, 0.0),
-) -> Stroke:  # fmt: skip
+) -> Stroke:
     """Return the stroke drawn on to a place; a released one stays as it is."""
     if not stroke.held:
         return stroke

@@ -22,8 +22,11 @@ from .stroke import ABOVE, DONE, DRAGGING, FINISHING, LEAVING, PRESSING, Brush, 
 PATIENCE, LOOK = 1.0, 4
 #: Brushes whose strokes the valves form, and what they tell them.
 SWEEPS = {
-    Brush.SMOOTH: Verb.SMOOTH, Brush.ERASE: Verb.ERASE, Brush.LOCK: Verb.LOCK, Brush.UNLOCK: Verb.UNLOCK,
-}  # fmt: skip
+    Brush.SMOOTH: Verb.SMOOTH,
+    Brush.ERASE: Verb.ERASE,
+    Brush.LOCK: Verb.LOCK,
+    Brush.UNLOCK: Verb.UNLOCK,
+}
 #: Brushes that tell all pins something, at once.
 WHOLE = {Brush.INVERT_LOCKS: Verb.INVERT, Brush.CLEAR_LOCKS: Verb.UNLOCK}
 #: Least change of a pin that the valves are to make, m.

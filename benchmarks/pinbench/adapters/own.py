@@ -53,8 +53,9 @@ def make_tables(file: dict[str, Any], stepper: str, step: float) -> dict[str, An
     chosen = {"tolerance": step} if stepper == "adaptive" else {"physics_step": step}
     tables["simulation"] = {"control_period": file["period"], "stepper": stepper, **chosen}
     tables["trajectory"] = {
-        "interpolation": "linear", "waypoints": [{"time": t, "position": xyz} for t, *xyz in file["path"]],
-    }  # fmt: skip
+        "interpolation": "linear",
+        "waypoints": [{"time": t, "position": xyz} for t, *xyz in file["path"]],
+    }
     return tables
 
 

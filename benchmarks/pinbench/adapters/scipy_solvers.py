@@ -31,9 +31,17 @@ def prepare(problem: Any, method: str, setting: float) -> Any:
 
                 if name == "LSODA":
                     y = odeint(
-                        rates, y, [start, end], tfirst=True, rtol=setting, atol=absolute, ml=band, mu=band,
-                        tcrit=[end], mxstep=50000,
-                    )[-1]  # fmt: skip
+                        rates,
+                        y,
+                        [start, end],
+                        tfirst=True,
+                        rtol=setting,
+                        atol=absolute,
+                        ml=band,
+                        mu=band,
+                        tcrit=[end],
+                        mxstep=50000,
+                    )[-1]
                 else:
                     y = solve_ivp(rates, (start, end), y, name, (end,), rtol=setting, atol=absolute).y[:, -1]
                 law.stop(y.reshape(-1, shape[0]).T)

@@ -41,8 +41,11 @@ IN_A_SESSION = {
 
 #: What can be called without a bed, and what in the Edit Mode of one.
 WITHOUT_A_BED = {
-    "digiclay.add_sample", "digiclay.open_scene", "import_scene.digital_clay_run", "mesh.digital_clay_add",
-}  # fmt: skip
+    "digiclay.add_sample",
+    "digiclay.open_scene",
+    "import_scene.digital_clay_run",
+    "mesh.digital_clay_add",
+}
 IN_EDIT_MODE = {"digiclay.leave_mode"}
 
 

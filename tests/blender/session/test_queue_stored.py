@@ -192,14 +192,21 @@ def test_a_session_that_is_stopped_keeps_strokes_for_the_next_one(
 
 GOOD = '["LOWER", false, [[1, 0, 0, 1, 0, 0]], [[0, 0, 0.003, 1, [0, 0]]], null]'
 JUNK = {
-    "no JSON": "nothing", "another list": "[1, 2]", "no list": "7", "a nest": "[" * 100_000,
-    "an unknown brush": GOOD.replace("LOWER", "CARVE"), "no path": GOOD.replace("[[0, 0, 0.003", "[[0"),
+    "no JSON": "nothing",
+    "another list": "[1, 2]",
+    "no list": "7",
+    "a nest": "[" * 100_000,
+    "an unknown brush": GOOD.replace("LOWER", "CARVE"),
+    "no path": GOOD.replace("[[0, 0, 0.003", "[[0"),
     "an empty path": GOOD.replace("[[0, 0, 0.003, 1, [0, 0]]]", "[]"),
     "far away": GOOD.replace("[[0", "[[1e9"),
-    "not finite": GOOD.replace("[[0, 0", "[[NaN, 0"), "too deep": GOOD.replace("0.003", "300"),
-    "a number too few": GOOD.replace("0.003, 1, ", "0.003, "), "a text": GOOD.replace("0.003", '"0.003"'),
-    "a stamp of nothing": GOOD.replace("null", '["x", []]'), "half a stamp": GOOD.replace("null", "[]"),
-}  # fmt: skip
+    "not finite": GOOD.replace("[[0, 0", "[[NaN, 0"),
+    "too deep": GOOD.replace("0.003", "300"),
+    "a number too few": GOOD.replace("0.003, 1, ", "0.003, "),
+    "a text": GOOD.replace("0.003", '"0.003"'),
+    "a stamp of nothing": GOOD.replace("null", '["x", []]'),
+    "half a stamp": GOOD.replace("null", "[]"),
+}
 
 
 @pytest.mark.parametrize("junk", JUNK.values(), ids=JUNK)

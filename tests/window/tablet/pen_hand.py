@@ -18,9 +18,13 @@ class Device(ctypes.Structure):
     """Xlib's XDeviceInfo."""
 
     _fields_ = [
-        ("id", ctypes.c_ulong), ("type", ctypes.c_ulong), ("name", ctypes.c_char_p),
-        ("num_classes", ctypes.c_int), ("use", ctypes.c_int), ("classes", ctypes.c_void_p),
-    ]  # fmt: skip
+        ("id", ctypes.c_ulong),
+        ("type", ctypes.c_ulong),
+        ("name", ctypes.c_char_p),
+        ("num_classes", ctypes.c_int),
+        ("use", ctypes.c_int),
+        ("classes", ctypes.c_void_p),
+    ]
 
 
 class Pen:

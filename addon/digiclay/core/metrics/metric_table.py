@@ -33,8 +33,10 @@ class Metric(NamedTuple):
 METRICS: dict[str, Metric] = {
     "duration": Metric("s", "simulated time from the first row to the last", "duration", "s"),
     "set_point": Metric(
-        "N", "total force asked for; one that changes from row to row: its mean while shaping",
-        "set point", "N",
+        "N",
+        "total force asked for; one that changes from row to row: its mean while shaping",
+        "set point",
+        "N",
     ),
     "rfd": Metric("N", "rms over time of (total force - set point) while the fingertip touches", "RFD", "mN"),
     "rfd_shaping": Metric(
@@ -60,8 +62,10 @@ METRICS: dict[str, Metric] = {
         "s", "first touch: from touching down until the force stays within 10 % of its set point"
     ),
     "height_deviation": Metric(
-        "m", "standard deviation over time of the surface's height over the fingertip, shaping",
-        "height deviation", "mm",
+        "m",
+        "standard deviation over time of the surface's height over the fingertip, shaping",
+        "height deviation",
+        "mm",
     ),
     "ridge_offset": Metric("m", "mean height of what the fingertip left behind over its path"),
     "ridge_error": Metric("m", "rms of the same", "ridge-height error", "mm"),
@@ -80,10 +84,12 @@ METRICS: dict[str, Metric] = {
         "1", "RFD over the smallest just noticeable difference of the set point", "RFD, at most", "JND"
     ),
     "ridge_unevenness_touch": Metric(
-        "1", "ridge_unevenness over the spatial resolution of a fingertip",
-        "unevenness", "spatial resolutions",
+        "1",
+        "ridge_unevenness over the spatial resolution of a fingertip",
+        "unevenness",
+        "spatial resolutions",
     ),
-}  # fmt: skip
+}
 #: Metrics of a run beside those of its history.
 RUN: dict[str, Metric] = {
     "losses": Metric("1", "how often the controller lost the fingertip, at every lift-off too", "losses"),
