@@ -74,6 +74,15 @@ def test_a_bend_raises_the_way_by_its_mean_over_the_loaded_part(share):
     assert gained == pytest.approx(exact, rel=0.06)
 
 
+@pytest.mark.parametrize(
+    "e, bow, slip",
+    [(-0.002, 0.015, 0.1), (-0.01, 0.02, 0.1), (0.01, -0.01, -0.05), (0.03, -0.05, -0.1)],
+)
+def test_a_bend_beyond_the_threshold_does_not_exchange_meeting_and_leaving(e, bow, slip):
+    # Of second order in the bend, which is as large as what is left of the way; exchanged it is 4e-2.
+    assert solved(e, bow, slip, 1.0, 1.0) == pytest.approx(integrated(e, bow, slip, 1.0, 1.0), abs=2e-3)
+
+
 @pytest.mark.parametrize("exponent", [-9000.0, 5.0, 290.0])
 @pytest.mark.parametrize("slip", [-8000.0, 0.0, 8000.0])
 @pytest.mark.parametrize("decay", [closed_form.TINY, 1e-3, 1e6])
