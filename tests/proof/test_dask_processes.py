@@ -170,7 +170,7 @@ def test_a_worker_that_dies_when_it_is_asked_for_its_versions_changes_nothing(
 
 def test_a_worker_of_another_version_is_named_at_once_and_when_it_joins(here: Path, start: Start) -> None:
     other = copy_package(here / "other") / "addon"
-    front = other / "digiclay" / "__init__.py"
+    front = other / "digiclay" / "core" / "version.py"
     text = front.read_text(encoding="utf-8")
     front.write_text(text.replace('__version__ = "', '__version__ = "9.'), encoding="utf-8")
     _, address = start_scheduler(start, here)
