@@ -215,7 +215,7 @@ def test_a_place_without_digiclay_is_named_in_one_line(place, line, here, start)
             wait_until(lambda: any(client.processing().values()))
         start_worker(start, address, "--no-nanny", **bare)
     _, said = sweep.communicate(timeout=TIMEOUT)
-    (told,) = [each for each in said.splitlines() if "no workers yet" not in each]
+    (told,) = [each for each in said.splitlines() if " has no workers" not in each]
     assert (sweep.returncode, told.startswith(line.format(address))) == (2, True)
     assert " lacks digiclay" in told
 
