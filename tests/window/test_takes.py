@@ -18,7 +18,7 @@ def test_a_finger_that_is_lifted_slowly_raises_a_ridge_and_draws_it_along(seen: 
 
 
 def test_what_is_recorded_is_kept_and_exported_in_mid_session_and_replayed_after_it(seen: Seen) -> None:
-    assert (seen["kept"]["sessions"], [name for _, name, _ in seen["kept"]["takes"]]) == (1, ["A press"])
+    assert (seen["kept"]["sessions"], [name for _, name, *_ in seen["kept"]["takes"]]) == (1, ["A press"])
     assert (seen["exported"], seen["exported in a session"]) == (["FINISHED"], True)
     assert [seen[name]["replay can be pressed"] for name in ("kept", "stopped")] == [False, True]
 
@@ -29,7 +29,7 @@ def test_blender_saves_by_itself_in_mid_session_with_the_recording_as_a_take(see
     recovered = seen["recovered"]
     assert recovered["kept"] > 0
     assert recovered["takes"][:1] == seen["kept"]["takes"] == seen["saved while recording"]["takes"]
-    assert [name for _, name, _ in recovered["takes"]] == ["A press", "Take 2"]
+    assert [name for _, name, *_ in recovered["takes"]] == ["A press", "Take 2"]
     assert (recovered["sessions"], recovered["replay can be pressed"]) == (0, True)
 
 
