@@ -1,6 +1,9 @@
 """Overlay as plain marks in pixels, boxes, lines, dots and text, and its colors; no Blender."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
@@ -80,8 +83,7 @@ def _luminance(color: Color) -> float:
     return 0.2126 * r + 0.7152 * g + 0.0722 * b
 
 
-@dataclass(frozen=True)
-class Box:
+class Box(NamedTuple):
     """Filled rectangle: left, bottom, width, height; pixels."""
 
     x: float
@@ -92,8 +94,7 @@ class Box:
     alpha: float = 1.0
 
 
-@dataclass(frozen=True, eq=False)
-class Line:
+class Line(NamedTuple):
     """Line through points (k, 2), pixels; solid or dashed, or lines between pairs of points."""
 
     points: Floats
@@ -103,8 +104,7 @@ class Line:
     pairs: bool = False
 
 
-@dataclass(frozen=True)
-class Dot:
+class Dot(NamedTuple):
     """Filled circle about a point."""
 
     x: float
@@ -113,8 +113,7 @@ class Dot:
     color: Color
 
 
-@dataclass(frozen=True)
-class Words:
+class Words(NamedTuple):
     """Line of text on a base line, from its left end or to its right end."""
 
     x: float
@@ -133,6 +132,22 @@ class Picture:
     lines: list[Line] = field(default_factory=list)
     dots: list[Dot] = field(default_factory=list)
     words: list[Words] = field(default_factory=list)
+
+    def add(self, other: Picture) -> None:
+        """Draw the marks of another picture over these."""
+        self.boxes += other.boxes
+        self.lines += other.lines
+        self.dots += other.dots
+        self.words += other.words
+
+    def move_up(self, distance: float) -> Picture:
+        """Return the picture with all marks higher by a distance, pixels."""
+        return Picture(
+            [box._replace(y=box.y + distance) for box in self.boxes],
+            [line._replace(points=line.points + np.array([0.0, distance])) for line in self.lines],
+            [dot._replace(y=dot.y + distance) for dot in self.dots],
+            [words._replace(y=words.y + distance) for words in self.words],
+        )
 
 
 def round_axis(low: float, high: float) -> tuple[float, float]:

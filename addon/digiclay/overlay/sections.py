@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
@@ -51,7 +51,7 @@ class Readings:
     pins: tuple[int, ...]
     #: (t, k), their heights, m; NaN where they were not followed yet.
     heights: Floats
-    #: (8,), number of pins in each mode.
+    #: (m,), number of pins in each of the m modes.
     modes: NDArray[np.int64]
     #: Of the modes, as the pins wear them.
     colors: tuple[Color, ...]
@@ -344,21 +344,20 @@ def lay_out(
     top -= TAKEN.get(corner, 0.0) * scale
     width, margin, padding = content.width * scale, MARGIN * scale, PADDING * scale
     x = left + margin if corner.endswith("left") else right - margin - width
-    pen = Pen(Picture(), look, x + padding, width - 2 * padding, scale)
-    space = SHARE * (top - bottom) - 2 * padding
-    total, sections = 0.0, []
+    if right - left < width + 2 * margin:
+        return Picture()
+    # How high it stands follows from its height, so it is drawn below 0 and then moved up.
+    shown, height, space = Picture(), 0.0, SHARE * (top - bottom) - 2 * padding
     for section in content.sections:
-        # Drawn once into a picture that nobody sees, it tells its height.
-        height = -section(readings, replace(pen, picture=Picture()), 0.0)
-        if 0.0 < height <= space - total:
-            sections.append(section)
-            total += height
-    if not sections or right - left < width + 2 * margin:
-        return pen.picture
-    tall = total + 2 * padding
+        pen = Pen(Picture(), look, x + padding, width - 2 * padding, scale)
+        below = -section(readings, pen, -height)
+        if below <= space:
+            shown.add(pen.picture)
+            height = below
+    if not height:
+        return Picture()
+    tall = height + 2 * padding
     y = top - margin - tall if corner.startswith("top") else bottom + margin
-    pen.picture.boxes.append(Box(x, y, width, tall, look.back, BACK_ALPHA))
-    y += tall - padding
-    for section in sections:
-        y = section(readings, pen, y)
-    return pen.picture
+    picture = Picture([Box(x, y, width, tall, look.back, BACK_ALPHA)])
+    picture.add(shown.move_up(y + tall - padding))
+    return picture
