@@ -1,4 +1,4 @@
-"""Figures of README, performance and stacking that are counts, or depend on one: none is stale unseen."""
+"""Figures of README, performance and batches that are counts, or depend on one: none is stale unseen."""
 
 import statistics
 import sys
@@ -110,7 +110,7 @@ FIGURES: dict[str, tuple[Callable[[], float], float, float]] = {
     "ten with Method I": (partial(compare_ten_fingers, "virtual_master"), 4.9, 0.1),
     "ten with Method II": (partial(compare_ten_fingers, "cell_states"), 9.1, 0.1),
     "ten with Method III": (partial(compare_ten_fingers, "hybrid"), 7.4, 0.1),
-    "stacking: 64 runs to one, control": (partial(compare_batch, "control"), 2.6, 0.1),
+    "batches: 64 runs to one, control": (partial(compare_batch, "control"), 2.6, 0.1),
     "64 runs to one, device": (partial(compare_batch, "device"), 2.5, 0.1),
 }
 
