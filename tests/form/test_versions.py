@@ -1,10 +1,11 @@
-"""Bounds of the libraries: pyproject.toml, and the pins that `tests/release` installs and runs with."""
+"""Bounds of the libraries, by pyproject.toml and the pins of `tests/release`; the version in citations."""
 
 import re
 import tomllib
 from pathlib import Path
 
 import pytest
+from digiclay import __version__
 
 ROOT = Path(__file__).parents[2]
 DEPENDENCIES = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["dependencies"]
@@ -38,3 +39,9 @@ def test_every_pin_lies_between_the_lowest_and_the_highest(file: str) -> None:
     for name, pin in pins.items():
         low, above = BOUNDS[name]
         assert numbers(low) <= pin <= highest[name] < [above], name
+
+
+@pytest.mark.parametrize("file", ["CITATION.cff", "docs/paper.md"])
+def test_a_citation_has_the_version_of_the_program(file: str) -> None:
+    cited = re.findall(r"^ *version *[:=] *{?([\d.]+)", (ROOT / file).read_text(encoding="utf-8"), re.MULTILINE)
+    assert cited == [__version__]
