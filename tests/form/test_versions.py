@@ -43,5 +43,5 @@ def test_every_pin_lies_between_the_lowest_and_the_highest(file: str) -> None:
 
 @pytest.mark.parametrize("file", ["CITATION.cff", "docs/paper.md"])
 def test_a_citation_has_the_version_of_the_program(file: str) -> None:
-    cited = re.findall(r"^ *version *[:=] *{?([\d.]+)", (ROOT / file).read_text(encoding="utf-8"), re.MULTILINE)
-    assert cited == [__version__]
+    text = (ROOT / file).read_text(encoding="utf-8")
+    assert re.findall(r"^ *version *[:=] *{?([\d.]+)", text, re.MULTILINE) == [__version__]
