@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .compat import bpy
+from .compat import Context, Mesh, Object, bpy
 from .core.base.arrays import Floats
 from .core.base.errors import DigiclayError
 from .core.model.fingertip import LEVEL, Fingertip, make_matrices
@@ -32,7 +32,7 @@ AXES = "digiclay_axes"
 ATTRIBUTES = {"mode": ("INT", "value", np.int32), "force": ("FLOAT", "value", np.float32)}
 
 
-def mesh(name: str, shape: tuple[Floats, list[tuple[int, ...]]], smooth_below: float = 0.6) -> Any:
+def mesh(name: str, shape: tuple[Floats, list[tuple[int, ...]]], smooth_below: float = 0.6) -> Mesh:
     """Make a mesh of a shape in Blender units, smooth where faces meet at less than an angle, rad."""
     vertices, faces = shape
     made = bpy.data.meshes.new(name)
@@ -42,7 +42,7 @@ def mesh(name: str, shape: tuple[Floats, list[tuple[int, ...]]], smooth_below: f
     return made
 
 
-def points(name: str, count: int) -> Any:
+def points(name: str, count: int) -> Mesh:
     """Make a mesh of `count` loose vertices with the attributes of a bed."""
     made = bpy.data.meshes.new(name)
     made.vertices.add(count)
@@ -51,7 +51,7 @@ def points(name: str, count: int) -> Any:
     return made
 
 
-def find_fault(bed: Any, pins: int | None = None) -> str:
+def find_fault(bed: Mesh, pins: int | None = None) -> str:
     """Return why a bed's mesh can be neither read nor written as that of its pins now, or an empty text."""
     if not isinstance(bed, bpy.types.Mesh) or not ATTRIBUTES.keys() <= set(bed.attributes.keys()):
         return localize("the bed's mesh is no longer that of its pins: undo that to go on")
@@ -62,14 +62,14 @@ def find_fault(bed: Any, pins: int | None = None) -> str:
     return ""
 
 
-def _require_cells(bed: Any, pins: int | None = None) -> None:
+def _require_cells(bed: Mesh, pins: int | None = None) -> None:
     """Refuse a mesh that has a fault, by a DigiclayError."""
     fault = find_fault(bed, pins)
     if fault:
         raise DigiclayError(f"{bed.name}: {fault}.")
 
 
-def write_cells(bed: Any, position: Floats, height: Floats, **values: NDArray[Any]) -> None:
+def write_cells(bed: Mesh, position: Floats, height: Floats, **values: NDArray[Any]) -> None:
     """Write pins into a mesh: axes (n, 2), m, tops (n,), m, and of `mode` and `force` (n,) what changed."""
     _require_cells(bed, len(height))
     placed = np.column_stack([position, height]) * SCALE
@@ -81,7 +81,7 @@ def write_cells(bed: Any, position: Floats, height: Floats, **values: NDArray[An
     bed.update()  # 4.2 shows stale data without
 
 
-def read_cells(bed: Any) -> dict[str, NDArray[Any]]:
+def read_cells(bed: Mesh) -> dict[str, NDArray[Any]]:
     """Return `position` (n, 2) and `height` (n,), m, `mode` and `force` of a bed's mesh."""
     _require_cells(bed)
     count = len(bed.vertices)
@@ -97,7 +97,7 @@ def read_cells(bed: Any) -> dict[str, NDArray[Any]]:
 
 
 def place_fingertips(
-    bed: Any, poses: Floats, fingers: Sequence[Fingertip], numbers: Sequence[int] = ()
+    bed: Object, poses: Floats, fingers: Sequence[Fingertip], numbers: Sequence[int] = ()
 ) -> None:
     """Put fingertips of a bed to poses (f, 7), and give their ellipsoids their sizes: `move_fingertips`."""
     tips = fingertips_of(bed)
@@ -108,7 +108,7 @@ def place_fingertips(
 
 
 def move_fingertips(
-    bed: Any, poses: Floats, fingers: Sequence[Fingertip], numbers: Sequence[int] = ()
+    bed: Object, poses: Floats, fingers: Sequence[Fingertip], numbers: Sequence[int] = ()
 ) -> None:
     """Put the first fingertips, or those of some numbers, to poses (f, 7); a palm goes along if all do."""
     parts: dict[Any, list[tuple[Any, Floats]]] = {}
@@ -139,7 +139,7 @@ def _place(at: Floats, finger: Fingertip) -> Floats:
     return place
 
 
-def resize_fingertip(tip: Any, finger: Fingertip) -> None:
+def resize_fingertip(tip: Object, finger: Fingertip) -> None:
     """Give the ellipsoid in a fingertip its semi-axes, and the empty a size to be seen about it."""
     axes = np.array([finger.length, finger.width, finger.height])
     tip[AXES] = axes.tolist()
@@ -149,7 +149,7 @@ def resize_fingertip(tip: Any, finger: Fingertip) -> None:
             ball.scale = axes * SCALE
 
 
-def keep_sizes(bed: Any) -> None:
+def keep_sizes(bed: Object) -> None:
     """Take back what the scale of a palm, or other parent, adds to the size of fingertips."""
     for tip in fingertips_of(bed).values():
         scale = np.linalg.norm(np.array(tip.matrix_world)[:3, :3], axis=0) / uniform(bed)
@@ -157,24 +157,24 @@ def keep_sizes(bed: Any) -> None:
             tip.scale = np.array(tip.scale) / scale
 
 
-def finger_of(tip: Any) -> Fingertip:
+def finger_of(tip: Object) -> Fingertip:
     """Return the size of a fingertip, as `resize_fingertip` has given it."""
     return Fingertip(*tip[AXES])
 
 
-def pose(tip: Any) -> Floats:
+def pose(tip: Object) -> Floats:
     """Return the pose (7,) of a fingertip in its bed's space: lowest point, m, and quaternion."""
     (found,) = _read_poses(owner_of(tip), [tip])
     return np.asarray(found)
 
 
-def poses(bed: Any) -> Floats:
+def poses(bed: Object) -> Floats:
     """Return the poses (f, 7) of the fingertips of a bed, in order; without any that of one at its origin."""
     tips = list(fingertips_of(bed).values())
     return _read_poses(bed, tips) if tips else np.array([[0.0, 0.0, 0.0, *LEVEL]])
 
 
-def _read_poses(bed: Any, tips: Sequence[Any]) -> Floats:
+def _read_poses(bed: Object, tips: Sequence[Object]) -> Floats:
     """Return the poses (f, 7) of fingertips in the space of their bed."""
     uniform(bed)
     inverse, found = bed.matrix_world.inverted(), np.empty((len(tips), 7))
@@ -189,7 +189,7 @@ def _read_poses(bed: Any, tips: Sequence[Any]) -> Floats:
     return found
 
 
-def uniform(bed: Any) -> float:
+def uniform(bed: Object) -> float:
     """Return the scale of a bed in the world; raise DigiclayError where lengths in it mean nothing."""
     fault = find_scale_fault(bed)
     if fault:
@@ -197,7 +197,7 @@ def uniform(bed: Any) -> float:
     return _judge_scale(tuple(map(tuple, bed.matrix_world)))[0]
 
 
-def find_scale_fault(bed: Any) -> str:
+def find_scale_fault(bed: Object) -> str:
     """Return why lengths in a bed mean nothing, or an empty text; see `uniform`."""
     fault = _judge_scale(tuple(map(tuple, bed.matrix_world)))[1]
     remedy = "Set it with Object > Apply or in the sidebar's Item tab"
@@ -223,7 +223,7 @@ def _judge_scale(rows: tuple[tuple[float, ...], ...]) -> tuple[float, str]:
     return largest, ""
 
 
-def project(context: Any, bed: Any, points: Floats) -> Floats:
+def project(context: Context, bed: Object, points: Floats) -> Floats:
     """Return where points (k, 3) of a bed's space, m, appear in the region (k, 2), pixels; or NaN."""
     to_clip = np.array(context.region_data.perspective_matrix @ bed.matrix_world)
     clip = np.column_stack([points * SCALE, np.ones(len(points))]) @ to_clip.T

@@ -6,9 +6,10 @@ What the commands need is imported in `main`, where Ctrl-C is looked after alrea
 import gc
 import os
 import sys
+from argparse import Namespace
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import Any, NoReturn
+from typing import NoReturn
 
 from .commands.stop import STOPPED, WRONG, defer_interrupt
 from .core.base.errors import DigiclayError, one_line
@@ -22,7 +23,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     return carry_out(partial(_parsed, argv))
 
 
-def carry_out(parse: Callable[[], Any]) -> int:
+def carry_out(parse: Callable[[], Namespace]) -> int:
     """Read arguments and carry out the command they name; return its exit code, as `main` does."""
     os.environ["MPLBACKEND"] = "agg"  # a notebook's is one that matplotlib cannot always import
     try:
@@ -44,7 +45,7 @@ def carry_out(parse: Callable[[], Any]) -> int:
     return code
 
 
-def _parsed(argv: Sequence[str] | None = None) -> Any:
+def _parsed(argv: Sequence[str] | None = None) -> Namespace:
     """Read the arguments."""
     with defer_interrupt():
         from .commands.parser import parser
@@ -64,7 +65,7 @@ def console() -> NoReturn:
     run_as_program(_parsed)
 
 
-def run_as_program(parse: Callable[[], Any]) -> NoReturn:
+def run_as_program(parse: Callable[[], Namespace]) -> NoReturn:
     """Read arguments, carry out the command they name, and leave with its exit code.
 
     On one core, unless the environment says otherwise: a session's products are small, and a second
@@ -72,7 +73,7 @@ def run_as_program(parse: Callable[[], Any]) -> NoReturn:
     searched for garbage, which would take a seventh of a short command; Blender's module is imported later.
     """
 
-    def parse_and_freeze() -> Any:
+    def parse_and_freeze() -> Namespace:
         gc.disable()
         try:
             return parse()

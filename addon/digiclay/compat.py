@@ -9,7 +9,41 @@ from typing import Any
 from .core.base.errors import DigiclayError
 
 try:
-    import bpy as bpy  # for the others
+    import bpy as bpy  # for the others, as are the types
+    from bpy.types import ID as ID
+    from bpy.types import AddonPreferences as AddonPreferences
+    from bpy.types import Area as Area
+    from bpy.types import Collection as Collection
+    from bpy.types import Context as Context
+    from bpy.types import Depsgraph as Depsgraph
+    from bpy.types import Event as Event
+    from bpy.types import Header as Header
+    from bpy.types import Material as Material
+    from bpy.types import Menu as Menu
+    from bpy.types import Mesh as Mesh
+    from bpy.types import Modifier as Modifier
+    from bpy.types import Node as Node
+    from bpy.types import NodeInputs as NodeInputs
+    from bpy.types import NodeOutputs as NodeOutputs
+    from bpy.types import NodeSocket as NodeSocket
+    from bpy.types import NodeTree as NodeTree
+    from bpy.types import Object as Object
+    from bpy.types import Operator as Operator
+    from bpy.types import OperatorProperties as OperatorProperties
+    from bpy.types import PropertyGroup as PropertyGroup
+    from bpy.types import Region as Region
+    from bpy.types import RegionView3D as RegionView3D
+    from bpy.types import RenderSettings as RenderSettings
+    from bpy.types import Screen as Screen
+    from bpy.types import Timer as Timer
+    from bpy.types import UILayout as UILayout
+    from bpy.types import View3DShading as View3DShading
+    from bpy.types import ViewLayer as ViewLayer
+    from bpy.types import Window as Window
+    from bpy.types import WorkSpaceTool as WorkSpaceTool
+    from bpy.types import World as World
+    from bpy.types import bpy_struct as bpy_struct
+    from mathutils import Matrix as Matrix
 except ModuleNotFoundError as error:
     if error.name != "bpy":
         raise
@@ -42,20 +76,20 @@ KINDS = (
 )
 
 
-def shader_nodes(owner: Any) -> Any:
+def shader_nodes(owner: Material | World) -> NodeTree:
     """Return the node tree of a material or world; up to 4.5 it must be enabled, from 5.0 it exists."""
     if owner.node_tree is None:
         owner.use_nodes = True
     return owner.node_tree
 
 
-def has_node_setting(modifier: Any, name: str) -> bool:
+def has_node_setting(modifier: Modifier, name: str) -> bool:
     """Return whether a geometry nodes modifier's tree has an input, be it under its name in older files."""
     inputs = modifier.node_group.interface.items_tree
     return name in inputs or FORMER_INPUTS.get(name, name) in inputs
 
 
-def node_setting(modifier: Any, name: str) -> Any:
+def node_setting(modifier: Modifier, name: str) -> Any:
     """Return what a geometry nodes modifier sets an input of its tree to."""
     identifier = _identifier(modifier, name)
     if hasattr(modifier, "properties"):  # from 5.2 on; before that the modifier itself is the dictionary
@@ -63,7 +97,7 @@ def node_setting(modifier: Any, name: str) -> Any:
     return modifier[identifier]
 
 
-def read_stored(owner: Any, name: str) -> dict[str, Any]:
+def read_stored(owner: ID, name: str) -> dict[str, Any]:
     """Return all that is stored in a property group of an object, nested; what was never set is not in it."""
     # From 5.0 on these values are kept apart from the custom properties.
     kept = owner.bl_system_properties_get() if hasattr(owner, "bl_system_properties_get") else owner
@@ -71,7 +105,7 @@ def read_stored(owner: Any, name: str) -> dict[str, Any]:
     return group.to_dict() if group is not None else {}
 
 
-def set_node_setting(modifier: Any, name: str, value: Any) -> None:
+def set_node_setting(modifier: Modifier, name: str, value: Any) -> None:
     """Set an input of a geometry nodes modifier's tree, for the object that has the modifier."""
     identifier = _identifier(modifier, name)
     if hasattr(modifier, "properties"):
@@ -81,7 +115,7 @@ def set_node_setting(modifier: Any, name: str, value: Any) -> None:
     modifier.id_data.update_tag()  # Blender does not notice by itself
 
 
-def keyframe_node_setting(modifier: Any, name: str, frame: int) -> None:
+def keyframe_node_setting(modifier: Modifier, name: str, frame: int) -> None:
     """Insert a keyframe for an input of a geometry nodes modifier's tree, at its present value."""
     identifier = _identifier(modifier, name)
     if hasattr(modifier, "properties"):
@@ -90,14 +124,14 @@ def keyframe_node_setting(modifier: Any, name: str, frame: int) -> None:
         modifier.keyframe_insert(f'["{identifier}"]', frame=frame)
 
 
-def _identifier(modifier: Any, name: str) -> str:
+def _identifier(modifier: Modifier, name: str) -> str:
     """Return the identifier of an input of a geometry nodes modifier's tree, also of an older file's tree."""
     inputs = modifier.node_group.interface.items_tree
     found: str = inputs[name if name in inputs else FORMER_INPUTS[name]].identifier
     return found
 
 
-def curves(owner: Any) -> list[Any]:
+def curves(owner: ID) -> list[Any]:
     """Return the collections of animation curves of an object: from 4.4 on those of its own slot alone."""
     data = owner.animation_data
     action = data.action if data else None
@@ -112,7 +146,7 @@ def curves(owner: Any) -> list[Any]:
     return [bag.fcurves for bag in bags if bag is not None]
 
 
-def own_curves(owner: Any) -> None:
+def own_curves(owner: ID) -> None:
     """Give an object an action of its own where it shares its curves with others, as linked duplicates do."""
     data = owner.animation_data
     if not data or data.action is None:
@@ -138,7 +172,7 @@ def has_denoiser() -> bool:
     return bool(getattr(_cycles, "with_openimagedenoise", False))
 
 
-def to_video(render: Any) -> None:
+def to_video(render: RenderSettings) -> None:
     """Have a scene's render settings write a film in an MP4 file, H.264, without sound."""
     image = render.image_settings
     if hasattr(image, "media_type"):  # from 5.0 on

@@ -2,9 +2,8 @@
 
 # No postponed annotations here: Blender reads the preferences' properties from them.
 from types import SimpleNamespace
-from typing import Any
 
-from .compat import RELATIVE_PATH, bpy
+from .compat import RELATIVE_PATH, AddonPreferences, Context, UILayout, bpy
 from .device import palettes
 from .settings import own_folder
 from .settings.declared import choice, flag, integer, text, title
@@ -23,14 +22,14 @@ SHOWN = (
 )
 
 
-def redraw_views(preferences: Any, context: Any) -> None:
+def redraw_views(preferences: AddonPreferences, context: Context) -> None:
     """Draw the 3D views anew."""
     for window in context.window_manager.windows:
         for area in window.screen.areas:
             area.tag_redraw()
 
 
-def take_methods(preferences: Any, context: Any) -> None:
+def take_methods(preferences: AddonPreferences, context: Context) -> None:
     """Run the files of the folder of own control methods where that is allowed; else take them back."""
     if preferences.run_own_methods:
         own_folder.load(preferences.methods_folder)
@@ -38,7 +37,7 @@ def take_methods(preferences: Any, context: Any) -> None:
         own_folder.clear()
 
 
-def take_folder(preferences: Any, context: Any) -> None:
+def take_folder(preferences: AddonPreferences, context: Context) -> None:
     """Take the permission back, which was given for another folder; store the full path of this one."""
     preferences.run_own_methods = False
     full = own_folder.find_full_path(preferences.methods_folder)
@@ -113,7 +112,7 @@ class Preferences(bpy.types.AddonPreferences):
         update=take_folder,
     )
 
-    def draw(self, context: Any) -> None:
+    def draw(self, context: Context) -> None:
         """Draw the preferences."""
         column = self.layout.column()
         column.use_property_split = True
@@ -126,7 +125,7 @@ class Preferences(bpy.types.AddonPreferences):
         if self.methods_folder:
             self._draw_methods(column)
 
-    def _draw_methods(self, column: Any) -> None:
+    def _draw_methods(self, column: UILayout) -> None:
         """Draw a warning, the permission, what was loaded, and what was refused."""
         warning = column.column()
         warning.alert = True
@@ -147,7 +146,7 @@ def defaults() -> SimpleNamespace:
     return SimpleNamespace(**{name: each.keywords["default"] for name, each in declared.items()})
 
 
-def get(context: Any) -> Any:
+def get(context: Context) -> AddonPreferences:
     """Return the user's preferences; where the package is used without being enabled, the defaults."""
     entry = context.preferences.addons.get(__package__)
     return defaults() if entry is None or entry.preferences is None else entry.preferences

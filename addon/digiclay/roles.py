@@ -1,8 +1,13 @@
 """Roles of Blender's objects: which is a bed, a fingertip of it, the ellipsoid in that, or another part."""
 
-from typing import Any
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
 
 from .core.model.fingers import MOST_FINGERS
+
+if TYPE_CHECKING:
+    from bpy.types import Context, Object
 
 #: Property that holds an object's role.
 ROLE = "digiclay_role"
@@ -22,12 +27,12 @@ FINGERS = (FINGER, *(f"{FINGER}_{number}" for number in range(2, MOST_FINGERS + 
 OWNED = "digiclay_owned"
 
 
-def is_bed(thing: Any) -> bool:
+def is_bed(thing: Object) -> bool:
     """Return whether an object is a bed of this extension."""
     return thing is not None and thing.get(ROLE) == BED and thing.type == "MESH"
 
 
-def bed_of(context: Any) -> Any:
+def bed_of(context: Context) -> Any:
     """Return the bed the active object is or belongs to, be it fingertip, housing or a part; None without."""
     thing = getattr(context, "object", None)
     while thing is not None and not is_bed(thing):
@@ -35,44 +40,44 @@ def bed_of(context: Any) -> Any:
     return thing
 
 
-def find_whole(part: Any) -> Any | None:
+def find_whole(part: Object) -> Object | None:
     """Return what an object is a part of: its parent, or the bed of a fingertip or palm."""
     return owner_of(part) if part.get(ROLE) in (FINGERTIP, PALM) else part.parent
 
 
-def is_edited(context: Any) -> bool:
+def is_edited(context: Context) -> bool:
     """Return whether the active object, or the bed it belongs to, is being edited, painted or posed."""
     bed = bed_of(context)
     return context.mode != "OBJECT" or (bed is not None and bed.mode != "OBJECT")
 
 
-def is_local(thing: Any) -> bool:
+def is_local(thing: Object) -> bool:
     """Return whether an object is of this file alone: neither linked, nor a library override of what is."""
     return thing.library is None and thing.override_library is None
 
 
-def is_linked(thing: Any) -> bool:
+def is_linked(thing: Object) -> bool:
     """Return whether an object stands in any collection: what is deleted but held by a property does not."""
     return bool(thing.users_collection)
 
 
-def fingertips_of(bed: Any) -> dict[int, Any]:
+def fingertips_of(bed: Object) -> dict[int, Object]:
     """Return the fingertips that belong to a bed, by number; not those that the user has deleted."""
     parts = ((number, _part(bed, name, FINGERTIP)) for number, name in enumerate(FINGERS, 1))
     return {number: part for number, part in parts if part is not None}
 
 
-def fingertip_of(bed: Any) -> Any | None:
+def fingertip_of(bed: Object) -> Object | None:
     """Return the first fingertip that belongs to a bed, or None when the user has deleted all of them."""
     return next(iter(fingertips_of(bed).values()), None)
 
 
-def ellipsoid(tip: Any) -> Any | None:
+def ellipsoid(tip: Object) -> Object | None:
     """Return the ellipsoid of a fingertip, or None when the user has deleted it."""
     return _part(tip, BALL, ELLIPSOID)
 
 
-def owner_of(part: Any, role: str = BED) -> Any | None:
+def owner_of(part: Object, role: str = BED) -> Object | None:
     """Return the nearest object of a role above one; None without, or if a palm between is deleted.
 
     A fingertip or palm that hangs on something else, or nothing, is still the bed's that holds it.
@@ -93,7 +98,7 @@ def owner_of(part: Any, role: str = BED) -> Any | None:
     return min(held, key=lambda bed: bed.session_uid, default=None)
 
 
-def _part(owner: Any, name: str, role: str) -> Any | None:
+def _part(owner: Object, name: str, role: str) -> Object | None:
     """Return the part that an object holds as a property, if it still is below it and in a collection."""
     part = owner.get(name)
     if name in (FINGER, BALL) and name not in owner:  # older files do not have it as a property

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..compat import bpy
+from ..compat import Object, Region, RegionView3D, Window, bpy
 from ..core.base.arrays import Floats
 from ..roles import is_bed, is_local
 from . import view
@@ -39,9 +39,9 @@ def follow() -> None:
             view.write_setting(bed, FAR, not view.is_far(bed))
 
 
-def _sizes() -> Iterator[tuple[Any, float]]:
+def _sizes() -> Iterator[tuple[Object, float]]:
     """Give the beds shown as "automatic", with the pitch in the view that shows them largest, pixels."""
-    sizes: dict[Any, float] = {}
+    sizes: dict[Object, float] = {}
     scale = bpy.context.preferences.system.ui_scale or 1.0  # 0 without a window
     for window in bpy.context.window_manager.windows:
         beds = [thing for thing in window.scene.objects if is_bed(thing) and _is_automatic(thing)]
@@ -55,7 +55,7 @@ def _sizes() -> Iterator[tuple[Any, float]]:
     yield from sizes.items()
 
 
-def _regions(window: Any) -> Iterator[tuple[Any, Any]]:
+def _regions(window: Window) -> Iterator[tuple[Region, RegionView3D]]:
     """Give the regions of a window's 3D views, with where each looks from."""
     for area in window.screen.areas:
         if area.type == "VIEW_3D":
@@ -63,12 +63,12 @@ def _regions(window: Any) -> Iterator[tuple[Any, Any]]:
             yield region, area.spaces.active.region_3d
 
 
-def _is_automatic(bed: Any) -> bool:
+def _is_automatic(bed: Object) -> bool:
     """Return whether a bed's size in the views decides what is drawn of it."""
     return is_local(bed) and view.can_show_skin(bed) and view.read_form(bed) == "automatic"
 
 
-def _pitch(bed: Any) -> float:
+def _pitch(bed: Object) -> float:
     """Return the distance of the first two pins of a bed, Blender units."""
     vertices = bed.data.vertices
     if len(vertices) < 2:

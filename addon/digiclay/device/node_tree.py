@@ -5,14 +5,15 @@ pins: a session, a bake, undo. It needs no data of its own in a tick.
 """
 
 from collections.abc import Mapping
-from typing import Any
 
-from ..compat import bpy
+from ..compat import Node, NodeInputs, NodeOutputs, NodeSocket, NodeTree, Object, bpy
 from ..core.base.modes import Mode
 from . import heat
-from .parts import FOLLOWING, HIGH, LOW, NEAREST, PAIR, PREVIOUS, VALUE, WEIGHTS, Sources
+from .parts import FOLLOWING, HIGH, LOW, NEAREST, PAIR, PREVIOUS, VALUE, WEIGHTS, SkinMeshes, Sources
 from .skin_lattice import KINDS
 
+#: What an input of a node is given: a value, an output of another node, or a list of outputs.
+Value = object
 #: Names of the nodes that have the housing and the collection of all that is drawn.
 CASE, SOURCES = "Housing", "Sources"
 
@@ -31,8 +32,13 @@ LEAST = 1e-3
 
 
 def node(
-    tree: Any, kind: str, column: float, row: float, inputs: Mapping[str, Any] | None = None, **settings: Any
-) -> Any:
+    tree: NodeTree,
+    kind: str,
+    column: float,
+    row: float,
+    inputs: Mapping[str, Value] | None = None,
+    **settings: object,
+) -> Node:
     """Add a node at a place of a coarse grid; each input gets a value, an output, or a list of outputs."""
     made = tree.nodes.new(kind)
     made.location = (220.0 * column, -180.0 * row)
@@ -43,7 +49,7 @@ def node(
     return made
 
 
-def link(tree: Any, value: Any, place: Any) -> None:
+def link(tree: NodeTree, value: Value, place: NodeSocket) -> None:
     """Give an input a value, an output, or a list of outputs in the order in which they are to be linked."""
     if isinstance(value, list):
         for each in value:
@@ -54,12 +60,12 @@ def link(tree: Any, value: Any, place: Any) -> None:
         place.default_value = value
 
 
-def enabled(sockets: Any, name: str) -> Any:
+def enabled(sockets: NodeInputs | NodeOutputs, name: str) -> NodeSocket:
     """Return the socket of a name that is in use: nodes have one for each type, all of the same name."""
     return next((each for each in sockets if each.name == name and each.enabled), sockets[name])
 
 
-def new_tree(name: str) -> Any:
+def new_tree(name: str) -> NodeTree:
     """Add a tree that takes a geometry."""
     tree = bpy.data.node_groups.new(name, "GeometryNodeTree")
     tree.interface.new_socket("Geometry", in_out="INPUT", socket_type="NodeSocketGeometry")
@@ -67,20 +73,20 @@ def new_tree(name: str) -> Any:
     return tree
 
 
-def socket(tree: Any, name: str, kind: str, default: Any, description: str) -> None:
+def socket(tree: NodeTree, name: str, kind: str, default: Value, description: str) -> None:
     """Add a setting to a tree, which each object that uses the tree has for itself."""
     made = tree.interface.new_socket(name, in_out="INPUT", socket_type=kind)
     made.default_value = default
     made.description = description
 
 
-def attribute(tree: Any, name: Any, kind: str, column: float, row: float) -> Any:
+def attribute(tree: NodeTree, name: Value, kind: str, column: float, row: float) -> NodeSocket:
     """Add a node that reads an attribute of the vertices of a name or text of nodes; return its output."""
     made = node(tree, "GeometryNodeInputNamedAttribute", column, row, {"Name": name}, data_type=kind)
     return enabled(made.outputs, "Attribute")
 
 
-def number(tree: Any, operation: str, column: float, row: float, *values: Any) -> Any:
+def number(tree: NodeTree, operation: str, column: float, row: float, *values: Value) -> NodeSocket:
     """Add a node that reckons with numbers or with outputs of other nodes; return its output."""
     made = node(tree, "ShaderNodeMath", column, row, operation=operation)
     for place, value in zip(made.inputs, values, strict=False):
@@ -88,44 +94,50 @@ def number(tree: Any, operation: str, column: float, row: float, *values: Any) -
     return made.outputs["Value"]
 
 
-def switch(tree: Any, kind: str, column: float, row: float, on: Any, off: Any, then: Any) -> Any:
+def switch(
+    tree: NodeTree, kind: str, column: float, row: float, on: Value, off: Value, then: Value
+) -> NodeSocket:
     """Add a node that hands on `then` where `on` holds and `off` (may be None) else; return its output."""
     # What is not handed on is not worked out either: that is how a part that is off costs nothing.
     ways = {"Switch": on, **({} if off is None else {"False": off}), "True": then}
     return enabled(node(tree, "GeometryNodeSwitch", column, row, ways, input_type=kind).outputs, "Output")
 
 
-def combine(tree: Any, column: float, row: float, **parts: Any) -> Any:
+def combine(tree: NodeTree, column: float, row: float, **parts: Value) -> NodeSocket:
     """Add a node that makes a vector of X, Y and Z; return its output."""
     return node(tree, "ShaderNodeCombineXYZ", column, row, parts).outputs["Vector"]
 
 
-def read_height(tree: Any, row: float) -> Any:
+def read_height(tree: NodeTree, row: float) -> NodeSocket:
     """Add the nodes that read the height of a vertex; return their output."""
     place = node(tree, "GeometryNodeInputPosition", 0, row).outputs["Position"]
     return node(tree, "ShaderNodeSeparateXYZ", 1, row, {"Vector": place}).outputs["Z"]
 
 
-def mesh_of(tree: Any, thing: Any, column: float, row: float) -> Any:
+def mesh_of(tree: NodeTree, thing: Object, column: float, row: float) -> NodeSocket:
     """Add the node that reads an object's mesh; return its output."""
     return node(tree, "GeometryNodeObjectInfo", column, row, {"Object": thing}).outputs["Geometry"]
 
 
-def sample(tree: Any, table: Any, value: Any, kind: str, index: Any, column: float, row: float) -> Any:
+def sample(
+    tree: NodeTree, table: NodeSocket, value: Value, kind: str, index: Value, column: float, row: float
+) -> NodeSocket:
     """Add the node that reads a value of other vertices, by their place; return its output."""
     given = {"Geometry": table, "Value": value, "Index": index}
     made = node(tree, "GeometryNodeSampleIndex", column, row, given, data_type=kind, domain="POINT")
     return enabled(made.outputs, "Value")
 
 
-def store(tree: Any, table: Any, name: str, kind: str, value: Any, column: float, row: float) -> Any:
+def store(
+    tree: NodeTree, table: NodeSocket, name: str, kind: str, value: Value, column: float, row: float
+) -> NodeSocket:
     """Add the node that stores a value at every vertex; return its geometry."""
     given = {"Geometry": table, "Name": name, "Value": value}
     made = node(tree, "GeometryNodeStoreNamedAttribute", column, row, given, data_type=kind, domain="POINT")
     return made.outputs["Geometry"]
 
 
-def bed_nodes(sources: Sources, deck: float, length: float, unit: float) -> Any:
+def bed_nodes(sources: Sources, deck: float, length: float, unit: float) -> NodeTree:
     """Make the node group that puts a pin on every vertex, an arrow where arrows are on, and the housing."""
     # Stretching one mesh costs half of drawing rod and cap apart. A cap is stretched with its
     # rod, from a flat one on a low pin to a round one on a high pin.
@@ -175,7 +187,7 @@ SETTINGS = (
 )
 
 
-def _form_switches(tree: Any, settings: Any, row: float) -> tuple[Any, Any, Any]:
+def _form_switches(tree: NodeTree, settings: Node, row: float) -> tuple[NodeSocket, NodeSocket, NodeSocket]:
     """Add the nodes that tell whether pins, skin, and both are drawn."""
     form = settings.outputs[FORM]
     automatic, pins, skin, both = (
@@ -191,7 +203,7 @@ def _form_switches(tree: Any, settings: Any, row: float) -> tuple[Any, Any, Any]
     return number(tree, "ADD", 5, row + 1, pins, both), number(tree, "ADD", 5, row + 2, skin, both), both
 
 
-def _skin(tree: Any, sources: Sources, settings: Any, both: Any, row: float) -> Any:
+def _skin(tree: NodeTree, sources: Sources, settings: Node, both: NodeSocket, row: float) -> NodeSocket:
     """Add the nodes of the skin, clear where pins are drawn under it; return its geometry."""
     smooth, membrane = (
         node(tree, "FunctionNodeInputString", -3, row + step, string=name).outputs["String"]
@@ -212,13 +224,13 @@ def _skin(tree: Any, sources: Sources, settings: Any, both: Any, row: float) -> 
     return node(tree, "GeometryNodeGeometryToInstance", 21, row, {"Geometry": chosen}).outputs["Instances"]
 
 
-def _stretch(tree: Any, deck: float, length: float) -> Any:
+def _stretch(tree: NodeTree, deck: float, length: float) -> NodeSocket:
     """Add the nodes that give (1, 1, (z - deck) / length) at every vertex."""
     line = number(tree, "MULTIPLY_ADD", 2, -2, read_height(tree, -2), 1.0 / length, -deck / length)
     return combine(tree, 4, -2, X=1.0, Y=1.0, Z=number(tree, "MAXIMUM", 3, -2, line, LEAST_STRETCH))
 
 
-def _level_of_force(tree: Any, top: Any, first: int, row: float) -> Any:
+def _level_of_force(tree: NodeTree, top: NodeSocket, first: int, row: float) -> NodeSocket:
     """Add the nodes that choose a pin by the force on it; return its place among the pins."""
     force = attribute(tree, "force", "FLOAT", 0, row + 1)
     per_newton = number(tree, "DIVIDE", 0, row + 2, float(len(heat.COLORS)), top)
@@ -228,7 +240,9 @@ def _level_of_force(tree: Any, top: Any, first: int, row: float) -> Any:
     return number(tree, "ADD", 3.5, row, within, float(first))
 
 
-def _arrows_on_points(tree: Any, arrow: Any, settings: Any, pins: Any, unit: float, row: float) -> Any:
+def _arrows_on_points(
+    tree: NodeTree, arrow: NodeSocket, settings: Node, pins: NodeSocket, unit: float, row: float
+) -> NodeSocket:
     """Add the nodes that draw the arrows beside the pins."""
     force = attribute(tree, "force", "FLOAT", 1, row + 1)
     pressed = node(
@@ -260,7 +274,9 @@ def _arrows_on_points(tree: Any, arrow: Any, settings: Any, pins: Any, unit: flo
     return switch(tree, "GEOMETRY", 6, row - 1, settings.outputs[ARROWS], pins, joined)
 
 
-def skin_nodes(tree: Any, sources: Any, pins: Any, kind: Any, row: float) -> Any:
+def skin_nodes(
+    tree: NodeTree, sources: SkinMeshes, pins: NodeSocket, kind: NodeSocket, row: float
+) -> NodeSocket:
     """Add the nodes that stretch a skin over pins; return its geometry."""
     names = [_prefixed(tree, words, kind, row + step) for step, words in enumerate(WEIGHTS)]
     height = read_height(tree, row + 3)
@@ -277,14 +293,14 @@ def skin_nodes(tree: Any, sources: Any, pins: Any, kind: Any, row: float) -> Any
     return raised.outputs["Geometry"]
 
 
-def _prefixed(tree: Any, words: str, kind: Any, row: float) -> Any:
+def _prefixed(tree: NodeTree, words: str, kind: NodeSocket, row: float) -> NodeSocket:
     """Add the nodes that put words before a name."""
     first = node(tree, "FunctionNodeInputString", -1, row, string=words).outputs["String"]
     # What is linked first stands last.
     return node(tree, "GeometryNodeStringJoin", 0, row, {"Strings": [kind, first]}).outputs["String"]
 
 
-def _store_pair(tree: Any, table: Any, column: float, row: float) -> Any:
+def _store_pair(tree: NodeTree, table: NodeSocket, column: float, row: float) -> NodeSocket:
     """Add the nodes that store height and slope: the harmonic mean of the slopes on both sides, or 0."""
     here = attribute(tree, VALUE, "FLOAT", column, row + 1)
     sides = []
@@ -304,7 +320,7 @@ def _store_pair(tree: Any, table: Any, column: float, row: float) -> Any:
     return store(tree, table, PAIR, "FLOAT_VECTOR", pair, column + 1.7, row)
 
 
-def _sum(tree: Any, table: Any, names: list[Any], column: float, row: float) -> Any:
+def _sum(tree: NodeTree, table: NodeSocket, names: list[NodeSocket], column: float, row: float) -> NodeSocket:
     """Add the nodes that add up heights and slopes of two neighbors."""
     pair = attribute(tree, PAIR, "FLOAT_VECTOR", column, row + 5)
     parts = []

@@ -1,13 +1,13 @@
 """Objects of the device: shapes, materials and roles; meshes of the live skin."""
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from .. import bridge, roles
 from ..bridge import SCALE
-from ..compat import bpy, shader_nodes
+from ..compat import ID, Collection, Material, Mesh, Object, bpy, shader_nodes
 from ..core.base.errors import DigiclayError
 from ..core.base.modes import COLORS, Mode
 from ..ui_text import localize
@@ -43,7 +43,9 @@ NEAREST = "pin"
 WEIGHTS = ("weight low ", "weight high ")
 
 
-def marked(data: Any, name: str, role: str, *collections: Any, parent: Any | None = None) -> Any:
+def marked(
+    data: ID | None, name: str, role: str, *collections: Collection, parent: Object | None = None
+) -> Object:
     """Make an object of data (None: an empty) in some collections, marked with its role."""
     made = bpy.data.objects.new(name, data)
     made[roles.ROLE] = role
@@ -53,7 +55,7 @@ def marked(data: Any, name: str, role: str, *collections: Any, parent: Any | Non
     return made
 
 
-def material(name: str, color: tuple[float, float, float], roughness: float, alpha: float = 1.0) -> Any:
+def material(name: str, color: tuple[float, float, float], roughness: float, alpha: float = 1.0) -> Material:
     """Return the material of a part, as the user may have changed it, or make it."""
     existing = next((m for m in bpy.data.materials if m.get(roles.ROLE) == name), None)
     if existing is not None:
@@ -72,23 +74,23 @@ def material(name: str, color: tuple[float, float, float], roughness: float, alp
 class SkinMeshes(NamedTuple):
     """Meshes of the skin: points of the pins and of the rows, and the skin itself, flat."""
 
-    pins: Any
-    rows: Any
-    skin: Any
+    pins: Object
+    rows: Object
+    skin: Object
 
 
 class Sources(NamedTuple):
     """Objects drawn by a bed's geometry nodes, in a collection outside all Blender scenes."""
 
     #: First a pin a mode, then a pin a level of force, in the order of their codes; then the others.
-    collection: Any
+    collection: Collection
     #: An arrow of length 1 that points down and ends at the origin.
-    arrow: Any
-    housing: Any
+    arrow: Object
+    housing: Object
     #: Objects of the live skin.
     skin: SkinMeshes
     #: Material of a skin over pins that are drawn.
-    clear: Any
+    clear: Material
 
 
 def make_sources(instant: Instant, length: float, deck: float, rim: float) -> Sources:
@@ -116,7 +118,7 @@ def make_sources(instant: Instant, length: float, deck: float, rim: float) -> So
     return Sources(collection, arrow, case, SkinMeshes(*skin), clear)
 
 
-def _clays() -> list[Any]:
+def _clays() -> list[Material]:
     """Return the material of the skin over pins of each mode."""
     clay = material("skin", CLAY, roughness=0.6)
     return [
@@ -125,14 +127,14 @@ def _clays() -> list[Any]:
     ]
 
 
-def _arrow(pitch: float) -> Any:
+def _arrow(pitch: float) -> Mesh:
     """Make the mesh of a bed's arrow; the pitch in m."""
     mesh = bridge.mesh("Digital Clay Force", primitives.arrow(HEAD * pitch * SCALE))
     mesh.materials.append(material("force_arrow", ARROW, roughness=0.5))
     return mesh
 
 
-def _housing(instant: Instant, deck: float, rim: float) -> Any:
+def _housing(instant: Instant, deck: float, rim: float) -> Mesh:
     """Make the mesh of the case about the pins of an instant; floor inside and upper edge in m."""
     reach = np.abs(instant.position).max(axis=0) + instant.actuator.bore / 2 + GAP * instant.pitch
     half = float(reach[0]) * SCALE, float(reach[1]) * SCALE
@@ -144,7 +146,7 @@ def _housing(instant: Instant, deck: float, rim: float) -> Any:
     return mesh
 
 
-def make_meshes(lattice: SkinLattice, deck: float, materials: Sequence[Any]) -> SkinMeshes:
+def make_meshes(lattice: SkinLattice, deck: float, materials: Sequence[Material]) -> SkinMeshes:
     """Make the meshes of a skin; a material for each mode."""
     pins = _points("Digital Clay Skin Pins", lattice.along.previous.size)
     _write_neighbors(pins, lattice.along)
@@ -167,20 +169,20 @@ def make_meshes(lattice: SkinLattice, deck: float, materials: Sequence[Any]) -> 
     return SkinMeshes(pins, rows, skin)
 
 
-def _points(name: str, count: int) -> Any:
+def _points(name: str, count: int) -> Mesh:
     """Make a mesh of loose vertices."""
     made = bpy.data.meshes.new(name)
     made.vertices.add(count)
     return made
 
 
-def _write_neighbors(mesh: Any, step: Pass) -> None:
+def _write_neighbors(mesh: Mesh, step: Pass) -> None:
     """Write the neighbors that the slopes of a pass need."""
     for name, values in ((PREVIOUS, step.previous), (FOLLOWING, step.following)):
         mesh.attributes.new(name, "INT", "POINT").data.foreach_set("value", values)
 
 
-def _write_weights(mesh: Any, step: Pass) -> None:
+def _write_weights(mesh: Mesh, step: Pass) -> None:
     """Write the neighbors that a pass adds up, and their weights."""
     for name, values in ((LOW, step.low), (HIGH, step.high)):
         mesh.attributes.new(name, "INT", "POINT").data.foreach_set("value", values)
@@ -190,7 +192,7 @@ def _write_weights(mesh: Any, step: Pass) -> None:
             made.data.foreach_set("vector", share.astype(np.float32).ravel())
 
 
-def make_fingertip(bed: Any, number: int = 1, palm: Any = None) -> Any:
+def make_fingertip(bed: Object, number: int = 1, palm: Object | None = None) -> Object:
     """Make a fingertip of a bed, or of a palm on it: an empty that is moved, in it an ellipsoid."""
     homes = bed.users_collection
     # The empty carries the pose alone. Its scale is locked: the fingertip's size is a parameter
@@ -216,7 +218,7 @@ def name_fingertip(number: int) -> str:
     return FINGERTIP_NAME + f" {number}" * (number > 1)
 
 
-def find_free_number(bed: Any) -> int:
+def find_free_number(bed: Object) -> int:
     """Return the least number that no fingertip of a bed has; raise DigiclayError where all have one."""
     taken = roles.fingertips_of(bed)
     free = (number for number in range(1, len(roles.FINGERS) + 1) if number not in taken)
@@ -226,7 +228,7 @@ def find_free_number(bed: Any) -> int:
     return number
 
 
-def hold_fingertip(bed: Any, number: int, tip: Any) -> None:
+def hold_fingertip(bed: Object, number: int, tip: Object) -> None:
     """Have a bed, and the palm that a fingertip stands on, hold it as that of a number."""
     bed[roles.FINGERS[number - 1]] = tip
     palm = roles.owner_of(tip, roles.PALM)
@@ -234,7 +236,7 @@ def hold_fingertip(bed: Any, number: int, tip: Any) -> None:
         palm[roles.FINGERS[number - 1]], tip[roles.HAND] = tip, palm
 
 
-def make_palm(bed: Any) -> Any:
+def make_palm(bed: Object) -> Object:
     """Make the palm of a hand over a bed: an empty that moves its fingertips as one."""
     made = marked(None, "Digital Clay Hand", roles.PALM, *bed.users_collection, parent=bed)
     made[roles.OWNED] = True
@@ -242,13 +244,13 @@ def make_palm(bed: Any) -> Any:
     return made
 
 
-def lock_in_place(ball: Any) -> None:
+def lock_in_place(ball: Object) -> None:
     """Have an ellipsoid selected by a click, and moved by its fingertip alone."""
     ball.hide_select = False
     ball.lock_location = ball.lock_rotation = ball.lock_scale = (True, True, True)
 
 
-def color_fingertip(tip: Any, number: int, *, clear: bool) -> None:
+def color_fingertip(tip: Object, number: int, *, clear: bool) -> None:
     """Give the ellipsoid of a fingertip the color of its number, opaque, or clear so that arrows are seen."""
     ball = roles.ellipsoid(tip)
     if ball is not None:

@@ -4,12 +4,12 @@ Blender copies, deletes and hides the objects that are selected, not those that 
 here finds what is missing or left over then and puts it right; the second, a timer, decides when.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from .. import bridge
-from ..compat import bpy, connect, disconnect, own_curves
+from ..compat import Depsgraph, Object, ViewLayer, Window, bpy, connect, disconnect, own_curves
 from ..core.base.errors import DigiclayError
 from ..core.scene.schema import Scene
 from ..core.scene.toml_table import resolve
@@ -49,13 +49,13 @@ class Faults(NamedTuple):
 
     #: Beds, and palms, that have come without fingertips of their own: copies, and beds of older files. And
     #: fingertips that were copied without their ellipsoid, which cannot be selected.
-    bare: list[Any]
+    bare: list[Object]
     #: Fingertips that were copied on their bed, or have come from another one, and that bed: further ones.
-    loose: list[tuple[Any, Any]]
+    loose: list[tuple[Object, Object]]
     #: Fingertips, palms, ellipsoids and housings whose bed or fingertip is gone.
-    left: list[Any]
+    left: list[Object]
     #: What beds are drawn with, come into a scene with an older bed that was appended.
-    strewn: list[Any]
+    strewn: list[Object]
 
 
 def mark_parts() -> frozenset[int]:
@@ -108,7 +108,7 @@ def repair(found: Faults) -> None:
     _remove(found.left)
 
 
-def give_fingertip(bed: Any, scene: Scene) -> str:
+def give_fingertip(bed: Object, scene: Scene) -> str:
     """Give a bed the fingertip it lost, or another one; return words about it, empty where it has one."""
     if fingertips_of(bed):
         return ""
@@ -154,19 +154,19 @@ def follow_selection() -> None:
                 layer.objects.active = tip
 
 
-def _standing(role: str) -> list[Any]:
+def _standing(role: str) -> list[Object]:
     """Return the objects of this file with a role that stand in a collection."""
     every = (thing for thing in bpy.data.objects if thing.get(ROLE) == role)
     return [thing for thing in every if is_local(thing) and is_linked(thing)]
 
 
-def _tips() -> Iterator[tuple[Any, int, Any]]:
+def _tips() -> Iterator[tuple[Object, int, Object]]:
     """Give the fingertips of all beds, with bed and number."""
     for bed in _standing(BED):
         yield from ((bed, number, tip) for number, tip in fingertips_of(bed).items())
 
 
-def _lacking(owner: Any, known: frozenset[int], mended: frozenset[int]) -> Iterator[str]:
+def _lacking(owner: Object, known: frozenset[int], mended: frozenset[int]) -> Iterator[str]:
     """Give the properties of a bed or a palm whose fingertips it is to get."""
     own = fingertips_of(owner)
     if not own and owner.get(ROLE) == BED and _lacks_part(owner, FINGER, known, mended):
@@ -177,13 +177,13 @@ def _lacking(owner: Any, known: frozenset[int], mended: frozenset[int]) -> Itera
             yield name
 
 
-def _holder(part: Any, owner: Any) -> Any | None:
+def _holder(part: Object, owner: Object) -> Object | None:
     """Return what has a part: its parent, or the bed of its palm, unless that is the owner asked about."""
     above = part.parent
     return above.parent if above is not None and above.get(ROLE) == PALM and above != owner else above
 
 
-def _lacks_part(owner: Any, name: str, known: frozenset[int], mended: frozenset[int]) -> bool:
+def _lacks_part(owner: Object, name: str, known: frozenset[int], mended: frozenset[int]) -> bool:
     """Return whether an object without a part of its own is to get one."""
     # A copy is: it holds the part of the one it was copied from. A bed that has come without is. One whose
     # part the user has deleted, or taken off it, is not.
@@ -196,7 +196,7 @@ def _lacks_part(owner: Any, name: str, known: frozenset[int], mended: frozenset[
     return new or owner.session_uid in mended
 
 
-def _is_orphan(part: Any) -> bool:
+def _is_orphan(part: Object) -> bool:
     """Return whether nothing that stands has this part any more."""
     kind, names = {ELLIPSOID: (FINGERTIP, (BALL,)), PALM: (BED, (HAND,))}.get(part[ROLE], (BED, FINGERS))
     owner = owner_of(part, kind)
@@ -210,7 +210,7 @@ def _is_orphan(part: Any) -> bool:
     )
 
 
-def _complete(owner: Any) -> None:
+def _complete(owner: Object) -> None:
     """Give a bed, or a palm, fingertips: copies of those it holds and does not own, or a new one."""
     bed, own = owner if owner[ROLE] == BED else owner_of(owner), fingertips_of(owner)
     for number, name in enumerate(FINGERS, 1):
@@ -243,7 +243,7 @@ def _complete(owner: Any) -> None:
     view.hold_parts(bed)
 
 
-def _find_palm(bed: Any, name: str) -> Any:
+def _find_palm(bed: Object, name: str) -> Object | None:
     """Return the palm for the copy of a fingertip that a bed holds, itself copied if need be; or the bed."""
     tip = bed[name]
     palm = owner_of(tip, PALM)
@@ -256,14 +256,14 @@ def _find_palm(bed: Any, name: str) -> Any:
     return _duplicate(palm, bed, bed)
 
 
-def _stand(bed: Any, tip: Any) -> None:
+def _stand(bed: Object, tip: Object) -> None:
     """Have a fingertip, with its ellipsoid and palm, stand where its bed does."""
     for part in (tip, tip.get(BALL), owner_of(tip, PALM)):
         for collection in bed.users_collection if part is not None and not is_linked(part) else ():
             collection.objects.link(part)
 
 
-def _adopt(tip: Any, bed: Any) -> None:
+def _adopt(tip: Object, bed: Object) -> None:
     """Make a fingertip that has come to a bed a further one; as many as a bed can have."""
     try:
         number = parts.find_free_number(bed)
@@ -277,26 +277,26 @@ def _adopt(tip: Any, bed: Any) -> None:
     view.hold_parts(bed)
 
 
-def _copy(owner: Any, held: str, parent: Any = None) -> None:
+def _copy(owner: Object, held: str, parent: Object | None = None) -> None:
     """Give a copy of an object a copy of the part it holds, where that one is."""
     owner[held] = _duplicate(owner[held], parent or owner, owner)
 
 
-def _duplicate(thing: Any, parent: Any, owner: Any) -> Any:
+def _duplicate(thing: Object, parent: Object, owner: Object) -> Object:
     """Return a copy of an object below another, its animation its own, that stands where its owner does."""
     made = thing.copy()
     own_curves(made)
     made.parent = parent
     if thing.parent is None or ROLE not in thing.parent:  # it stands on its bed as the other one on its own
         made.matrix_parent_inverse.identity()
-        home: Any = owner_of(thing) or parent
+        home = owner_of(thing) or parent
         made.matrix_basis = home.matrix_world.inverted() @ thing.matrix_world
     for collection in owner.users_collection:
         collection.objects.link(made)
     return made
 
 
-def _remove(found: list[Any]) -> None:
+def _remove(found: list[Object]) -> None:
     """Remove parts; what is still held by another stands nowhere from then on, and can be had back."""
     for part in found:
         for child in [one for one in part.children if ROLE not in one]:
@@ -310,7 +310,7 @@ def _remove(found: list[Any]) -> None:
     bpy.data.batch_remove([one for one in bpy.data.objects if one.get(OWNED) and not one.users])
 
 
-def _unlink(thing: Any) -> None:
+def _unlink(thing: Object) -> None:
     """Take what beds are drawn with out of all scenes."""
     for scene in bpy.data.scenes:
         for owner in (scene.collection, *scene.collection.children_recursive):
@@ -321,7 +321,7 @@ def _unlink(thing: Any) -> None:
                 owner.objects.unlink(thing)
 
 
-def _hide_along(owner: Any, part: Any) -> None:
+def _hide_along(owner: Object, part: Object) -> None:
     """Hide a part in every way its owner is hidden, and show it again where it was hidden along."""
     before = now = int(part.get(HIDDEN, 0))
     both = _list_layers(owner, part)
@@ -344,7 +344,7 @@ def _hide_along(owner: Any, part: Any) -> None:
         del part[HIDDEN]
 
 
-def _list_layers(*things: Any) -> list[Any]:
+def _list_layers(*things: Object) -> list[ViewLayer]:
     """Return the view layers in which all of some objects stand."""
     layers = (layer for scene in bpy.data.scenes for layer in scene.view_layers)
     return [layer for layer in layers if all(layer.objects.get(each.name) == each for each in things)]
@@ -421,14 +421,14 @@ def _repeat_step(came: str) -> bool:
 
 
 @bpy.app.handlers.persistent
-def note_change(scene: Any, graph: Any = None) -> None:
+def note_change(scene: bpy.types.Scene, graph: Depsgraph | None = None) -> None:
     """Look soon: objects, or what is shown of them, may have come or gone."""
     if graph is None or graph.id_type_updated("SCENE"):
         _repair_soon()
 
 
 @bpy.app.handlers.persistent
-def note_load(*_: Any) -> None:
+def note_load(*_: object) -> None:
     """Look soon at what another file has: it stays as it is."""
     _watch.known = None
     _watch.mended.clear()
@@ -454,7 +454,7 @@ def _repair_when_idle() -> float | None:
     return None
 
 
-def _is_busy(windows: Any) -> bool:
+def _is_busy(windows: Iterable[Window]) -> bool:
     """Return whether an operator is under way that changes data, or something is edited, or rendered."""
     every = (operator for window in windows for operator in window.modal_operators)
     active = (window.view_layer.objects.active for window in windows)

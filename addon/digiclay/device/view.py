@@ -15,7 +15,17 @@ from numpy.typing import NDArray
 
 from .. import bridge
 from ..bridge import SCALE
-from ..compat import has_node_setting, node_setting, set_node_setting
+from ..compat import (
+    ID,
+    Collection,
+    Mesh,
+    Modifier,
+    NodeTree,
+    Object,
+    has_node_setting,
+    node_setting,
+    set_node_setting,
+)
 from ..core.base.errors import DigiclayError
 from ..core.engine.state import State
 from ..core.engine.system import System
@@ -36,13 +46,13 @@ MODIFIER = "Pins"
 NO_PIN = -1
 
 
-def picked_pins(bed: Any) -> tuple[int, ...]:
+def picked_pins(bed: Object) -> tuple[int, ...]:
     """Return the pins whose heights the overlay shows, in the order they were picked."""
     display = getattr(bed, "digiclay_display", None)
     return () if display is None else tuple(pin for pin in display.picked if pin != NO_PIN)
 
 
-def build(instant: Instant, collection: Any, lowest: float | None = None) -> Any:
+def build(instant: Instant, collection: Collection, lowest: float | None = None) -> Object:
     """Add a bed and its fingertips to a collection."""
     cells = make_cells(instant)
     bed = parts.marked(cells, cells.name, BED, collection)
@@ -54,14 +64,14 @@ def build(instant: Instant, collection: Any, lowest: float | None = None) -> Any
     return bed
 
 
-def make_cells(instant: Instant) -> Any:
+def make_cells(instant: Instant) -> Mesh:
     """Make the mesh of a bed at an instant."""
     cells = bridge.points("Digital Clay", len(instant.height))
     bridge.write_cells(cells, instant.position, instant.height, mode=instant.mode, force=instant.force)
     return cells
 
 
-def _make_tree(instant: Instant, lowest: float | None = None) -> Any:
+def _make_tree(instant: Instant, lowest: float | None = None) -> NodeTree:
     """Make the geometry nodes that draw pins and housing of a bed; see `build`."""
     lowest = float(instant.height.min()) if lowest is None else lowest
     # The rim stays below most tops, so that the surface and little of the rods is seen over it.
@@ -73,12 +83,12 @@ def _make_tree(instant: Instant, lowest: float | None = None) -> Any:
     return bed_nodes(drawn, deck * SCALE, length * SCALE, SCALE * 1e-3)
 
 
-def add_modifier(bed: Any, instant: Instant) -> None:
+def add_modifier(bed: Object, instant: Instant) -> None:
     """Draw a bed by new geometry nodes, which know its housing; what it is asked to show stays."""
     require_modifier(bed).node_group = _make_tree(instant, 0.0)
 
 
-def hold_parts(bed: Any) -> None:
+def hold_parts(bed: Object) -> None:
     """Have what a bed is drawn with stay out of the scene when the bed is appended to another file."""
     # Blender puts an appended collection of objects that stand in no scene into the scene, unless an
     # empty instances it. The fingertip is one; it shows nothing of it, since its instancing is off.
@@ -86,13 +96,13 @@ def hold_parts(bed: Any) -> None:
         tip.instance_collection = sources_of(bed)
 
 
-def show(bed: Any, instant: Instant) -> None:
+def show(bed: Object, instant: Instant) -> None:
     """Show another instant of the same bed, the poses of its fingertips included."""
     bridge.write_cells(bed.data, instant.position, instant.height, mode=instant.mode, force=instant.force)
     bridge.place_fingertips(bed, instant.fingertips, instant.fingers)
 
 
-def show_state(bed: Any, system: System, state: State) -> None:
+def show_state(bed: Object, system: System, state: State) -> None:
     """Show the pins of a running session; the fingertip is the user's and stays where it is."""
     # Forces are gathered and written only while something drawn tells them.
     shown: dict[str, NDArray[Any]] = {"mode": state.mode()}
@@ -101,7 +111,7 @@ def show_state(bed: Any, system: System, state: State) -> None:
     bridge.write_cells(bed.data, system.grid.positions, state.row(0), **shown)
 
 
-def find_modifier(bed: Any) -> Any | None:
+def find_modifier(bed: Object) -> Modifier | None:
     """Return the modifier that draws the pins, or None when the user has removed or changed it."""
     for modifier in bed.modifiers:
         tree = modifier.node_group if modifier.type == "NODES" else None
@@ -110,7 +120,7 @@ def find_modifier(bed: Any) -> Any | None:
     return None
 
 
-def require_modifier(bed: Any) -> Any:
+def require_modifier(bed: Object) -> Modifier:
     """Return the modifier that draws the pins, or refuse a bed without. Raises DigiclayError."""
     found = find_modifier(bed)
     if found is None:
@@ -119,23 +129,23 @@ def require_modifier(bed: Any) -> Any:
     return found
 
 
-def is_drawn(bed: Any) -> bool:
+def is_drawn(bed: Object) -> bool:
     """Return whether the bed still has the modifier that draws its pins."""
     return find_modifier(bed) is not None
 
 
-def has_setting(bed: Any, name: str) -> bool:
+def has_setting(bed: Object, name: str) -> bool:
     """Return whether a bed's geometry nodes have a setting: those of older files have none of the skin's."""
     modifier = find_modifier(bed)
     return modifier is not None and has_node_setting(modifier, name)
 
 
-def read_setting(bed: Any, name: str, default: Any) -> Any:
+def read_setting(bed: Object, name: str, default: Any) -> Any:
     """Return a setting of a bed's geometry nodes, see `node_tree.SETTINGS`; the default without it."""
     return node_setting(find_modifier(bed), name) if has_setting(bed, name) else default
 
 
-def write_setting(bed: Any, name: str, value: Any) -> None:
+def write_setting(bed: Object, name: str, value: Any) -> None:
     """Change a setting of a bed's geometry nodes, of its own type. Raises DigiclayError without it."""
     modifier = require_modifier(bed)
     if not has_setting(bed, name):
@@ -145,82 +155,82 @@ def write_setting(bed: Any, name: str, value: Any) -> None:
     set_node_setting(modifier, name, value)
 
 
-def color_by(bed: Any, what: str) -> None:
+def color_by(bed: Object, what: str) -> None:
     """Color the pins by one of `COLORINGS`: what they do, or the force on them."""
     write_setting(bed, COLOR_BY_FORCE, bool(COLORINGS.index(what)))
 
 
-def shows_force(bed: Any) -> bool:
+def shows_force(bed: Object) -> bool:
     """Return whether the colors of the pins show the force on them."""
     return bool(read_setting(bed, COLOR_BY_FORCE, False))
 
 
-def show_arrows(bed: Any, on: bool) -> None:
+def show_arrows(bed: Object, on: bool) -> None:
     """Draw the force on each pin as an arrow, through a fingertip made clear; or stop doing so."""
     write_setting(bed, ARROWS, bool(on))
     for number, tip in fingertips_of(bed).items():
         parts.color_fingertip(tip, number, clear=bool(on))
 
 
-def wants_force(bed: Any) -> bool:
+def wants_force(bed: Object) -> bool:
     """Return whether anything drawn needs the force on each pin."""
     return shows_force(bed) or bool(read_setting(bed, ARROWS, False))
 
 
-def can_show_skin(bed: Any) -> bool:
+def can_show_skin(bed: Object) -> bool:
     """Return whether a bed's geometry nodes have a skin: those of older files have none."""
     return has_setting(bed, FORM)
 
 
-def read_form(bed: Any) -> str:
+def read_form(bed: Object) -> str:
     """Return one of `FORMS`; "pins" for a bed without a skin."""
     number = int(read_setting(bed, FORM, FORMS.index("pins")))
     return FORMS[min(max(number, 0), len(FORMS) - 1)]
 
 
-def set_form(bed: Any, form: str) -> None:
+def set_form(bed: Object, form: str) -> None:
     """Show a bed as one of `FORMS`. Raises DigiclayError for a bed without a skin."""
     write_setting(bed, FORM, FORMS.index(form))
     bed.pop(BEFORE, None)
 
 
-def show_form(bed: Any) -> None:
+def show_form(bed: Object) -> None:
     """Show a bed that is shown as "automatic" as a skin for a sculptor, unless its pins tell forces."""
     if read_form(bed) == "automatic" and not wants_force(bed):
         set_form(bed, "skin")
         bed[BEFORE] = "automatic"
 
 
-def is_far(bed: Any) -> bool:
+def is_far(bed: Object) -> bool:
     """Return whether the pins of a bed are too small in the views to be drawn one by one."""
     return bool(read_setting(bed, FAR, False))
 
 
-def is_skin_shown(bed: Any) -> bool:
+def is_skin_shown(bed: Object) -> bool:
     """Return whether a skin is seen in the views."""
     form = read_form(bed)
     return form in ("skin", "both") or (form == "automatic" and is_far(bed))
 
 
-def housing_of(bed: Any) -> Any | None:
+def housing_of(bed: Object) -> Object | None:
     """Return the object that has the shape of a bed's housing, in the bed's space; None without."""
     case = _read_node(bed, CASE, "Object")
     return case or next((child for child in bed.children if child.get(ROLE) == HOUSING), None)
 
 
-def sources_of(bed: Any) -> Any | None:
+def sources_of(bed: Object) -> Collection | None:
     """Return the collection of all a bed is drawn with; None in older files, or without its nodes."""
     return _read_node(bed, SOURCES, "Collection")
 
 
-def _read_node(bed: Any, name: str, place: str) -> Any | None:
+def _read_node(bed: Object, name: str, place: str) -> ID | None:
     """Return what an input of one of a bed's geometry nodes is set to; None without."""
     modifier = find_modifier(bed)
     drawn = modifier.node_group.nodes.get(name) if modifier else None
     return None if drawn is None else drawn.inputs[place].default_value
 
 
-def underside(bed: Any) -> float:
+def underside(bed: Object) -> float:
     """Return the height of the housing's underside in the space of its bed, Blender units."""
-    housing: Any = housing_of(bed)
+    housing: Object = housing_of(bed)
     return min(float(vertex.co.z) for vertex in housing.data.vertices)

@@ -6,8 +6,8 @@ import numpy as np
 
 from .. import bridge
 from ..bridge import SCALE
-from ..compat import bpy
-from ..core.base.arrays import Flags
+from ..compat import Mesh, Object, bpy
+from ..core.base.arrays import Flags, Floats
 from ..core.base.errors import DigiclayError
 from ..core.engine.state import State
 from ..core.engine.system import System
@@ -27,10 +27,10 @@ FORMER = "former"
 SHOWN = 1e-7
 
 
-def read_formed(bed: Any) -> Formed:
+def read_formed(bed: Object) -> Formed:
     """Return the pins of a bed, and before: as kept, or at rest; DigiclayError when it is no bed."""
     cells = bridge.read_cells(bed.data) | _of_session(bed)
-    before: Any = _scene(bed).actuator.rest_height
+    before: float | Floats = _scene(bed).actuator.rest_height
     if has_reference(bed):
         kept = np.empty(len(cells["height"]), np.float32)
         bed.data.attributes[FORMER].data.foreach_get("value", kept)
@@ -38,13 +38,13 @@ def read_formed(bed: Any) -> Formed:
     return Formed.of(cells["position"], cells["height"], before, cells["force"], cells["mode"])
 
 
-def has_reference(bed: Any) -> bool:
+def has_reference(bed: Object) -> bool:
     """Return whether a bed's owner has kept a surface to measure from."""
     stored = bed.data.attributes.get(FORMER)
     return stored is not None and stored.domain == "POINT" and stored.data_type == "FLOAT"
 
 
-def set_reference(bed: Any) -> None:
+def set_reference(bed: Object) -> None:
     """Keep the present surface as the one features are measured from."""
     height = read_formed(bed).height
     clear_reference(bed)
@@ -52,19 +52,19 @@ def set_reference(bed: Any) -> None:
     bed.data.attributes[FORMER].data.foreach_set("value", height.astype(np.float32))
 
 
-def clear_reference(bed: Any) -> None:
+def clear_reference(bed: Object) -> None:
     """Measure features from the bed at rest again."""
     stored = bed.data.attributes.get(FORMER)
     if stored is not None:
         bed.data.attributes.remove(stored)
 
 
-def model(bed: Any, **fields: Any) -> Model:
+def model(bed: Object, **fields: Any) -> Model:
     """Return a `Model` of a bed from its other fields; the flat ends of its pins are those of its device."""
     return Model(cap=_scene(bed).actuator.bore / 2.0, **fields)
 
 
-def _of_session(bed: Any) -> dict[str, Any]:
+def _of_session(bed: Object) -> dict[str, Any]:
     """Return heights, forces and modes of the session if that is shown: the mesh may not have its forces."""
     current = _state(bed)
     if current is None:
@@ -77,7 +77,7 @@ def _of_session(bed: Any) -> dict[str, Any]:
     return {"height": height.copy(), "force": force, "mode": state.mode().copy()}
 
 
-def _state(bed: Any) -> tuple[System, State] | None:
+def _state(bed: Object) -> tuple[System, State] | None:
     """Return the state of the bed's session, running or kept, or None."""
     session = running.find(bed)
     if session is not None:
@@ -92,7 +92,7 @@ def _state(bed: Any) -> tuple[System, State] | None:
         return None
 
 
-def _scene(bed: Any) -> Scene:
+def _scene(bed: Object) -> Scene:
     """Return the scene of the bed's settings, or the defaults while a setting makes no sense."""
     try:
         return properties.read_scene(bed)
@@ -106,7 +106,7 @@ SHARP = 0.7
 UPWARDS = 1e-6
 
 
-def make_object(body: Body, name: str, *, smooth: bool) -> Any:
+def make_object(body: Body, name: str, *, smooth: bool) -> Object:
     """Return a new object, in no collection yet, of a body that has values; `smooth` shades its skin."""
     made = bpy.data.objects.new(name, _mesh(body, name, smooth=smooth))
     for number, group in enumerate(body.groups, 1):
@@ -115,7 +115,7 @@ def make_object(body: Body, name: str, *, smooth: bool) -> Any:
     return made
 
 
-def _mesh(body: Body, name: str, *, smooth: bool) -> Any:
+def _mesh(body: Body, name: str, *, smooth: bool) -> Mesh:
     """Return a new mesh."""
     mesh = bpy.data.meshes.new(name)
     count, corners = len(body.faces), 3 * len(body.faces)
@@ -143,7 +143,7 @@ def _find_skin(body: Body) -> Flags:
     return np.asarray(normal[:, 2] > UPWARDS * np.linalg.norm(normal, axis=1))
 
 
-def _mark_rim(mesh: Any, skin: Flags) -> None:
+def _mark_rim(mesh: Mesh, skin: Flags) -> None:
     """Mark the edges around flat faces as sharp, and none within the skin (f,), however steep it is."""
     mesh.set_sharp_from_angle(angle=SHARP)
     edge = np.empty(len(mesh.loops), np.int32)

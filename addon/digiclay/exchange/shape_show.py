@@ -2,11 +2,11 @@
 
 from collections import deque
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
 from .. import bridge
+from ..compat import Depsgraph, Object
 from ..core.base.errors import DigiclayError, ParameterError
 from ..core.engine.simulation import begin, periods
 from ..core.model.layout import make_grid
@@ -33,12 +33,12 @@ LONGEST = 60.0
 AWAY = 50.0
 
 
-def has_surface(thing: Any) -> bool:
+def has_surface(thing: Object) -> bool:
     """Return whether an object has a surface that can be displayed."""
     return thing is not None and thing.type in SURFACED and ROLE not in thing
 
 
-def read_relief(thing: Any, bed: Any, depsgraph: Any) -> ShapeMesh:
+def read_relief(thing: Object, bed: Object, depsgraph: Depsgraph) -> ShapeMesh:
     """Return the surface of an object, all modifiers included, in the space of a bed, m."""
     bridge.uniform(bed)
     evaluated = thing.evaluated_get(depsgraph)
@@ -59,19 +59,19 @@ def read_relief(thing: Any, bed: Any, depsgraph: Any) -> ShapeMesh:
     return make_shape_mesh(thing.name, vertices / bridge.SCALE, triangles, "z", 1.0)
 
 
-def show_relief(bed: Any, relief: Relief, shape: Shape) -> tuple[Fitted, float]:
+def show_relief(bed: Object, relief: Relief, shape: Shape) -> tuple[Fitted, float]:
     """Display a relief on a bed as `shape` requests; return the fit, and what the display is off by, m."""
     scene = properties.scene_of(bed)
     return _show(bed, scene, shape, fit_relief(shape, relief, make_grid(scene.layout), scene.actuator))
 
 
-def show_file(bed: Any, shape: Shape) -> tuple[Fitted, float]:
+def show_file(bed: Object, shape: Shape) -> tuple[Fitted, float]:
     """Display the shape of a file or sample on a bed; see `show_relief`."""
     scene = properties.scene_of(bed)
     return _show(bed, scene, shape, fit_shape(shape, make_grid(scene.layout), scene.actuator))
 
 
-def _show(bed: Any, scene: Scene, shape: Shape, laid: Fitted) -> tuple[Fitted, float]:
+def _show(bed: Object, scene: Scene, shape: Shape, laid: Fitted) -> tuple[Fitted, float]:
     """Drive the pins of a bed to a shape, and keep shape and state in the bed."""
     scene = replace(scene, shape=replace(shape, heights=pack(laid.heights)))
     system = assemble(scene)

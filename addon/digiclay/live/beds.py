@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import json
 from enum import Enum
-from typing import Any
 
 import numpy as np
 
 from .. import bridge
-from ..compat import bpy
+from ..compat import Context, Object, bpy
 from ..core.base.arrays import Floats
 from ..roles import BED, FINGERS, ROLE, bed_of, fingertips_of, is_local
 from ..sessions import running
@@ -18,7 +17,7 @@ from ..strokes import drawn
 from ..ui_text import localize
 
 
-def deselect(bed: Any) -> None:
+def deselect(bed: Object) -> None:
     """Take a bed out of the selection of the view layer in use; it stays active."""
     if bed.name in bpy.context.view_layer.objects and bed.select_get():
         TABLE.selected.add(bed.session_uid)
@@ -37,7 +36,7 @@ def select_active(uids: frozenset[int]) -> None:
         active.select_set(True)
 
 
-def find_bed(uid: int, name: str) -> Any | None:
+def find_bed(uid: int, name: str) -> Object | None:
     """Return the object of a `session_uid`, its last name looked up first; None when it was deleted."""
     bed = bpy.data.objects.get(name)
     if bed is None or bed.session_uid != uid:
@@ -48,13 +47,13 @@ def find_bed(uid: int, name: str) -> Any | None:
     return bed if _is_shown(bpy.context, bed) or bed.users_scene else None
 
 
-def _is_shown(context: Any, thing: Any) -> bool:
+def _is_shown(context: Context, thing: Object) -> bool:
     """Return whether some window shows a scene the object stands in."""
     layers = (window.view_layer for window in context.window_manager.windows)
     return any(layer.objects.get(thing.name) == thing for layer in layers)
 
 
-def blocking_reason(context: Any, bed: Any, pins: int | None = None) -> str:
+def blocking_reason(context: Context, bed: Object, pins: int | None = None) -> str:
     """Return why the session of a bed, of so many pins, cannot continue now, or an empty text."""
     if bpy.app.is_job_running("RENDER"):
         return localize("a render is under way")
@@ -91,7 +90,7 @@ class Use(Enum):
     MEASURE, CHANGE, FORM = range(3)
 
 
-def find_obstacle(context: Any, bed: Any, use: Use) -> str:
+def find_obstacle(context: Context, bed: Object, use: Use) -> str:
     """Return why the state of a bed does not allow a use of it, or an empty text."""
     if context.view_layer.objects.get(bed.name) != bed:
         return localize("The bed is not in this view layer: show its scene or collection first")
@@ -106,7 +105,7 @@ def find_obstacle(context: Any, bed: Any, use: Use) -> str:
     return bridge.find_scale_fault(bed)
 
 
-def active_session(context: Any) -> tuple[Any, Running] | None:
+def active_session(context: Context) -> tuple[Object, Running] | None:
     """Return the bed that is active, or the only one with a session, and its session; None without."""
     bed, sessions = bed_of(context), running.list_sessions()
     if bed is None and len(sessions) == 1:
@@ -122,7 +121,7 @@ STATE, POSE, NUMBERS, TICK = "digiclay_state", "digiclay_pose", "digiclay_finger
 QUEUE = "digiclay_strokes"
 
 
-def write(bed: Any, running: Running, before: Running | None = None) -> None:
+def write(bed: Object, running: Running, before: Running | None = None) -> None:
     """Write a session into its bed's properties, except what has not changed since `before` was written.
 
     No stroke stands there half-formed: it is there as drawn, with the state it begins from.
@@ -144,7 +143,7 @@ def write(bed: Any, running: Running, before: Running | None = None) -> None:
         bed[name] = data
 
 
-def _identify(running: Running) -> tuple[Any, ...]:
+def _identify(running: Running) -> tuple[object, ...]:
     """Return what tells apart what is written of sessions."""
     return running.standing.snapshot, running.stroke_start, *(stroke.number for stroke in running.drawn)
 
@@ -157,19 +156,19 @@ def put(running: Running) -> None:
         write(bed, running)
 
 
-def clear(bed: Any) -> None:
+def clear(bed: Object) -> None:
     """Remove all session data: the bed is at rest."""
     for name in (STATE, POSE, NUMBERS, TICK, QUEUE):
         bed.pop(name, None)
 
 
-def read_snapshot(bed: Any) -> bytes | None:
+def read_snapshot(bed: Object) -> bytes | None:
     """Return the stored state, or None for a bed at rest; it may be anything a file can hold."""
     value = bed.get(STATE)
     return value if value is None or isinstance(value, bytes) else b""
 
 
-def read_poses(bed: Any) -> Floats | None:
+def read_poses(bed: Object) -> Floats | None:
     """Return the fingertips' poses (f, 7) at the stored state, or None where there are no usable ones."""
     value = bed.get(POSE)
     if not isinstance(value, bytes) or len(value) != len(read_numbers(bed)) * 7 * 8:
@@ -179,7 +178,7 @@ def read_poses(bed: Any) -> Floats | None:
     return poses if np.isfinite(poses).all() and (abs(lengths - 1.0) < 1e-6).all() else None
 
 
-def read_numbers(bed: Any) -> tuple[int, ...]:
+def read_numbers(bed: Object) -> tuple[int, ...]:
     """Return the numbers of the fingertips at the stored state; 1 for older files and unusable ones."""
     value = bed.get(NUMBERS)
     numbers = tuple(value) if isinstance(value, bytes) else ()
@@ -187,13 +186,13 @@ def read_numbers(bed: Any) -> tuple[int, ...]:
     return numbers if valid else (1,)
 
 
-def read_tick(bed: Any) -> int:
+def read_tick(bed: Object) -> int:
     """Return the tick that was written last; 0 where none is stored."""
     value = bed.get(TICK)
     return value if isinstance(value, int) and value > 0 else 0
 
 
-def read_queue(bed: Any) -> tuple[int, list[int], list[str]]:
+def read_queue(bed: Object) -> tuple[int, list[int], list[str]]:
     """Return the tick that the stored state is of, those in which its gestures began, and strokes to form."""
     try:
         started, ticks, lines = json.loads(bed[QUEUE])

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 from ..compat import bpy, connect, disconnect
 from ..core.base.errors import DigiclayError
@@ -41,7 +40,7 @@ KEYS: tuple[tuple[tuple[str, str], str, str, dict[str, bool]], ...] = (
 
 
 @bpy.app.handlers.persistent
-def write_recovery(*_: Any) -> None:
+def write_recovery(*_: object) -> None:
     """Write each recording into its bed, as a take: the file is about to be saved."""
     clear_recovery()
     for session in running.list_sessions():
@@ -51,7 +50,7 @@ def write_recovery(*_: Any) -> None:
 
 
 @bpy.app.handlers.persistent
-def clear_recovery(path: str = "", *_: Any) -> None:
+def clear_recovery(path: str = "", *_: object) -> None:
     """Remove these takes, since the recordings continue; `path` of the saved file, empty if that failed."""
     for session in running.list_sessions():
         number, later = session.saved_take, replace(session, saved_take="")
@@ -87,7 +86,7 @@ def save_copy() -> str:
 
 
 @bpy.app.handlers.persistent
-def reload_states(*_: Any) -> None:
+def reload_states(*_: object) -> None:
     """Have every session take up, two ticks later, what undo or redo has put into its bed."""
     for session in running.list_sessions():
         running.put(replace(session, stale=STALE))
@@ -104,7 +103,7 @@ def form_left() -> None:
 
 
 @bpy.app.handlers.persistent
-def form_soon(*_: Any) -> None:
+def form_soon(*_: object) -> None:
     """Form what is left of strokes when Blender has evaluated what it has loaded."""
     if not (bpy.app.background or bpy.app.timers.is_registered(form_left)):
         bpy.app.timers.register(form_left)

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
-from typing import Any
 
 from .. import preferences
-from ..compat import bpy
+from ..compat import Context, Header, Timer, Window, bpy
 from ..sessions import running
 
 #: A loop that has not ticked for so long is gone, s: its window was closed without a notice.
@@ -24,7 +23,7 @@ NUMBERS = 0.25
 class Loop:
     """Loop that runs: Blender's timer and the address of its window; without a timer there is none."""
 
-    timer: Any = None
+    timer: Timer | None = None
     window: int = 0
     #: Number of the loop: how many were begun.
     token: int = 0
@@ -52,7 +51,7 @@ def is_running() -> bool:
     return LOOP.timer is not None and time.perf_counter() - LOOP.ticked < GONE
 
 
-def begin(context: Any) -> None:
+def begin(context: Context) -> None:
     """Begin a loop with a timer in the window of the context."""
     end()
     LOOP.timer = _add_timer(context)
@@ -62,13 +61,13 @@ def begin(context: Any) -> None:
     redraw_status()
 
 
-def _add_timer(context: Any) -> Any:
+def _add_timer(context: Context) -> Timer:
     """Add a timer at the preferred rate; its events come to the operators of the context's window alone."""
     rate = preferences.get(context).redraw_rate
     return context.window_manager.event_timer_add(1.0 / rate, window=context.window)
 
 
-def time_window(context: Any) -> Any | None:
+def time_window(context: Context) -> Window | None:
     """Return a timer for the window of the context, to be removed; None where the loop has one."""
     has_loop = LOOP.timer is not None and LOOP.window == context.window.as_pointer()
     return None if has_loop else _add_timer(context)
@@ -89,12 +88,12 @@ def end() -> None:
     redraw_status()
 
 
-def find_interval(context: Any) -> float:
+def find_interval(context: Context) -> float:
     """Return the time between two ticks, s."""
     return HASTE if LOOP.in_haste else 1.0 / float(preferences.get(context).redraw_rate)
 
 
-def is_due(context: Any, now: float) -> bool:
+def is_due(context: Context, now: float) -> bool:
     """Return whether to tick at a monotonic time, s: no more often than preferred, whatever timers run."""
     if now - LOOP.ticked < (1.0 - EARLY) / preferences.get(context).redraw_rate:
         return False
@@ -102,7 +101,7 @@ def is_due(context: Any, now: float) -> bool:
     return True
 
 
-def redraw_numbers(context: Any, now: float) -> None:
+def redraw_numbers(context: Context, now: float) -> None:
     """Redraw the sidebars now and then: numbers that change too quickly cannot be read. `now`, s."""
     if now - LOOP.numbers < NUMBERS:
         return
@@ -119,7 +118,7 @@ def redraw_status() -> None:
         window.workspace.status_text_set_internal(None)
 
 
-def draw(header: Any, context: Any) -> None:
+def draw(header: Header, context: Context) -> None:
     """Draw the keys of a running session in the status bar."""
     row = header.layout.row()
     paused = all(session.paused for session in running.list_sessions())

@@ -7,11 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from .. import bridge, preferences
+from ..compat import Context, Object
 from ..core.base.arrays import Floats
 from ..core.base.errors import DigiclayError, DivergenceError, MethodError
 from ..device import repair, view
@@ -36,7 +37,7 @@ class Note(NamedTuple):
     uid: int = 0
 
 
-def start(context: Any, bed: Any) -> list[Note]:
+def start(context: Context, bed: Object) -> list[Note]:
     """Begin a session of a bed from its stored state; raise DigiclayError if settings or scale forbid it."""
     if is_baked(bed):
         raise DigiclayError(f"{bed.name} plays a baked session: free the bake in the Takes panel first.")
@@ -84,7 +85,7 @@ def stop(uid: int) -> str:
     return takes.keep_recording(bed, ended) if ended is not None and bed is not None else ""
 
 
-def show(bed: Any, session: Running) -> None:
+def show(bed: Object, session: Running) -> None:
     """Make a value the present one of a session, write it into its bed, and show it if its mesh allows."""
     running.put(session)
     beds.write(bed, session)
@@ -92,29 +93,29 @@ def show(bed: Any, session: Running) -> None:
         view.show_state(bed, session.system, session.state)
 
 
-def place_fingers(context: Any, bed: Any, session: Running) -> None:
+def place_fingers(context: Context, bed: Object, session: Running) -> None:
     """Put the fingertips where a session has them; an animation or constraint of a fingertip prevails."""
     _move_fingers(bed, session, len(session.poses))
     _evaluate(context)
 
 
-def bring_back(context: Any, bed: Any, session: Running) -> None:
+def bring_back(context: Context, bed: Object, session: Running) -> None:
     """Show a session as it was at another moment, its fingertips too."""
     show(bed, session)
     place_fingers(context, bed, session)
 
 
-def _evaluate(context: Any) -> None:
+def _evaluate(context: Context) -> None:
     """Have Blender evaluate what has changed: only then the world's matrix of a moved fingertip is right."""
     context.view_layer.update()
 
 
-def _move_fingers(bed: Any, session: Running, count: int = 1) -> None:
+def _move_fingers(bed: Object, session: Running, count: int = 1) -> None:
     """Put the first fingertips where a session has them, without evaluation."""
     bridge.move_fingertips(bed, session.poses[:count], find_ellipsoids(session.scene))
 
 
-def form_strokes(context: Any, bed: Any) -> None:
+def form_strokes(context: Context, bed: Object) -> None:
     """Form at once what a bed without a session has stored of strokes, as far as that takes some seconds."""
     start(context, bed)
     session = running.TABLE.sessions[bed.session_uid]
@@ -127,7 +128,7 @@ def form_strokes(context: Any, bed: Any) -> None:
     stop(session.uid)
 
 
-def take_up(context: Any, bed: Any, session: Running) -> Running:
+def take_up(context: Context, bed: Object, session: Running) -> Running:
     """Return a session with what undo or redo has put into its bed."""
     poses, was, queue = beds.read_poses(bed), beds.read_numbers(bed), beds.read_queue(bed)
     if poses is None:
@@ -145,7 +146,7 @@ def has_strokes() -> bool:
     return any(session.strokes and not session.strokes[0].held for session in free)
 
 
-def end_haste(context: Any) -> None:
+def end_haste(context: Context) -> None:
     """Let ticks take their time again, and show what has been formed in haste."""
     if loop.LOOP.in_haste:
         loop.LOOP.in_haste = False
@@ -155,7 +156,7 @@ def end_haste(context: Any) -> None:
                 bring_back(context, bed, session)
 
 
-def tick(context: Any, now: float) -> list[Note]:
+def tick(context: Context, now: float) -> list[Note]:
     """Advance every session to the current time of a monotonic clock, s; return the messages."""
     notes: list[Note] = []
     most = preferences.get(context).most_periods
@@ -171,7 +172,9 @@ def tick(context: Any, now: float) -> list[Note]:
     return notes
 
 
-def _advance_session(context: Any, bed: Any, session: Running, now: float, most: int) -> Iterator[Note]:
+def _advance_session(
+    context: Context, bed: Object, session: Running, now: float, most: int
+) -> Iterator[Note]:
     """Advance one session; yield its messages."""
     if session.stale > 1:
         # What undo has put back has no place in the world until Blender has evaluated it, which it
@@ -223,7 +226,7 @@ def _advance_session(context: Any, bed: Any, session: Running, now: float, most:
         _evaluate(context)
 
 
-def find_moment(context: Any) -> float | None:
+def find_moment(context: Context) -> float | None:
     """Return the time of the scene's frame, s, while an animation plays; None: none does."""
     scene, screen = context.scene, context.screen
     if screen is None or not screen.is_animation_playing:
@@ -237,7 +240,7 @@ def _visible_rows(session: Running) -> Floats:
     return np.array([state.row(0), state.row(session.system.rows.force), state.mode()])
 
 
-def _read_changes(context: Any, bed: Any, session: Running) -> tuple[str, Running, str]:
+def _read_changes(context: Context, bed: Object, session: Running) -> tuple[str, Running, str]:
     """Detect changes of settings and undo; return the reason to wait, the session, and the messages."""
     reason, words = blocking_reason(context, bed, session.system.grid.count), ""
     if reason:
@@ -261,7 +264,7 @@ def _read_changes(context: Any, bed: Any, session: Running) -> tuple[str, Runnin
     return "", session, words
 
 
-def _take_settings(bed: Any, session: Running) -> tuple[Running, str]:
+def _take_settings(bed: Object, session: Running) -> tuple[Running, str]:
     """Return the session with the scene of its bed's settings, and words about what that ended."""
     scene, numbers = properties.scene_of(bed), tuple(fingertips_of(bed))
     if scene == session.scene and numbers == session.numbers:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable
 from functools import wraps
 from typing import Any
 
-from ..compat import bpy
+from ..compat import Area, Context, Event, Operator, bpy
 from ..core.base.errors import DigiclayError, one_line
 from ..panels.base import declare
 from ..settings.declared import number
@@ -21,7 +21,7 @@ def end_in_order(step: Callable[..., set[str]]) -> Callable[..., set[str]]:
     """Return a `modal` or `invoke` that no exception leaves: Blender would drop the operator silently."""
 
     @wraps(step)
-    def guarded(self: Any, context: Any, event: Any) -> set[str]:
+    def guarded(self: Polled, context: Context, event: Event) -> set[str]:
         try:
             return step(self, context, event)
         except DigiclayError as error:
@@ -45,35 +45,35 @@ class Polled:
     `end_in_order` surrounds `invoke` and `modal`.
     """
 
-    report: Any
+    report: Callable[[set[str], str], None]
     properties: Any
-    poll_message_set: Any
+    poll_message_set: Callable[[str], None]
     needs: Needs = ()
     in_any_mode = False
 
-    def __init_subclass__(cls, **options: Any) -> None:
+    def __init_subclass__(cls, **options: object) -> None:
         """Surround what Blender calls with an event."""
         super().__init_subclass__(**options)
         for name in {"invoke", "modal"} & vars(cls).keys():
             setattr(cls, name, end_in_order(vars(cls)[name]))
 
     @classmethod
-    def poll_message(cls, context: Any) -> str:
+    def poll_message(cls, context: Context) -> str:
         """Return the first reason against running now, or an empty text."""
         return next(filter(None, (need(context) for need in cls.needs)), "")
 
     @classmethod
-    def poll(cls, context: Any) -> bool:
+    def poll(cls, context: Context) -> bool:
         """Return whether the operator can run; Blender shows the message where it cannot."""
         message = cls.poll_message(context) or ("" if cls.in_any_mode else edited(context))
         if message:
             cls.poll_message_set(localize(message))
         return not message
 
-    def cancel(self, context: Any) -> None:
+    def cancel(self, context: Context) -> None:
         """Give back what a modal operator has taken of Blender, which ends it, say to load a file."""
 
-    def give_up(self, context: Any, words: str) -> None:
+    def give_up(self, context: Context, words: str) -> None:
         """End after an error in the modal part, which the words tell."""
         self.cancel(context)
 
@@ -84,7 +84,7 @@ class Action(Polled):
     #: Does it; returns the operator's result where that is not FINISHED.
     perform: Callable[..., set[str] | None]
 
-    def execute(self, context: Any) -> set[str]:
+    def execute(self, context: Context) -> set[str]:
         """Do it, and report what stands in its way."""
         try:
             return self.perform(context) or {"FINISHED"}
@@ -96,12 +96,12 @@ class Action(Polled):
 def action(
     idname: str,
     label: str,
-    *needs: Callable[[Any], str],
+    *needs: Callable[[Context], str],
     options: Iterable[str] = ("REGISTER", "UNDO"),
     in_any_mode: bool = False,
     bases: tuple[type, ...] = (Action,),
     **properties: Any,
-) -> Callable[[Callable[[Any, Any], set[str] | None]], Any]:
+) -> Callable[[Callable[[Operator, Context], set[str] | None]], Any]:
     """Return a decorator that makes an operator, with properties, of its `perform` and its docstring."""
     return declare(
         (*bases, bpy.types.Operator),
@@ -118,7 +118,7 @@ def action(
 class FileAction(Action):
     """Mixin of an action with a file browser for its `filepath`."""
 
-    def invoke(self, context: Any, event: Any) -> set[str]:
+    def invoke(self, context: Context, event: Event) -> set[str]:
         context.window_manager.fileselect_add(self)
         return {"RUNNING_MODAL"}
 
@@ -131,7 +131,7 @@ def file_of(pattern: str, *options: str) -> dict[str, Any]:
     }
 
 
-def become_modal(operator: Any, context: Any) -> set[str]:
+def become_modal(operator: Operator, context: Context) -> set[str]:
     """Have Blender hand an operator its events: the last step of a start, nothing may fail after it.
 
     Blender crashes when an operator ends by another result while its handler is there.
@@ -146,7 +146,7 @@ class Modal(Polled):
     #: Gets ready for events; returns the operator's result where it has ended already.
     prepare: Callable[..., set[str] | None]
 
-    def invoke(self, context: Any, event: Any) -> set[str]:
+    def invoke(self, context: Context, event: Event) -> set[str]:
         """Prepare, then borrow what `cancel` gives back, then become modal."""
         self.region = context.region
         ended = self.prepare(context, event)
@@ -155,7 +155,7 @@ class Modal(Polled):
         self.borrow(context)
         return become_modal(self, context)
 
-    def borrow(self, context: Any) -> None:
+    def borrow(self, context: Context) -> None:
         """Borrow timers, draw handlers and the like of Blender; nothing here may fail."""
 
 
@@ -165,10 +165,10 @@ class TimedAction(Modal, Action):
     #: Between two events of the timer, s.
     interval: float
 
-    def borrow(self, context: Any) -> None:
+    def borrow(self, context: Context) -> None:
         self.timer = context.window_manager.event_timer_add(self.interval, window=context.window)
 
-    def cancel(self, context: Any) -> None:
+    def cancel(self, context: Context) -> None:
         """Give back timer and status bar."""
         context.window_manager.event_timer_remove(self.timer)
         clear_status()
@@ -178,15 +178,15 @@ class Drawing(Modal):
     """Mixin of a modal operator that draws in the view in which it was called."""
 
     #: Draws, in each region of each view; given the area in which the operator was called.
-    draw_view: Callable[[Any], None]
+    draw_view: Callable[[Area], None]
 
-    def borrow(self, context: Any) -> None:
+    def borrow(self, context: Context) -> None:
         """Draw from now on."""
         self.handler = bpy.types.SpaceView3D.draw_handler_add(
             self.draw_view, (context.area,), "WINDOW", "POST_PIXEL"
         )
 
-    def end(self, context: Any, *result: str) -> set[str]:
+    def end(self, context: Context, *result: str) -> set[str]:
         """Give back status bar and view; return the result."""
         clear_status()
         if self.handler is not None:
@@ -196,7 +196,7 @@ class Drawing(Modal):
             area.tag_redraw()
         return set(result)
 
-    def cancel(self, context: Any) -> None:
+    def cancel(self, context: Context) -> None:
         self.end(context)
 
 
@@ -211,7 +211,7 @@ def millimeters(name: str, default: float, words: str, **limits: Any) -> Any:
 _TOLD: dict[str, str] = {}
 
 
-def show_status(context: Any, words: str) -> None:
+def show_status(context: Context, words: str) -> None:
     """Write words into the status bar, in place of those written before, in whichever workspace."""
     name = context.workspace.name
     if _TOLD.get(name) == words:

@@ -1,12 +1,12 @@
 """Beds that are added: at rest, by scene files, samples, recorded runs; Rebuild: a bed by its settings."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from .. import bridge, preferences
-from ..compat import bpy
+from ..compat import Context, Event, Menu, NodeTree, Object, Operator, UILayout, bpy
 from ..core.control.methods import METHODS
 from ..core.model.layout import ARRANGEMENTS, Layout
 from ..core.model.trajectory import sample_poses
@@ -42,7 +42,7 @@ MOST = 400
 OFFERED: list[tuple[str, str, str]] = []
 
 
-def offered(operator: Any, context: Any) -> list[tuple[str, str, str]]:
+def offered(operator: Operator, context: Context) -> list[tuple[str, str, str]]:
     """Return the core's presets and the user's own."""
     OFFERED[:] = [(name, title(name), PRESET_WORDS.get(name, "")) for name in PRESETS]
     OFFERED.extend((name, name, "A preset of your own") for name in own_presets.names())
@@ -56,7 +56,7 @@ def plan(name: str) -> dict[str, Any]:
     return {**size, "method": bed.method, "preset": bed.preset}
 
 
-def take_bed(operator: Any, context: Any) -> None:
+def take_bed(operator: Operator, context: Context) -> None:
     """Set the plan of the chosen bed."""
     for name, value in plan(operator.bed).items():
         setattr(operator, name, value)
@@ -65,9 +65,9 @@ def take_bed(operator: Any, context: Any) -> None:
 class Placed:
     """Mixin of an operator that adds a bed: at the 3D cursor, or where it is seen."""
 
-    report: Any
+    report: Callable[[set[str], str], None]
     properties: Any
-    execute: Any
+    execute: Callable[[Context], set[str]]
 
     location: bpy.props.FloatVectorProperty(
         name="Location",
@@ -77,7 +77,7 @@ class Placed:
         options={"SKIP_SAVE", "SKIP_PRESET"},
     )
 
-    def invoke(self, context: Any, event: Any) -> set[str]:
+    def invoke(self, context: Context, event: Event) -> set[str]:
         """Add the bed, and show all of it."""
         done: set[str] = self.execute(context)
         if done == {"FINISHED"}:
@@ -85,7 +85,7 @@ class Placed:
             light(context)
         return done
 
-    def place(self, context: Any, bed: Any) -> None:
+    def place(self, context: Context, bed: Object) -> None:
         """Put the bed there, active; in a window it is not selected, since each pin would have an outline."""
         shown, words = find_view(context), ""
         if not self.properties.is_property_set("location"):
@@ -145,7 +145,7 @@ class AddBed(Placed, Action, bpy.types.Operator):
         max=1000.0,
     )
 
-    def invoke(self, context: Any, event: Any) -> set[str]:
+    def invoke(self, context: Context, event: Event) -> set[str]:
         """Add the bed to design on unless another is chosen."""
         if not self.properties.is_property_set("bed"):
             own = self.properties.is_property_set
@@ -155,7 +155,7 @@ class AddBed(Placed, Action, bpy.types.Operator):
                 setattr(self, name, value)
         return super().invoke(context, event)
 
-    def perform(self, context: Any) -> None:
+    def perform(self, context: Context) -> None:
         for name, value in plan(self.bed).items():
             if not self.properties.is_property_set(name):  # called by a script
                 setattr(self, name, value)
@@ -173,18 +173,18 @@ class AddBed(Placed, Action, bpy.types.Operator):
     baked.reworded("Free the bake in the Takes panel first: it moves the pins there are now"),
     edited.reworded("Leave Edit Mode first"),
 )  # fmt: skip
-def rebuild_bed(operator: Any, context: Any) -> None:
+def rebuild_bed(operator: Operator, context: Context) -> None:
     """Make pins and housing from the settings; the formed surface is lost, the fingertip stays"""
     layout = rebuild(bed_of(context)).layout
     operator.report({"INFO"}, localize("The bed has {} x {} pins now", layout.rows, layout.columns))
 
 
-def add(context: Any, scene: Scene) -> Any:
+def add(context: Context, scene: Scene) -> Object:
     """Add the device of a scene, at rest, in the context's collection; return its bed."""
     return add_shown(context, scene, Instant.at_rest(scene.layout, scene.actuator, find_ellipsoids(scene)))
 
 
-def add_shown(context: Any, scene: Scene, instant: Instant) -> Any:
+def add_shown(context: Context, scene: Scene, instant: Instant) -> Object:
     """Add the device of a scene as it is at an instant, in the context's collection; return its bed."""
     colored = palettes.has_palette()
     bed = view.build(instant, context.collection, lowest=0.0)
@@ -194,7 +194,7 @@ def add_shown(context: Any, scene: Scene, instant: Instant) -> Any:
     return bed
 
 
-def select_only(context: Any, bed: Any) -> None:
+def select_only(context: Context, bed: Object) -> None:
     """Leave a new object selected and active, as Blender's own Add operators do."""
     for other in context.selected_objects:
         other.select_set(False)
@@ -202,7 +202,7 @@ def select_only(context: Any, bed: Any) -> None:
     context.view_layer.objects.active = bed
 
 
-def rebuild(bed: Any) -> Scene:
+def rebuild(bed: Object) -> Scene:
     """Make a bed anew, at rest, by its settings; its place, fingertip and children stay."""
     scene = properties.read_scene(bed)
     instant = Instant.at_rest(scene.layout, scene.actuator, find_ellipsoids(scene))
@@ -223,7 +223,7 @@ def rebuild(bed: Any) -> Scene:
     return scene
 
 
-def _discard(tree: Any) -> None:
+def _discard(tree: NodeTree) -> None:
     """Remove the nodes that drew pins, with the pins; a copy of the bed may still be drawn by them."""
     if tree.users:
         return
@@ -235,7 +235,7 @@ def _discard(tree: Any) -> None:
     _remove(objects)
 
 
-def _remove(objects: Iterable[Any]) -> None:
+def _remove(objects: Iterable[Object]) -> None:
     """Remove objects, and the meshes only they have."""
     objects = list(objects)
     meshes = {thing.data for thing in objects if thing.type == "MESH"}
@@ -243,7 +243,7 @@ def _remove(objects: Iterable[Any]) -> None:
     bpy.data.batch_remove([mesh for mesh in meshes if not mesh.users])
 
 
-def entry(menu: Any, context: Any) -> None:
+def entry(menu: Menu, context: Context) -> None:
     """Draw the entry in Add > Mesh."""
     menu.layout.operator(AddBed.bl_idname, icon="MESH_GRID")
 
@@ -253,7 +253,7 @@ def entry(menu: Any, context: Any) -> None:
     options=("REGISTER", "UNDO", "PRESET"), **file_of("*.npz", "SKIP_PRESET"),
     row=integer("Row", "Recorded row to show: 0 is the first, -1 the last", default=-1),
 )  # fmt: skip
-def import_run(operator: Any, context: Any) -> None:
+def import_run(operator: Operator, context: Context) -> None:
     """Show one instant of a Digital Clay run as a bed of pins"""
     path = Path(bpy.path.abspath(operator.filepath))
     instant, scene = read(path, operator.row), load(path.with_name("scene.toml"))
@@ -272,7 +272,7 @@ class AddSceneAction(Placed, Action):
         default=True,
     )
 
-    def add_scene(self, context: Any, scene: Scene) -> None:
+    def add_scene(self, context: Context, scene: Scene) -> None:
         """Add the bed of a scene, its fingertips where their paths begin."""
         scene = embed_heights(scene)
         taken = takes.simulate(scene) if self.take else None
@@ -299,11 +299,11 @@ class OpenScene(AddSceneAction, FileAction, bpy.types.Operator):
     filepath: bpy.props.StringProperty(subtype="FILE_PATH", options={"SKIP_SAVE"})
     filter_glob: bpy.props.StringProperty(default="*.toml", options={"HIDDEN"})
 
-    def invoke(self, context: Any, event: Any) -> set[str]:
+    def invoke(self, context: Context, event: Event) -> set[str]:
         """Open the file browser, unless a file was dropped."""
         return (Placed if self.filepath else FileAction).invoke(self, context, event)
 
-    def perform(self, context: Any) -> None:
+    def perform(self, context: Context) -> None:
         self.add_scene(context, load(Path(bpy.path.abspath(self.filepath))))
 
 
@@ -316,7 +316,7 @@ class OpenScene(AddSceneAction, FileAction, bpy.types.Operator):
         ],
     ),
 )  # fmt: skip
-def add_sample(operator: Any, context: Any) -> None:
+def add_sample(operator: Operator, context: Context) -> None:
     """Add a bed with a sample session or shape of Digital Clay"""
     kind, _, name = operator.sample.partition(":")
     if kind == "session":
@@ -330,26 +330,26 @@ def add_sample(operator: Any, context: Any) -> None:
     operator.place(context, bed)
 
 
-def _list_samples(layout: Any, kind: str, names: Iterable[str]) -> None:
+def _list_samples(layout: UILayout, kind: str, names: Iterable[str]) -> None:
     """Draw an entry for each sample of a kind."""
     for name in names:
         layout.operator(add_sample.bl_idname, text=title(name)).sample = f"{kind}:{name}"
 
 
 @menu("DIGICLAY_MT_session_samples", "Sessions")
-def session_samples(entries: Any, context: Any) -> None:
+def session_samples(entries: Menu, context: Context) -> None:
     """Sample sessions of Digital Clay"""
     _list_samples(entries.layout, "session", list_samples())
 
 
 @menu("DIGICLAY_MT_shape_samples", "Shapes")
-def shape_samples(entries: Any, context: Any) -> None:
+def shape_samples(entries: Menu, context: Context) -> None:
     """Sample shapes of Digital Clay, displayed on a bed"""
     _list_samples(entries.layout, "shape", list_shapes())
 
 
 @menu("DIGICLAY_MT_samples", "Digital Clay Samples")
-def samples(entries: Any, context: Any) -> None:
+def samples(entries: Menu, context: Context) -> None:
     """Sample sessions and shapes of Digital Clay"""
     entries.layout.menu(session_samples.bl_idname, icon="CON_TRACKTO")
     entries.layout.menu(shape_samples.bl_idname, icon="RNDCURVE")
@@ -367,17 +367,17 @@ class SceneFiles(bpy.types.FileHandler):
     bl_file_extensions = ".toml"
 
     @classmethod
-    def poll_drop(cls, context: Any) -> bool:
+    def poll_drop(cls, context: Context) -> bool:
         """Only a 3D view can take a bed."""
         return context.area is not None and context.area.type == "VIEW_3D"
 
 
-def samples_entry(parent: Any, context: Any) -> None:
+def samples_entry(parent: Menu, context: Context) -> None:
     """Draw the submenu in Add > Mesh."""
     parent.layout.menu(samples.bl_idname, icon="MESH_GRID")
 
 
-def import_entry(parent: Any, context: Any) -> None:
+def import_entry(parent: Menu, context: Context) -> None:
     """Draw the entries in File > Import."""
     parent.layout.operator(import_run.bl_idname, text="Digital Clay run (.npz)")
     parent.layout.operator(OpenScene.bl_idname, text="Digital Clay scene (.toml)")

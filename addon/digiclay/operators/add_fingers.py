@@ -1,10 +1,9 @@
 """Further fingertips of a bed, alone or as a hand."""
 
-from typing import Any
-
 import numpy as np
 
 from .. import bridge
+from ..compat import Context, Menu, Object, Operator
 from ..core.base.arrays import Floats
 from ..core.base.errors import DigiclayError
 from ..device import parts, view
@@ -29,7 +28,7 @@ BESIDE, STEP = 200e-3, 3e-3
 
 
 @action("digiclay.add_fingertip", "Add Fingertip", cannot_form)
-def add_fingertip(operator: Any, context: Any) -> None:
+def add_fingertip(operator: Operator, context: Context) -> None:
     """Add another fingertip to the bed; a running session takes it up"""
     bed = bed_of(context)
     parts.find_free_number(bed)
@@ -43,7 +42,7 @@ def add_fingertip(operator: Any, context: Any) -> None:
     "digiclay.add_hand", "Add Hand", cannot_form,
     side=choice("Side", "Which hand", items=[("RIGHT", "Right", ""), ("LEFT", "Left", "")]),
 )  # fmt: skip
-def add_hand(operator: Any, context: Any) -> None:
+def add_hand(operator: Operator, context: Context) -> None:
     """Add the five fingertips of a hand to the bed, on an empty that moves them as one"""
     bed = bed_of(context)
     count = len(fingertips_of(bed)) + len(HAND)
@@ -62,7 +61,7 @@ def add_hand(operator: Any, context: Any) -> None:
     reveal(context, bed, [tip[BALL] for tip in made])
 
 
-def _find_place(bed: Any, places: Floats) -> Floats:
+def _find_place(bed: Object, places: Floats) -> Floats:
     """Return how far to move places (k, 2), m, to be apart from other fingertips: over the bed, or beside."""
     tips = fingertips_of(bed).values()
     taken = bridge.poses(bed)[:, :2] if tips else np.empty((0, 2))
@@ -82,12 +81,12 @@ def _find_place(bed: Any, places: Floats) -> Floats:
     return np.asarray(moves[((away >= APART) & beside).argmax()])
 
 
-def _find_top(bed: Any) -> float:
+def _find_top(bed: Object) -> float:
     """Return the height at which new fingertips stand clear of all pins, m."""
     return float(bridge.read_cells(bed.data)["height"].max()) + CLEARANCE
 
 
-def _add(bed: Any, places: Floats, palm: Any = None) -> list[Any]:
+def _add(bed: Object, places: Floats, palm: Object | None = None) -> list[Object]:
     """Add fingertips at places and headings (k, 3), m, rad, above the pins, on a palm; return them."""
     made, top = [], _find_top(bed)
     for x, y, heading in places:
@@ -104,7 +103,7 @@ def _add(bed: Any, places: Floats, palm: Any = None) -> list[Any]:
     return made
 
 
-def entries(menu: Any, context: Any) -> None:
+def entries(menu: Menu, context: Context) -> None:
     """Draw the entries in Add > Mesh while a bed is active."""
     if bed_of(context) is not None:
         menu.layout.operator(add_fingertip.bl_idname, icon="META_BALL")

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from .. import bridge
-from ..compat import bpy
+from ..compat import Context, Event, Menu, Object, Operator, UILayout, bpy
 from ..core.base.errors import OutputError
 from ..core.base.quantity import list_quantities
 from ..core.mesh_io.export_model import KINDS, Model, find_features, make_bodies
@@ -92,14 +92,14 @@ class SurfaceOptions(FindingOptions):
         soft_max=50.0,
     )
 
-    def model(self, bed: Any) -> Model:
+    def model(self, bed: Object) -> Model:
         """Return what is to be made of a bed."""
         base = to_si(self.base_thickness, 3)
         return formed_bed.model(
             bed, kind=self.kind, skin=self.skin, resolution=self.resolution, base_thickness=base
         )
 
-    def draw_surface(self, layout: Any) -> None:
+    def draw_surface(self, layout: UILayout) -> None:
         """Draw the properties; those without effect on what is made are grayed out."""
         layout.prop(self, "kind")
         column = layout.column()
@@ -114,7 +114,7 @@ class SurfaceOptions(FindingOptions):
         column.prop(self, "smallest")
 
 
-def chosen_bed(context: Any) -> Any:
+def chosen_bed(context: Context) -> Object:
     """Return the bed to work on, or refuse where it has gone since the operator was called."""
     bed = bed_of(context)
     if bed is None:
@@ -132,12 +132,12 @@ class MakeMesh(SurfaceOptions, bpy.types.Operator):
 
     beside: flag("Beside the Bed", "Place the mesh beside the bed instead of on its surface", default=True)
 
-    def draw(self, context: Any) -> None:
+    def draw(self, context: Context) -> None:
         self.layout.use_property_split = True
         self.draw_surface(self.layout)
         self.layout.prop(self, "beside")
 
-    def perform(self, context: Any) -> None:
+    def perform(self, context: Context) -> None:
         bed = chosen_bed(context)
         formed = formed_bed.read_formed(bed)
         bodies = make_bodies(formed, self.model(bed), self.finding())
@@ -163,7 +163,7 @@ class MakeMesh(SurfaceOptions, bpy.types.Operator):
 
 
 @action("digiclay.find_features", "List Features", no_surface, bases=(FindingOptions,))
-def list_features(operator: Any, context: Any) -> None:
+def list_features(operator: Operator, context: Context) -> None:
     """Find the bosses and creases of the active bed and list them in the panel"""
     bed = chosen_bed(context)
     features = find_features(formed_bed.read_formed(bed), formed_bed.model(bed), operator.finding())
@@ -179,13 +179,13 @@ def list_features(operator: Any, context: Any) -> None:
 
 
 @action("digiclay.keep_surface", "Measure from Here", cannot_form, no_surface)
-def keep_surface(operator: Any, context: Any) -> None:
+def keep_surface(operator: Operator, context: Context) -> None:
     """Measure features from the current surface"""
     formed_bed.set_reference(chosen_bed(context))
 
 
 @action("digiclay.forget_surface", "Measure from Rest", cannot_change, from_rest)
-def forget_surface(operator: Any, context: Any) -> None:
+def forget_surface(operator: Operator, context: Context) -> None:
     """Measure features from the bed at rest again"""
     formed_bed.clear_reference(chosen_bed(context))
 
@@ -238,7 +238,7 @@ class ExportMesh(SurfaceOptions, bpy.types.Operator):
     up_axis: choice("Up Axis", "Upward axis of an OBJ; slicers expect Z", items=AXIS_ITEMS, default="Y")
     separate: flag("A File Each", "Write each feature into a file of its own", default=False)
 
-    def invoke(self, context: Any, event: Any) -> set[str]:
+    def invoke(self, context: Context, event: Event) -> set[str]:
         """Open the file browser, with the name of the bed."""
         folder = Path(bpy.data.filepath).parent if bpy.data.filepath else Path.home()
         name = bpy.path.clean_name(bed_of(context).name)
@@ -247,7 +247,7 @@ class ExportMesh(SurfaceOptions, bpy.types.Operator):
         context.window_manager.fileselect_add(self)
         return {"RUNNING_MODAL"}
 
-    def check(self, context: Any) -> bool:
+    def check(self, context: Context) -> bool:
         """Keep name and format equal: the last change sets the other."""
         if self.file_format == self.shown:
             self.file_format = _format_of(self.filepath) or self.file_format
@@ -259,7 +259,7 @@ class ExportMesh(SurfaceOptions, bpy.types.Operator):
         self.filepath = wanted
         return changed
 
-    def draw(self, context: Any) -> None:
+    def draw(self, context: Context) -> None:
         layout = self.layout
         layout.use_property_split = True
         layout.use_property_decorate = False
@@ -275,7 +275,7 @@ class ExportMesh(SurfaceOptions, bpy.types.Operator):
         row.active = self.kind == "features"
         row.prop(self, "separate")
 
-    def perform(self, context: Any) -> None:
+    def perform(self, context: Context) -> None:
         """Write the file, or the files; without a format, the extension of the name determines it."""
         if not self.properties.is_property_set("file_format"):
             self.file_format = _format_of(self.filepath) or self.file_format
@@ -315,7 +315,7 @@ def _format_of(name: str) -> str:
 
 
 @menu("DIGICLAY_MT_export", "Digital Clay")
-def exports(entries: Any, context: Any) -> None:
+def exports(entries: Menu, context: Context) -> None:
     """Frequent exports, and a dialog for all others"""
     entries.layout.operator_context = "INVOKE_DEFAULT"
     for words, icon, options in ENTRIES:
@@ -326,6 +326,6 @@ def exports(entries: Any, context: Any) -> None:
     entries.layout.operator(ExportMesh.bl_idname, text="Other ...")
 
 
-def entry(parent: Any, context: Any) -> None:
+def entry(parent: Menu, context: Context) -> None:
     """Draw the entry in File > Export."""
     parent.layout.menu(exports.bl_idname, icon="MESH_GRID")

@@ -1,9 +1,8 @@
 """Operators on what is seen of a bed: pins picked for the overlay, and the live skin."""
 
 from collections.abc import Iterable
-from typing import Any
 
-from ..compat import bpy
+from ..compat import Area, Context, Event, Object, Operator, Region, Screen, bpy
 from ..core.base.errors import DigiclayError
 from ..core.session.recent_trace import PICKED
 from ..device import detail, view
@@ -17,7 +16,7 @@ from .poll_messages import cannot_change, no_pins, no_skin, no_view
 KEYS = "Click pins to pick them, or again to drop them.  Enter, Esc or right click: done"
 
 
-def pick_pins(bed: Any, pins: Iterable[int]) -> None:
+def pick_pins(bed: Object, pins: Iterable[int]) -> None:
     """Choose the pins whose heights the overlay shows: at most 6 different ones of the bed."""
     chosen, count = tuple(pins), len(bed.data.vertices)
     if len(chosen) > PICKED or len(set(chosen)) != len(chosen):
@@ -37,11 +36,11 @@ class PickPins(Modal, bpy.types.Operator):
     bl_options = {"UNDO"}
     needs = cannot_change, no_view
 
-    def prepare(self, context: Any, event: Any) -> None:
+    def prepare(self, context: Context, event: Event) -> None:
         self.changed = False
         show_status(context, localize(KEYS))
 
-    def modal(self, context: Any, event: Any) -> set[str]:
+    def modal(self, context: Context, event: Event) -> set[str]:
         """Pick or drop the pin under a click; any other event is passed to the view."""
         show_status(context, localize(KEYS))
         if event.type in ("ESC", "RET", "RIGHTMOUSE") and event.value == "PRESS":
@@ -51,10 +50,10 @@ class PickPins(Modal, bpy.types.Operator):
             return self._click(context, event)
         return {"PASS_THROUGH"}
 
-    def cancel(self, context: Any) -> None:
+    def cancel(self, context: Context) -> None:
         clear_status()
 
-    def _click(self, context: Any, event: Any) -> set[str]:
+    def _click(self, context: Context, event: Event) -> set[str]:
         """Pick or drop the pin under the mouse; a click beside the bed is passed to what lies there."""
         # The view it was started in may be gone by now: another workspace, another editor in its place.
         area, region = _under(context.window.screen, event)
@@ -75,7 +74,7 @@ class PickPins(Modal, bpy.types.Operator):
         return {"RUNNING_MODAL"}
 
 
-def _under(screen: Any, event: Any) -> tuple[Any, Any] | tuple[None, None]:
+def _under(screen: Screen, event: Event) -> tuple[Area, Region] | tuple[None, None]:
     """Return the 3D view that the mouse is in and its main region, of which it may have four."""
     for area in screen.areas:
         for region in area.regions if area.type == "VIEW_3D" else ():
@@ -86,13 +85,13 @@ def _under(screen: Any, event: Any) -> tuple[Any, Any] | tuple[None, None]:
 
 
 @action("digiclay.clear_pins", "Clear", cannot_change, no_pins, options=("UNDO",))
-def clear_pins(operator: Any, context: Any) -> None:
+def clear_pins(operator: Operator, context: Context) -> None:
     """Remove all picked pins of the active bed"""
     pick_pins(bed_of(context), ())
 
 
 @action("digiclay.skin_toggle", "Toggle Skin", cannot_change, no_skin)
-def toggle_skin(operator: Any, context: Any) -> None:
+def toggle_skin(operator: Operator, context: Context) -> None:
     """Show the surface of the pins as a skin, or the pins again"""
     bed = bed_of(context)
     seen, before = view.is_skin_shown(bed), bed.get(view.BEFORE)

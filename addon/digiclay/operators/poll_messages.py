@@ -8,10 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 from .. import preferences
-from ..compat import bpy
+from ..compat import Context, bpy
 from ..device import view
 from ..exchange import formed_bed
 from ..live import beds, follow, loop, tick
@@ -29,10 +28,10 @@ from ..ui_text import localize
 class Need:
     """Condition of an operator: what tells that it is not met, and the message then."""
 
-    is_lacking: Callable[[Any], object]
+    is_lacking: Callable[[Context], object]
     message: str
 
-    def __call__(self, context: Any) -> str:
+    def __call__(self, context: Context) -> str:
         """Return the message, or an empty text."""
         return self.message if self.is_lacking(context) else ""
 
@@ -41,11 +40,11 @@ class Need:
         return Need(self.is_lacking, message)
 
 
-def _has_view(context: Any) -> bool:
+def _has_view(context: Context) -> bool:
     return context.area is not None and context.area.type == "VIEW_3D"
 
 
-def _recording(context: Any) -> Any:
+def _recording(context: Context) -> object:
     session = running.find(bed_of(context))
     return session and session.recording
 
@@ -118,7 +117,7 @@ no_gesture = Need(
 )
 
 
-def _allow(use: Use) -> Callable[[Any], str]:
+def _allow(use: Use) -> Callable[[Context], str]:
     """Return the need of a bed whose state allows a use."""
     return lambda context: no_bed(context) or find_obstacle(context, bed_of(context), use)
 
@@ -126,13 +125,13 @@ def _allow(use: Use) -> Callable[[Any], str]:
 cannot_measure, cannot_change, cannot_form = map(_allow, Use)
 
 
-def no_surface(context: Any) -> str:
+def no_surface(context: Context) -> str:
     """There is no bed with pins to be measured, or they span no surface."""
     few = "A bed needs at least 2 x 2 pins to have a surface"
     return cannot_measure(context) or (few if len(bed_of(context).data.vertices) < 4 else "")
 
 
-def session_waits(context: Any) -> str:
+def session_waits(context: Context) -> str:
     """There is no session, or its bed cannot be written now."""
     active = active_session(context)
     if active is None:
@@ -142,7 +141,7 @@ def session_waits(context: Any) -> str:
     return localize("The session waits: {}", why) if why else ""
 
 
-def nothing_to_reset(context: Any) -> str:
+def nothing_to_reset(context: Context) -> str:
     """The bed is at rest, or its session waits."""
     if active_session(context) is not None:
         return session_waits(context)
@@ -151,14 +150,14 @@ def nothing_to_reset(context: Any) -> str:
     )
 
 
-def cannot_record(context: Any) -> str:
+def cannot_record(context: Context) -> str:
     """No session runs on the bed, or it records already."""
     if running.find(bed_of(context)) is None:
         return "Start a session first"
     return "A take is being recorded already" if _recording(context) is not None else ""
 
 
-def no_place(context: Any) -> str:
+def no_place(context: Context) -> str:
     """The mouse is in no 3D view in Object Mode, or there is no bed in it."""
     if not _has_view(context) or context.mode != "OBJECT":
         return "Pins are pressed in a 3D view, in Object Mode"
@@ -166,7 +165,7 @@ def no_place(context: Any) -> str:
     return "" if seen else "Add a bed first: Add > Mesh > Digital Clay"
 
 
-def no_finger(context: Any) -> str:
+def no_finger(context: Context) -> str:
     """There is no bed whose fingertip could be scaled."""
     bed = brush.bed_in_use(context)
     if bed is None or fingertip_of(bed) is None:

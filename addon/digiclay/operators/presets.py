@@ -1,10 +1,9 @@
 """Presets of a device: apply, save, remove; own control methods are loaded again."""
 
 from dataclasses import replace
-from typing import Any
 
 from .. import preferences
-from ..compat import bpy
+from ..compat import Context, Event, Operator, OperatorProperties, bpy
 from ..core.scene.scene_source import load
 from ..core.scene.toml_table import PRESETS
 from ..roles import bed_of
@@ -28,11 +27,11 @@ class ApplyPreset(Action, bpy.types.Operator):
     preset: text("Preset")
 
     @classmethod
-    def description(cls, context: Any, chosen: Any) -> str:
+    def description(cls, context: Context, chosen: OperatorProperties) -> str:
         """Return the description of the chosen preset."""
         return PRESET_WORDS.get(chosen.preset, "A preset of your own: every parameter but the layout")
 
-    def perform(self, context: Any) -> None:
+    def perform(self, context: Context) -> None:
         """Set the parameters; a session that runs on the bed goes on with them."""
         bed = bed_of(context)
         settings = bed.digiclay
@@ -53,11 +52,11 @@ class SavePreset(Action, bpy.types.Operator):
 
     name: text("Name", "Name of the preset; a preset of that name is replaced", maxlen=own_presets.LONGEST)
 
-    def invoke(self, context: Any, event: Any) -> set[str]:
+    def invoke(self, context: Context, event: Event) -> set[str]:
         self.name = bed_of(context).digiclay.own_preset
         return set(context.window_manager.invoke_props_dialog(self))
 
-    def perform(self, context: Any) -> None:
+    def perform(self, context: Context) -> None:
         bed = bed_of(context)
         scene = properties.read_scene(bed)
         alone = replace(scene, name=self.name.strip(), fingers=scene.fingers[:1])
@@ -73,10 +72,10 @@ class RemovePreset(Action, bpy.types.Operator):
     bl_label = "Remove Digital Clay Preset"
     needs = cannot_change, no_own_preset
 
-    def invoke(self, context: Any, event: Any) -> set[str]:
+    def invoke(self, context: Context, event: Event) -> set[str]:
         return set(context.window_manager.invoke_confirm(self, event))
 
-    def perform(self, context: Any) -> None:
+    def perform(self, context: Context) -> None:
         """Remove it; the bed keeps its parameters."""
         settings = bed_of(context).digiclay
         own_presets.remove(settings.own_preset)
@@ -85,7 +84,7 @@ class RemovePreset(Action, bpy.types.Operator):
 
 
 @action("digiclay.methods_reload", "Reload Methods", no_own_methods, options=(), in_any_mode=True)
-def reload_methods(operator: Any, context: Any) -> None:
+def reload_methods(operator: Operator, context: Context) -> None:
     """Run the Python files of the folder of own control methods again; running sessions keep their method"""
     preferences.take_methods(preferences.get(context), context)
     present = own_folder.read_present()

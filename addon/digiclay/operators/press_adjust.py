@@ -10,7 +10,8 @@ import numpy as np
 from bl_operators.presets import AddPresetBase  # type: ignore[import-not-found]
 
 from .. import bridge
-from ..compat import bpy
+from ..compat import Area, Context, Event, Menu, Object, Operator, OperatorProperties, bpy
+from ..core.base.arrays import Floats
 from ..core.base.errors import DigiclayError
 from ..core.model.fingertip import Fingertip
 from ..core.surface.pointing import find_contact_outline
@@ -56,11 +57,11 @@ class AdjustMixin(Drawing):
     #: Returns outlines (k, 2), m, about the place pointed at, by fingertip, its turn (wxyz), depth, value.
     outlines: Callable[[Fingertip, Any, float, float], list[Any]]
 
-    def read(self, bed: Any, settings: Any) -> float:
+    def read(self, bed: Object, settings: OperatorProperties) -> float:
         """Return the number."""
         return float(getattr(settings, self.setting)) / self.factor
 
-    def write(self, bed: Any, settings: Any, value: float) -> None:
+    def write(self, bed: Object, settings: OperatorProperties, value: float) -> None:
         """Set the number."""
         setattr(settings, self.setting, self.factor * value)
 
@@ -68,11 +69,11 @@ class AdjustMixin(Drawing):
         """Return the number of a typed text; a ValueError tells that it is none."""
         return float(bpy.utils.units.to_value("METRIC", "LENGTH", text, str_ref_unit="mm"))
 
-    def rate(self, context: Any, bed: Any) -> float:
+    def rate(self, context: Context, bed: Object) -> float:
         """Return the change of the number for a pixel."""
         return self.pixel / float(context.preferences.system.ui_scale)
 
-    def prepare(self, context: Any, event: Any) -> None:
+    def prepare(self, context: Context, event: Event) -> None:
         """Begin at the place under the mouse; beside a bed, in the middle of the one it is about."""
         bed, self.center = _find_place(context, (event.mouse_region_x, event.mouse_region_y))
         self.uid = bed.session_uid
@@ -80,7 +81,7 @@ class AdjustMixin(Drawing):
         self.before, self.text, self.snapped = event.mouse_x, "", False
         self._show(context)
 
-    def modal(self, context: Any, event: Any) -> set[str]:
+    def modal(self, context: Context, event: Event) -> set[str]:
         """Follow the mouse or the keyboard, until confirmed or cancelled."""
         bed = brush.find_bed(context, self.uid)
         if bed is None or not self.poll(context):
@@ -104,7 +105,7 @@ class AdjustMixin(Drawing):
         self._show(context)
         return {"RUNNING_MODAL"}
 
-    def _move(self, context: Any, bed: Any, event: Any) -> None:
+    def _move(self, context: Context, bed: Object, event: Event) -> None:
         """Follow the mouse sideways; a typed value has precedence."""
         way, self.before = event.mouse_x - self.before, event.mouse_x
         if not self.text:
@@ -124,7 +125,7 @@ class AdjustMixin(Drawing):
             value = round(self.value / self.snap) * self.snap if self.snapped else self.value
         return min(max(value, self.low), self.high) if np.isfinite(value) else self.start
 
-    def _show(self, context: Any) -> None:
+    def _show(self, context: Context) -> None:
         """Show the number in the status bar, and draw it."""
         self.words = self.describe(self._shown()) + (f"   [{self.text}]" if self.text else "")
         show_status(context, localize(KEYS, self.words))
@@ -132,7 +133,7 @@ class AdjustMixin(Drawing):
             if area.type == "VIEW_3D":
                 area.tag_redraw()
 
-    def draw_view(self, area: Any) -> None:
+    def draw_view(self, area: Area) -> None:
         """Draw outline and number in the view the operator was called in."""
         context = bpy.context
         bed = brush.find_bed(context, self.uid)
@@ -147,13 +148,13 @@ class AdjustMixin(Drawing):
         tool.draw_on_bed(context, bed, places, self.words, (middle[0], middle[1]))
 
 
-def _find_place(context: Any, xy: tuple[float, float]) -> tuple[Any, Any]:
+def _find_place(context: Context, xy: tuple[float, float]) -> tuple[Any, Any]:
     """Return the bed under a pixel of the region and the place there, m; or the bed in use and its middle."""
     target = aim.find_target(context, xy)
     tip = target and fingertip_of(target.bed)
     if target is not None and tip is not None and not find_obstacle(context, target.bed, Use.FORM):
         return target.bed, target.point
-    bed: Any = brush.bed_in_use(context)
+    bed: Object = brush.bed_in_use(context)
     height = bridge.read_cells(bed.data)["height"]
     return bed, np.array([0.0, 0.0, float(height.mean())])
 
@@ -166,13 +167,13 @@ class AdjustSize(AdjustMixin, bpy.types.Operator):
     bl_options = {"UNDO", "BLOCKING"}
     low, high, snap = devices.SMALLEST, devices.LARGEST, 1e-3
 
-    def read(self, bed: Any, settings: Any) -> float:
+    def read(self, bed: Object, settings: OperatorProperties) -> float:
         return devices.read_size(devices.find_first(bed))
 
-    def write(self, bed: Any, settings: Any, value: float) -> None:
+    def write(self, bed: Object, settings: OperatorProperties, value: float) -> None:
         devices.set_size(devices.find_first(bed), value)
 
-    def rate(self, context: Any, bed: Any) -> float:
+    def rate(self, context: Context, bed: Object) -> float:
         """Return m a pixel at which the outline's side keeps up with the mouse."""
         points = self.center + 1e-3 * np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
         middle, along, across = bridge.project(context, bed, points)[:, 0]
@@ -183,7 +184,7 @@ class AdjustSize(AdjustMixin, bpy.types.Operator):
     def describe(self, value: float) -> str:
         return localize("Size {:.2f} mm", 1e3 * value)
 
-    def outlines(self, finger: Fingertip, turn: Any, depth: float, value: float) -> list[Any]:
+    def outlines(self, finger: Fingertip, turn: Floats, depth: float, value: float) -> list[Any]:
         """Return the widest section of the fingertip, and what of it touches."""
         share = value / (2.0 * finger.width)
         scaled = Fingertip(finger.length * share, finger.width * share, finger.height * share)
@@ -198,7 +199,7 @@ class AdjustDepth(AdjustMixin, bpy.types.Operator):
     bl_options = {"BLOCKING"}
     low, high, snap, pixel, factor = SHALLOWEST, DEEPEST, 0.5e-3, 0.05e-3, 1e3
 
-    def read(self, bed: Any, settings: Any) -> float:
+    def read(self, bed: Object, settings: OperatorProperties) -> float:
         """Return the depth, or height, of the tool's brush, m."""
         self.setting = brush.amount_name(Brush(settings.brush))
         return super().read(bed, settings)
@@ -206,7 +207,7 @@ class AdjustDepth(AdjustMixin, bpy.types.Operator):
     def describe(self, value: float) -> str:
         return f"{self.setting.title()} {1e3 * value:.2f} mm"
 
-    def outlines(self, finger: Fingertip, turn: Any, depth: float, value: float) -> list[Any]:
+    def outlines(self, finger: Fingertip, turn: Floats, depth: float, value: float) -> list[Any]:
         """Return what of the fingertip touches at the depth."""
         return [find_contact_outline(finger, turn, value)]
 
@@ -228,7 +229,7 @@ class AdjustStrength(AdjustMixin, bpy.types.Operator):
     def describe(self, value: float) -> str:
         return localize("Strength {:.0f} %", 100.0 * value)
 
-    def outlines(self, finger: Fingertip, turn: Any, depth: float, value: float) -> list[Any]:
+    def outlines(self, finger: Fingertip, turn: Floats, depth: float, value: float) -> list[Any]:
         """Return what of the fingertip touches at the whole depth, and at the share of it."""
         return [find_contact_outline(finger, turn, depth), find_contact_outline(finger, turn, depth * value)]
 
@@ -237,9 +238,9 @@ class AdjustStrength(AdjustMixin, bpy.types.Operator):
     "digiclay.press_scale", "Scale Fingertip", no_finger,
     scalar=number("Factor", "Factor of the size", default=1.1, min=0.1, max=10.0),
 )  # fmt: skip
-def scale_size(operator: Any, context: Any) -> None:
+def scale_size(operator: Operator, context: Context) -> None:
     """Scale the fingertip; its blister follows"""
-    bed: Any = brush.bed_in_use(context)
+    bed: Object = brush.bed_in_use(context)
     devices.set_size(devices.find_first(bed), devices.read_size(devices.find_first(bed)) * operator.scalar)
 
 
@@ -258,20 +259,20 @@ class TakeFinger(Action, bpy.types.Operator):
     )
 
     @classmethod
-    def description(cls, context: Any, chosen: Any) -> str:
+    def description(cls, context: Context, chosen: OperatorProperties) -> str:
         """Return measures and source of the chosen finger."""
         kind = FINGERS[chosen.kind]
         axes = (kind.finger.length, kind.finger.width, kind.finger.height)
         measures = " × ".join(f"{2e3 * axis:g}" for axis in axes)
         return localize("{} mm: {}. The blister follows, the contact law stays", measures, kind.source)
 
-    def perform(self, context: Any) -> None:
-        bed: Any = brush.bed_in_use(context)
+    def perform(self, context: Context) -> None:
+        bed: Object = brush.bed_in_use(context)
         devices.resize(devices.find_first(bed), FINGERS[self.kind].finger)
 
 
 @menu("DIGICLAY_MT_fingers", "Finger")
-def fingers(entries: Any, context: Any) -> None:
+def fingers(entries: Menu, context: Context) -> None:
     """Preset fingers."""
     for name, kind in FINGERS.items():
         entries.layout.operator(TakeFinger.bl_idname, text=kind.label).kind = name
@@ -282,9 +283,9 @@ def fingers(entries: Any, context: Any) -> None:
     filepath=bpy.props.StringProperty(subtype="FILE_PATH", options={"SKIP_SAVE"}),
     menu_idname=bpy.props.StringProperty(default="DIGICLAY_MT_brushes", options={"SKIP_SAVE"}),
 )  # fmt: skip
-def apply_brush(operator: Any, context: Any) -> None:
+def apply_brush(operator: Operator, context: Context) -> None:
     """Set fingertip, brush, stroke and symmetry of the Press tool to those of a preset"""
-    settings: Any = brush.tool_settings(context)
+    settings: OperatorProperties = brush.tool_settings(context)
     before = {name: getattr(settings, name) for name in brush.list_settings(settings)}
     for name in before:  # a preset need not name those that have their defaults
         settings.property_unset(name)

@@ -1,8 +1,6 @@
 """What the Press tool's header has beside strokes: the center of symmetry, and the locks of all pins."""
 
-from typing import Any
-
-from ..compat import bpy
+from ..compat import Area, Context, Event, Operator, bpy
 from ..live import beds
 from ..press import aim, brush, tool
 from ..press.pointer import HELD
@@ -24,13 +22,13 @@ class PlaceCenter(Drawing, bpy.types.Operator):
     bl_options = {"INTERNAL"}
     needs = no_tool_in_view, no_finger
 
-    def prepare(self, context: Any, event: Any) -> None:
+    def prepare(self, context: Context, event: Event) -> None:
         """Wait for the press."""
         self.uid, self.center = 0, (0.0, 0.0)
         self.before = brush.read_center(brush.tool_settings(context))
         show_status(context, localize(KEYS))
 
-    def modal(self, context: Any, event: Any) -> set[str]:
+    def modal(self, context: Context, event: Event) -> set[str]:
         """Place the center by the press, and the axis until the release; the view can be turned meanwhile."""
         settings = brush.tool_settings(context)
         if settings is None:
@@ -60,7 +58,7 @@ class PlaceCenter(Drawing, bpy.types.Operator):
         self.region.tag_redraw()
         return {"RUNNING_MODAL"}
 
-    def draw_view(self, area: Any) -> None:
+    def draw_view(self, area: Area) -> None:
         """Draw center and axes in the view the operator was called in."""
         context = bpy.context
         bed, settings = brush.bed_in_use(context), brush.tool_settings(context)
@@ -76,14 +74,14 @@ class NoteKeys(Polled, bpy.types.Operator):
     bl_options = {"INTERNAL"}
     needs = (no_tool,)
 
-    def invoke(self, context: Any, event: Any) -> set[str]:
+    def invoke(self, context: Context, event: Event) -> set[str]:
         if (HELD.ctrl, HELD.shift) != (event.ctrl, event.shift):
             HELD.ctrl, HELD.shift = event.ctrl, event.shift
             context.area.tag_redraw()
         return {"PASS_THROUGH"}
 
 
-def _tell_all(operator: Any, context: Any, kind: Brush) -> set[str] | None:
+def _tell_all(operator: Operator, context: Context, kind: Brush) -> set[str] | None:
     """Queue a stroke that tells all pins something."""
     session = open_session(operator, context, brush.bed_in_use(context), kind)
     if session is None:
@@ -95,12 +93,12 @@ def _tell_all(operator: Any, context: Any, kind: Brush) -> set[str] | None:
 
 
 @action("digiclay.press_locks_invert", "Invert Locks", no_tool_in_view, no_finger, options=("UNDO",))
-def invert_locks(operator: Any, context: Any) -> set[str] | None:
+def invert_locks(operator: Operator, context: Context) -> set[str] | None:
     """Lock the pins that are not locked, and unlock those that are"""
     return _tell_all(operator, context, Brush.INVERT_LOCKS)
 
 
 @action("digiclay.press_locks_clear", "Clear Locks", no_tool_in_view, no_finger, options=("UNDO",))
-def clear_locks(operator: Any, context: Any) -> set[str] | None:
+def clear_locks(operator: Operator, context: Context) -> set[str] | None:
     """Unlock all pins"""
     return _tell_all(operator, context, Brush.CLEAR_LOCKS)

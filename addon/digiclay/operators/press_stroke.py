@@ -1,13 +1,13 @@
 """Strokes of the Press tool, queued for the session: drawn by the mouse, lines and rings."""
 
-from collections.abc import Callable
 from functools import partial
 from typing import Any
 
 import numpy as np
 
 from .. import bridge
-from ..compat import bpy
+from ..compat import Area, Context, Event, Object, Operator, OperatorProperties, bpy
+from ..core.base.arrays import Floats
 from ..core.base.errors import DigiclayError
 from ..core.control.methods import METHODS
 from ..live import beds, loop, tick
@@ -22,6 +22,7 @@ from ..strokes.stroke import (
     MOST,
     STAMPS,
     Brush,
+    Place,
     Stroke,
     deepen,
     draw,
@@ -151,7 +152,7 @@ class Press(PressSettings, Modal, bpy.types.Operator):
     bl_options = {"INTERNAL", "UNDO"}
     needs = (no_place,)
 
-    def prepare(self, context: Any, event: Any) -> set[str] | None:
+    def prepare(self, context: Context, event: Event) -> set[str] | None:
         """Begin where the mouse points; beside the bed there is nothing to press."""
         # Shift and Ctrl change the brush for as long as this stroke lasts.
         self.kind = brush.choose_brush(self.brush, event)
@@ -178,10 +179,10 @@ class Press(PressSettings, Modal, bpy.types.Operator):
         self._show(context)
         return None
 
-    def borrow(self, context: Any) -> None:
+    def borrow(self, context: Context) -> None:
         self.timer = loop.time_window(context)
 
-    def modal(self, context: Any, event: Any) -> set[str]:
+    def modal(self, context: Context, event: Event) -> set[str]:
         """Draw the stroke on; other events are passed to Blender, to turn the view for instance."""
         bed = brush.find_bed(bpy.context, self.uid)
         session = running.find(bed)
@@ -212,11 +213,11 @@ class Press(PressSettings, Modal, bpy.types.Operator):
         self._show(context)
         return {"RUNNING_MODAL"}
 
-    def cancel(self, context: Any) -> None:
+    def cancel(self, context: Context) -> None:
         self._change(let_go)
         self._end(set())
 
-    def _move(self, context: Any, bed: Any, event: Any) -> None:
+    def _move(self, context: Context, bed: Object, event: Event) -> None:
         """Draw on to the place under the mouse."""
         xy = event.mouse_x - self.region.x, event.mouse_y - self.region.y
         with context.temp_override(region=self.region):
@@ -246,21 +247,21 @@ class Press(PressSettings, Modal, bpy.types.Operator):
             put = beds.put if change is let_go else running.put
             put(change_stroke(session, self.number, change))
 
-    def _feel(self, context: Any, bed: Any, event: Any) -> None:
+    def _feel(self, context: Context, bed: Object, event: Event) -> None:
         """Take a pen's pressure and tilt."""
         if self.use_pressure and event.is_tablet:
             self.pressure = pointer.find_share(float(event.pressure), self.pressure_curve)
         if self.use_tilt and event.is_tablet:
             self.lean = pointer.find_lean(tuple(event.tilt), aim.find_view(context, bed))
 
-    def _is_released(self, event: Any) -> bool:
+    def _is_released(self, event: Event) -> bool:
         """Return whether the button is up though no release has come: a pie menu, say, has had it."""
         if event.type == "LEFTMOUSE":
             return False
         self.button = read_event(self.button, event.type, (event.type_prev, event.value_prev))
         return self.button.up
 
-    def _show(self, context: Any) -> None:
+    def _show(self, context: Context) -> None:
         """Show brush, depth or height, and keys in the status bar."""
         words = brush.describe_stroke(self.kind, self.full, self.strength * self.pressure)
         show_status(context, localize(KEYS if self.kind.has_amount else KEYS_PLAIN, words))
@@ -274,7 +275,7 @@ class Press(PressSettings, Modal, bpy.types.Operator):
         return result
 
 
-def _is_undo_key(context: Any, event: Any) -> bool:
+def _is_undo_key(context: Context, event: Event) -> bool:
     """Return whether an event is the user's key for Undo: a stroke that is being drawn has no step yet."""
     keymap = context.window_manager.keyconfigs.user.keymaps.get("Screen")
     return any(
@@ -286,7 +287,7 @@ def _is_undo_key(context: Any, event: Any) -> bool:
     )
 
 
-def find_pressed(operator: Any, context: Any, xy: tuple[float, float]) -> aim.Target | None:
+def find_pressed(operator: Operator, context: Context, xy: tuple[float, float]) -> aim.Target | None:
     """Return the place on a bed under a pixel of the region; the operator reports what hides it."""
     target, hider = aim.look_at(context, xy)
     if hider is not None:
@@ -294,7 +295,7 @@ def find_pressed(operator: Any, context: Any, xy: tuple[float, float]) -> aim.Ta
     return target if hider is None else None
 
 
-def open_session(operator: Any, context: Any, bed: Any, kind: Brush) -> running.Running | None:
+def open_session(operator: Operator, context: Context, bed: Object, kind: Brush) -> running.Running | None:
     """Return the session of a bed for a stroke, started if there is none; or report why it cannot be."""
     try:
         if running.find(bed) is None:
@@ -325,7 +326,11 @@ def open_session(operator: Any, context: Any, bed: Any, kind: Brush) -> running.
 
 
 #: Path between two places of the bed, by the tool's setting.
-SHAPES: dict[str, Callable[[Any, Any], Any]] = {"LINE": lay_line, "RING": lay_ring, "STAMP": lay_square}
+SHAPES = {
+    "LINE": lay_line,
+    "RING": lay_ring,
+    "STAMP": lay_square,
+}
 SHAPE_KEYS = {
     "LINE": "Length {:.1f} mm  |  Release: form the line  |  Esc or right click: cancel",
     "RING": "Radius {:.1f} mm  |  Release: form the ring  |  Esc or right click: cancel",
@@ -333,7 +338,7 @@ SHAPE_KEYS = {
 }
 
 
-def _no_shape(context: Any) -> str:
+def _no_shape(context: Context) -> str:
     """The tool is set to free strokes, or another one is in use: the press is for another operator."""
     settings = brush.tool_settings(context)
     chosen = settings is not None and brush.find_path(settings, Brush(settings.brush)) in SHAPES
@@ -348,8 +353,8 @@ class PressShape(Drawing, bpy.types.Operator):
     bl_options = {"INTERNAL", "UNDO"}
     needs = (_no_shape,)
 
-    def prepare(self, context: Any, event: Any) -> set[str] | None:
-        settings: Any = brush.tool_settings(context)
+    def prepare(self, context: Context, event: Event) -> set[str] | None:
+        settings: OperatorProperties = brush.tool_settings(context)
         self.kind = brush.choose_brush(settings.brush, event)
         self.shape = brush.find_path(settings, self.kind)
         if self.shape not in SHAPES:
@@ -362,7 +367,7 @@ class PressShape(Drawing, bpy.types.Operator):
         self._show(context)
         return None
 
-    def modal(self, context: Any, event: Any) -> set[str]:
+    def modal(self, context: Context, event: Event) -> set[str]:
         """Draw the path until the mouse button is released; the view can be turned meanwhile."""
         bed = brush.find_bed(context, self.uid)
         if bed is None or brush.tool_settings(context) is None:
@@ -382,15 +387,15 @@ class PressShape(Drawing, bpy.types.Operator):
         self.end(context)
         return _queue_path(self, context, bed, self._lay(), self.kind)
 
-    def _lay(self) -> Any:
+    def _lay(self) -> Floats:
         """Return the path of the stroke, (k, 2), m: that of a stamp is from its middle to its right side."""
         return lay_line(self.start, self.to) if self.shape == "STAMP" else self._path()
 
-    def _path(self) -> Any:
+    def _path(self) -> Floats:
         """Return what is drawn of the path as it is now, (k, 2), m."""
         return SHAPES[self.shape](self.start, self.to)
 
-    def _show(self, context: Any) -> None:
+    def _show(self, context: Context) -> None:
         """Show the length or the radius, and draw the path."""
         length = float(np.hypot(self.to[0] - self.start[0], self.to[1] - self.start[1]))
         self.words = localize(SHAPE_KEYS[self.shape], 1e3 * length)
@@ -398,11 +403,11 @@ class PressShape(Drawing, bpy.types.Operator):
         show_status(context, self.words)
         self.region.tag_redraw()
 
-    def end(self, context: Any, *result: str) -> set[str]:
+    def end(self, context: Context, *result: str) -> set[str]:
         ghost.plan(self.uid, None)
         return super().end(context, *result)
 
-    def draw_view(self, area: Any) -> None:
+    def draw_view(self, area: Area) -> None:
         context = bpy.context
         bed, settings = brush.find_bed(context, self.uid), brush.tool_settings(context)
         if bed is None or settings is None or context.area != area:
@@ -424,7 +429,7 @@ class PressLine(Polled, bpy.types.Operator):
     bl_options = {"INTERNAL", "UNDO"}
     needs = (no_tool,)
 
-    def invoke(self, context: Any, event: Any) -> set[str]:
+    def invoke(self, context: Context, event: Event) -> set[str]:
         """Queue the line; without a stroke before it, the place alone."""
         target = find_pressed(self, context, (event.mouse_region_x, event.mouse_region_y))
         if target is None:
@@ -432,13 +437,13 @@ class PressLine(Polled, bpy.types.Operator):
         to = float(target.point[0]), float(target.point[1])
         session = running.find(target.bed)
         start = last_place(session) if session is not None else None
-        settings: Any = brush.tool_settings(context)
+        settings: OperatorProperties = brush.tool_settings(context)
         kind = Brush(settings.brush)
         path = [to] if start is None or kind in STAMPS else lay_line(start, to)
         return _queue_path(self, context, target.bed, path, kind)
 
 
-def _lay_stroke(settings: Any, path: Any, kind: Brush) -> Stroke:
+def _lay_stroke(settings: OperatorProperties, path: Floats | list[Place], kind: Brush) -> Stroke:
     """Return the stroke along a path (k, 2), m, as the tool's settings have it."""
     share = float(settings.strength)
     depth = 1e-3 * share * getattr(settings, brush.amount_name(kind))
@@ -447,7 +452,9 @@ def _lay_stroke(settings: Any, path: Any, kind: Brush) -> Stroke:
     return lay_path(laid, path)
 
 
-def _queue_path(operator: Any, context: Any, bed: Any, path: Any, kind: Brush) -> set[str]:
+def _queue_path(
+    operator: Operator, context: Context, bed: Object, path: Floats | list[Place], kind: Brush
+) -> set[str]:
     """Queue a path for the fingertip, as the tool's settings have it."""
     session = open_session(operator, context, bed, kind)
     if session is None:

@@ -6,12 +6,11 @@ would be lost in a crash. The operator therefore ends for a moment every so ofte
 
 import time
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
 from .. import bridge, preferences
-from ..compat import bpy
+from ..compat import Context, Event, Menu, Object, Operator, Window, bpy
 from ..core.base.errors import DigiclayError
 from ..core.engine.simulation import begin
 from ..core.scene.assembly import assemble
@@ -44,7 +43,7 @@ class Ticking(Polled):
 
     in_any_mode = True
 
-    def advance(self, context: Any, now: float) -> None:
+    def advance(self, context: Context, now: float) -> None:
         """Advance all sessions until `now`, s."""
         self.tell(tick.tick(context, now))
 
@@ -58,7 +57,7 @@ class Ticking(Polled):
 class LoopMixin(Ticking):
     """Mixin of the modal operators for the sessions of a window."""
 
-    def drive(self, context: Any) -> set[str]:
+    def drive(self, context: Context) -> set[str]:
         """Begin to drive the loop."""
         loop.LOOP.aside = False
         self.token, self.since = loop.token(), time.perf_counter()
@@ -67,7 +66,7 @@ class LoopMixin(Ticking):
         with context.temp_override(area=None, region=None):
             return become_modal(self, context)
 
-    def modal(self, context: Any, event: Any) -> set[str]:
+    def modal(self, context: Context, event: Event) -> set[str]:
         """Tick with the timer; pass every other event on."""
         if self.token != loop.token():
             return {"CANCELLED"}
@@ -89,7 +88,7 @@ class LoopMixin(Ticking):
             return {"FINISHED", "PASS_THROUGH"}
         return {"PASS_THROUGH"}
 
-    def cancel(self, context: Any) -> None:
+    def cancel(self, context: Context) -> None:
         """End with the window the loop was started in, or with Blender."""
         if self.token != loop.token():
             return
@@ -99,7 +98,7 @@ class LoopMixin(Ticking):
         else:
             handlers.end_all(CLOSED)
 
-    def give_up(self, context: Any, words: str) -> None:
+    def give_up(self, context: Context, words: str) -> None:
         """End all sessions: nothing drives them any more."""
         handlers.end_all(localize("ended: {}", words))
 
@@ -112,7 +111,7 @@ class GoOn(LoopMixin, bpy.types.Operator):
     bl_options = {"INTERNAL"}
     needs = (poll.no_undriven,)
 
-    def invoke(self, context: Any, event: Any) -> set[str]:
+    def invoke(self, context: Context, event: Event) -> set[str]:
         return self.drive(context)
 
 
@@ -123,16 +122,16 @@ class FinishStrokes(Ticking, Modal, bpy.types.Operator):
     bl_label = "Finish Strokes"
     needs = (poll.no_stroke,)
 
-    def prepare(self, context: Any, event: Any) -> None:
+    def prepare(self, context: Context, event: Event) -> None:
         self.whole = _estimate_time()
 
-    def borrow(self, context: Any) -> None:
+    def borrow(self, context: Context) -> None:
         """Have the loop hurry, beside which this one shows the progress and takes Esc."""
         self.timer, loop.LOOP.in_haste = loop.time_window(context), True
         views.stop()  # its curves would have the views drawn
         context.window_manager.progress_begin(0, 100)
 
-    def modal(self, context: Any, event: Any) -> set[str]:
+    def modal(self, context: Context, event: Event) -> set[str]:
         """End with the strokes, or at Esc; the loop has every other event."""
         if event.type == "ESC" and event.value == "PRESS":
             return self._end(context, "CANCELLED")
@@ -143,7 +142,7 @@ class FinishStrokes(Ticking, Modal, bpy.types.Operator):
             context.window_manager.progress_update(int(100.0 * max(0.0, done)))
         return {"PASS_THROUGH"}
 
-    def execute(self, context: Any) -> set[str]:
+    def execute(self, context: Context) -> set[str]:
         """Finish them before anything else, as a script would have it; not what waits, for a hand say."""
         before: list[int] = []
         while tick.has_strokes() and before != (now := [one.state.period for one in running.list_sessions()]):
@@ -151,10 +150,10 @@ class FinishStrokes(Ticking, Modal, bpy.types.Operator):
             self.advance(context, time.perf_counter())
         return {"FINISHED"}
 
-    def cancel(self, context: Any) -> None:
+    def cancel(self, context: Context) -> None:
         self._end(context)
 
-    def _end(self, context: Any, *result: str) -> set[str]:
+    def _end(self, context: Context, *result: str) -> set[str]:
         """Give back the cursor and the timer, and let the loop take its time again; return the result."""
         tick.end_haste(context)
         views.follow()
@@ -166,7 +165,7 @@ class FinishStrokes(Ticking, Modal, bpy.types.Operator):
 
 
 @action("digiclay.session_escape", "Stop Sessions", poll.driven, options=("INTERNAL",), in_any_mode=True)
-def escape(operator: Any, context: Any) -> None:
+def escape(operator: Operator, context: Context) -> None:
     """Stop the sessions while none of their operators receives the key"""
     _stop(operator, context)
 
@@ -176,7 +175,7 @@ def _estimate_time() -> float:
     return sum(map(sculpting.estimate_time, running.list_sessions()))
 
 
-def _stop(operator: Any, context: Any) -> bool:
+def _stop(operator: Operator, context: Context) -> bool:
     """End all sessions as soon as drawn strokes are formed; return whether they have ended."""
     if not tick.has_strokes():
         handlers.end_all(handlers.STOPPED)
@@ -187,7 +186,7 @@ def _stop(operator: Any, context: Any) -> bool:
     return False
 
 
-def _other_operators(context: Any) -> frozenset[int]:
+def _other_operators(context: Context) -> frozenset[int]:
     """Return the modal operators of all windows but those that drive sessions."""
     own = ("DIGICLAY_OT_session", "DIGICLAY_OT_session_go_on")
     windows = context.window_manager.windows
@@ -195,7 +194,7 @@ def _other_operators(context: Any) -> frozenset[int]:
     return frozenset(operator.as_pointer() for operator in every if operator.bl_idname not in own)
 
 
-def _resume_later(token: int, window: Any) -> None:
+def _resume_later(token: int, window: Window) -> None:
     """Have the loop driven again in a moment, unless it ended or its window was closed meanwhile."""
     loop.LOOP.aside = True
     handlers.write_recovery()  # in case Blender saves the file in this moment
@@ -216,21 +215,21 @@ def _resume_later(token: int, window: Any) -> None:
     bpy.app.timers.register(go_on, first_interval=MOMENT)
 
 
-def leave_mode(context: Any) -> None:
+def leave_mode(context: Context) -> None:
     """Leave the active object's mode, for instance that of the Sculpting workspace, for Object Mode."""
     if context.mode != "OBJECT":
         bpy.ops.object.mode_set(mode="OBJECT")
 
 
 @action("digiclay.leave_mode", "Back to Object Mode", poll.no_bed, poll.in_object_mode, in_any_mode=True)
-def to_object_mode(operator: Any, context: Any) -> None:
+def to_object_mode(operator: Operator, context: Context) -> None:
     """Leave this mode for Object Mode, in which beds are sculpted, with the Press tool in hand"""
     leave_mode(context)
     if context.window is not None:
         tool.take_up(context)
 
 
-def leave_entry(menu: Any, context: Any) -> None:
+def leave_entry(menu: Menu, context: Context) -> None:
     """Offer the way back after the menus of a 3D view's header, as in the Sculpting workspace."""
     if not to_object_mode.poll_message(context):
         menu.layout.operator(to_object_mode.bl_idname, icon="LOOP_BACK")
@@ -248,10 +247,10 @@ class Session(LoopMixin, Action, bpy.types.Operator):
         poll.no_window,
     )
 
-    def invoke(self, context: Any, event: Any) -> set[str]:
+    def invoke(self, context: Context, event: Event) -> set[str]:
         return self.execute(context)
 
-    def perform(self, context: Any) -> set[str] | None:
+    def perform(self, context: Context) -> set[str] | None:
         """Start the session, and the loop unless another session's drives this one as well."""
         bed = bed_of(context)
         leave_mode(context)
@@ -274,7 +273,7 @@ class Session(LoopMixin, Action, bpy.types.Operator):
         return self.drive(context)
 
 
-def _session(context: Any) -> tuple[Any, Running]:
+def _session(context: Context) -> tuple[Object, Running]:
     """Return the bed and the session that an action is about, which its poll has found."""
     active = active_session(context)
     assert active is not None
@@ -282,7 +281,7 @@ def _session(context: Any) -> tuple[Any, Running]:
 
 
 @action("digiclay.session_pause", "Pause or Resume", poll.no_session, options=(), in_any_mode=True)
-def pause_session(operator: Any, context: Any) -> None:
+def pause_session(operator: Operator, context: Context) -> None:
     """Pause or resume the bed; on resume the fingertip path is straight to its current position"""
     _, session = _session(context)
     running.put(replace(session, paused=not session.paused))
@@ -290,14 +289,14 @@ def pause_session(operator: Any, context: Any) -> None:
 
 
 @action("digiclay.session_step", "Single Step", poll.no_session, options=(), in_any_mode=True)
-def step_session(operator: Any, context: Any) -> None:
+def step_session(operator: Operator, context: Context) -> None:
     """Simulate one control period; a running session is paused"""
     running.put(sculpting.request_step(_session(context)[1]))
     loop.redraw_status()
 
 
 @action("digiclay.session_stop", "Stop Session", poll.no_session, options=("UNDO",), in_any_mode=True)
-def stop_session(operator: Any, context: Any) -> None:
+def stop_session(operator: Operator, context: Context) -> None:
     """Stop the session of the bed; the bed keeps its state, from which another session continues"""
     handlers.end(handlers.STOPPED, _session(context)[1])
 
@@ -305,7 +304,7 @@ def stop_session(operator: Any, context: Any) -> None:
 @action(
     "digiclay.session_rewind", "Take Back a Gesture", poll.session_waits, poll.no_gesture, options=("UNDO",)
 )
-def rewind_session(operator: Any, context: Any) -> None:
+def rewind_session(operator: Operator, context: Context) -> None:
     """Undo the last gesture: bed and fingertip return to its start"""
     bed, session = _session(context)
     back = sculpting.rewind(session)
@@ -322,7 +321,7 @@ def rewind_session(operator: Any, context: Any) -> None:
         options={"HIDDEN", "SKIP_SAVE"},
     ),
 )  # fmt: skip
-def reset_session(operator: Any, context: Any) -> set[str] | None:
+def reset_session(operator: Operator, context: Context) -> set[str] | None:
     """Return all pins to rest and lift the fingertip off them"""
     active = active_session(context)
     if active is None:
@@ -339,7 +338,7 @@ def reset_session(operator: Any, context: Any) -> set[str] | None:
     return None
 
 
-def _bring_to_rest(bed: Any) -> None:
+def _bring_to_rest(bed: Object) -> None:
     """Bring a bed without a session to rest."""
     scene = properties.scene_of(bed)
     system = assemble(scene)
@@ -361,10 +360,10 @@ class FollowServer(Action, bpy.types.Operator):
     address: text("Address", "Address and port that the server prints for OSC", default="127.0.0.1:8766")
     token: text("Token", "Token that the server prints; no file keeps it", subtype="PASSWORD")
 
-    def invoke(self, context: Any, event: Any) -> set[str]:
+    def invoke(self, context: Context, event: Event) -> set[str]:
         return set(context.window_manager.invoke_props_dialog(self))
 
-    def perform(self, context: Any) -> None:
+    def perform(self, context: Context) -> None:
         uid = _session(context)[1].uid
         try:
             follow.begin(uid, self.address, self.token, online=bool(bpy.app.online_access))
@@ -374,6 +373,6 @@ class FollowServer(Action, bpy.types.Operator):
 
 
 @action("digiclay.leave_server", "Stop Following", poll.no_server, options=(), in_any_mode=True)
-def leave_server(operator: Any, context: Any) -> None:
+def leave_server(operator: Operator, context: Context) -> None:
     """Move the fingertip by hand again"""
     follow.end(_session(context)[1].uid)

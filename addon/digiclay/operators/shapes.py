@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from .. import bridge
-from ..compat import bpy
+from ..compat import Context, Object, Operator, bpy
 from ..core.shapes.fitting import KINDS, list_shapes, pack
 from ..core.shapes.request import LENGTHS, UPWARDS, Shape
 from ..exchange import shape_show
@@ -55,14 +55,14 @@ class Shaped(Action):
     )
     foot: millimeters("Foot", DEFAULT.foot, "Where its lowest point lies above the bed at rest", **LENGTH)
 
-    def tell(self, bed: Any, laid: Any, off: float) -> None:
+    def tell(self, bed: Object, laid: Any, off: float) -> None:
         """Report what `shape_show` has displayed, and its parts beyond the bed."""
         lost = laid.too_low + laid.too_high + laid.overhanging
         words = localize("{}; displayed to within {:.2g} µm", laid.describe(), off * 1e6)
         running.set_message(words, bed.session_uid)
         self.report({"WARNING" if lost else "INFO"}, words)
 
-    def shape(self, file: str, bed: Any, **more: Any) -> Shape:
+    def shape(self, file: str, bed: Object, **more: Any) -> Shape:
         """Return how the shape of a file or an object is laid onto the bed, with more fields of `Shape`."""
         more |= {name: to_si(getattr(self, name), 3) for name in ("x", "y", "rise", "foot")}
         before, scale = bed.digiclay.shape, float(f"{self.scale:.7g}")
@@ -77,18 +77,18 @@ class Shaped(Action):
         )
 
 
-def _updated_bed(context: Any) -> Any:
+def _updated_bed(context: Context) -> Object:
     """Return the active bed, placed as Blender has evaluated it."""
     context.view_layer.update()
     return bed_of(context)
 
 
-def _others(context: Any, bed: Any) -> list[Any]:
+def _others(context: Context, bed: Object) -> list[Object]:
     """Return the selected objects with a surface that are no part of a bed."""
     return [thing for thing in context.selected_objects if thing != bed and shape_show.has_surface(thing)]
 
 
-def _not_two(context: Any) -> str:
+def _not_two(context: Context) -> str:
     """Not one other object with a surface is selected."""
     count = len(_others(context, bed_of(context)))
     if count > 1:
@@ -97,7 +97,7 @@ def _not_two(context: Any) -> str:
 
 
 @action("digiclay.shape_from_object", "Shape from Object", *NEEDS, _not_two, bases=(Shaped,))
-def show_object(operator: Any, context: Any) -> None:
+def show_object(operator: Operator, context: Context) -> None:
     """Display the upper side of another selected object on the active bed, driving the pins there"""
     bed = _updated_bed(context)
     (thing,) = _others(context, bed)
@@ -117,7 +117,7 @@ def show_object(operator: Any, context: Any) -> None:
         items=[("auto", "Automatic", ""), *((unit, unit, "") for unit in LENGTHS)],
     ),
 )  # fmt: skip
-def show_file(operator: Any, context: Any) -> None:
+def show_file(operator: Operator, context: Context) -> None:
     """Display a mesh, a picture (bright is high) or a .npy file of heights on the active bed"""
     bed, path = _updated_bed(context), str(Path(bpy.path.abspath(operator.filepath)))
     shape = operator.shape(path, bed, up=operator.up, unit=operator.unit)
@@ -128,14 +128,14 @@ def show_file(operator: Any, context: Any) -> None:
     "digiclay.shape_sample", "Sample Shape", *NEEDS, bases=(Shaped,),
     sample=choice("Shape", items=[(name, title(name), "") for name in list_shapes()]),
 )  # fmt: skip
-def show_sample(operator: Any, context: Any) -> None:
+def show_sample(operator: Operator, context: Context) -> None:
     """Display a sample shape of Digital Clay on the active bed"""
     bed = _updated_bed(context)
     operator.tell(bed, *shape_show.show_file(bed, operator.shape(operator.sample, bed)))
 
 
 @action("digiclay.shape_keep", "Keep Formed as Shape", cannot_form, session_runs, options=("UNDO",))
-def keep_shape(operator: Any, context: Any) -> None:
+def keep_shape(operator: Operator, context: Context) -> None:
     """Make the formed surface the bed's shape: sessions begin with it, elastic and viscous beds keep to it"""
     bed = bed_of(context)
     scene = properties.scene_of(bed)
@@ -147,7 +147,7 @@ def keep_shape(operator: Any, context: Any) -> None:
 
 
 @action("digiclay.shape_remove", "Remove Shape", cannot_change, session_runs, no_shape, options=("UNDO",))
-def remove_shape(operator: Any, context: Any) -> None:
+def remove_shape(operator: Operator, context: Context) -> None:
     """Remove the bed's shape: sessions begin at rest; the formed surface stays until then"""
     settings = bed_of(context).digiclay
     settings.use_shape = False

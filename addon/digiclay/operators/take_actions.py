@@ -4,12 +4,11 @@ import time
 from collections.abc import Generator, Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from .. import bridge, preferences
-from ..compat import bpy
+from ..compat import Context, Event, Object, Operator, bpy
 from ..core.base.errors import DigiclayError
 from ..core.engine.simulation import begin
 from ..core.engine.state import State
@@ -48,7 +47,7 @@ TAKE = text("Take", "Number of the take; empty: the last one")
 
 
 @action("digiclay.take_record", "Record Take", cannot_record)
-def record_take(operator: Any, context: Any) -> None:
+def record_take(operator: Operator, context: Context) -> None:
     """Record the fingertip's path from now on, to replay, bake or export it"""
     session = running.find(bed_of(context))
     assert session is not None  # by the poll
@@ -59,7 +58,7 @@ def record_take(operator: Any, context: Any) -> None:
     "digiclay.take_keep", "Keep Take", no_recording,
     name=text("Name", "Name of the take; empty: its number", maxlen=60),
 )  # fmt: skip
-def keep_take(operator: Any, context: Any) -> set[str] | None:
+def keep_take(operator: Operator, context: Context) -> set[str] | None:
     """Stop recording and keep the take in this file"""
     handlers.clear_recovery()
     bed = bed_of(context)
@@ -87,7 +86,7 @@ class ExportTake(FileAction, bpy.types.Operator):
     filepath: bpy.props.StringProperty(subtype="FILE_PATH")
     filter_glob: bpy.props.StringProperty(default="*.toml", options={"HIDDEN"})
 
-    def invoke(self, context: Any, event: Any) -> set[str]:
+    def invoke(self, context: Context, event: Event) -> set[str]:
         """Open the file browser, with the name of the take."""
         try:
             name = takes.find(bed_of(context), self.take).name
@@ -96,7 +95,7 @@ class ExportTake(FileAction, bpy.types.Operator):
         self.filepath = bpy.path.clean_name(name) + ".toml"
         return super().invoke(context, event)
 
-    def perform(self, context: Any) -> None:
+    def perform(self, context: Context) -> None:
         entry = takes.find(bed_of(context), self.take)
         take = takes.read(bed_of(context), entry.number)
         # A point in the name is not where an ending begins: "ridge 1.5" is no "ridge 1".
@@ -111,7 +110,7 @@ class ExportTake(FileAction, bpy.types.Operator):
 
 
 @action("digiclay.take_remove", "Remove Take", cannot_change, no_take, take=TAKE)
-def remove_take(operator: Any, context: Any) -> None:
+def remove_take(operator: Operator, context: Context) -> None:
     """Remove a take"""
     takes.remove(bed_of(context), takes.find(bed_of(context), operator.take).number)
 
@@ -120,7 +119,7 @@ def remove_take(operator: Any, context: Any) -> None:
     "digiclay.play_strokes", "Play Strokes", cannot_form, session_runs, baked, bases=(FileAction,),
     **file_of("*.toml"),
 )  # fmt: skip
-def play(operator: Any, context: Any) -> None:
+def play(operator: Operator, context: Context) -> None:
     """Form recorded strokes of the Press tool on the bed, from a file, as fast as they can be simulated"""
     recorded = read_strokes(Path(bpy.path.abspath(operator.filepath)))
     bed = bed_of(context)
@@ -136,7 +135,7 @@ def play(operator: Any, context: Any) -> None:
     operator.report({"INFO"}, localize("{}: {} strokes", recorded.name, len(recorded.strokes)))
 
 
-def read_fitting_take(bed: Any, number: str) -> Take:
+def read_fitting_take(bed: Object, number: str) -> Take:
     """Return a take of a bed; DigiclayError for one of another layout."""
     take = takes.read(bed, number)
     plan = take.scene.layout
@@ -169,18 +168,18 @@ class ReplayTake(TimedAction, bpy.types.Operator):
         max=MOST_PARTS,
     )
 
-    def perform(self, context: Any) -> None:
+    def perform(self, context: Context) -> None:
         """Play it without showing anything but its end."""
         self._begin(context)
         for moment in self._states:
             (self._system, self._state), self._at = moment, self._at + 1
         self._finish(context)
 
-    def prepare(self, context: Any, event: Any) -> None:
+    def prepare(self, context: Context, event: Event) -> None:
         self._begin(context)
         self.interval = 1.0 / preferences.get(context).redraw_rate
 
-    def modal(self, context: Any, event: Any) -> set[str]:
+    def modal(self, context: Context, event: Event) -> set[str]:
         """Continue by the wall clock."""
         if event.type == "ESC" and event.value == "PRESS":
             return self._restore(context)
@@ -208,16 +207,16 @@ class ReplayTake(TimedAction, bpy.types.Operator):
         show_status(context, localize("Replay: {:.1f} of {:.1f} s     Esc: stop", seconds, whole))
         return {"PASS_THROUGH"}
 
-    def cancel(self, context: Any) -> None:
+    def cancel(self, context: Context) -> None:
         """Give back what the replay needs of Blender, and the states to come."""
         self._states = iter(())
         super().cancel(context)
 
-    def give_up(self, context: Any, words: str) -> None:
+    def give_up(self, context: Context, words: str) -> None:
         """Show the bed as it was before."""
         self._restore(context)
 
-    def _begin(self, context: Any) -> None:
+    def _begin(self, context: Context) -> None:
         """Read the take and put everything to its start."""
         bed = bed_of(context)
         self._uid = bed.session_uid
@@ -229,12 +228,12 @@ class ReplayTake(TimedAction, bpy.types.Operator):
         self._system, self._state = next(self._states)
         self._clock, self._at = Clock(), 0
 
-    def _place(self, bed: Any) -> None:
+    def _place(self, bed: Object) -> None:
         """Put the fingertips to where the take has them; one that is animated follows its animation."""
         fingers = find_ellipsoids(self._take.scene)
         bridge.place_fingertips(bed, self._take.poses[self._at], fingers, self._numbers)
 
-    def _finish(self, context: Any) -> set[str]:
+    def _finish(self, context: Context) -> set[str]:
         """Leave the bed in the final state of the take, and report the comparison."""
         bed, system = bed_of(context), self._system
         state = snapshot.dump(system, self._state)
@@ -267,7 +266,7 @@ class ReplayTake(TimedAction, bpy.types.Operator):
             self.report({"INFO"}, localize("Replayed {}: {}", seconds, words))
         return {"FINISHED"}
 
-    def _restore(self, context: Any) -> set[str]:
+    def _restore(self, context: Context) -> set[str]:
         """Show the bed as it was before."""
         self.cancel(context)
         bed = next((thing for thing in bpy.data.objects if thing.session_uid == self._uid), None)
@@ -314,11 +313,11 @@ class Bake(TimedAction, bpy.types.Operator):
     first: integer("First Frame", "First frame of the session", default=1)
     last: integer("Last Frame", "Last frame of the session; a take has its own length", default=250)
 
-    def perform(self, context: Any) -> None:
+    def perform(self, context: Context) -> None:
         for _ in self.work(context):
             pass
 
-    def prepare(self, context: Any, event: Any) -> None:
+    def prepare(self, context: Context, event: Event) -> None:
         """Take the scene's frames where none are asked for; work goes on while Blender draws."""
         if not self.properties.is_property_set("first"):
             self.first = context.scene.frame_start
@@ -326,11 +325,11 @@ class Bake(TimedAction, bpy.types.Operator):
             self.last = context.scene.frame_end
         self._steps = self.work(context)
 
-    def borrow(self, context: Any) -> None:
+    def borrow(self, context: Context) -> None:
         super().borrow(context)
         context.window_manager.progress_begin(0.0, 100.0)
 
-    def modal(self, context: Any, event: Any) -> set[str]:
+    def modal(self, context: Context, event: Event) -> set[str]:
         """Work for a moment, unless the user has had enough."""
         if event.type == "ESC" and event.value == "PRESS":
             self.cancel(context)
@@ -350,13 +349,13 @@ class Bake(TimedAction, bpy.types.Operator):
         show_status(context, localize("{}: {:.0f} %     Esc: stop", localize(self.bl_label), 100.0 * share))
         return {"RUNNING_MODAL"}
 
-    def cancel(self, context: Any) -> None:
+    def cancel(self, context: Context) -> None:
         """Take back what shows the progress."""
         self._steps.close()
         context.window_manager.progress_end()
         super().cancel(context)
 
-    def work(self, context: Any) -> Generator[float, None, None]:
+    def work(self, context: Context) -> Generator[float, None, None]:
         """Read the path, simulate it and write the bake, which Esc leaves out; yield the share done."""
         bed, scene = bed_of(context), context.scene
         recorded = self.source == "TAKE"
@@ -389,6 +388,6 @@ class Bake(TimedAction, bpy.types.Operator):
 
 
 @action("digiclay.bake_free", "Free Bake", cannot_change, no_bake)
-def free_bake(operator: Any, context: Any) -> None:
+def free_bake(operator: Operator, context: Context) -> None:
     """Remove the bake: the bed shows its own state again. Keyframes of the fingertip stay"""
     bake.free(bed_of(context))

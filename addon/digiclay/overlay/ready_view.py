@@ -1,12 +1,11 @@
 """3D view in use: found, turned so that all of a bed is seen in it, and lit so that its relief is."""
 
 from collections.abc import Iterable
-from typing import Any
 
 import numpy as np
 
 from .. import preferences
-from ..compat import bpy
+from ..compat import Area, Context, Matrix, Object, Region, bpy
 from ..core.base.arrays import Floats
 from ..device import detail, view
 from ..roles import BALL, fingertips_of
@@ -28,7 +27,7 @@ RELIEF = {"light": "MATCAP", "studio_light": "basic_side.exr", "show_cavity": Tr
 LIT = "digiclay_lit"
 
 
-def find_view(context: Any) -> tuple[Any, Any] | None:
+def find_view(context: Context) -> tuple[Area, Region] | None:
     """Return area and region of the 3D view in use: the context's, or the first of its window."""
     window = None if bpy.app.background else context.window
     areas = [context.area, *(window.screen.areas if window is not None else ())]
@@ -36,7 +35,7 @@ def find_view(context: Any) -> tuple[Any, Any] | None:
     return area and (area, next(region for region in area.regions if region.type == "WINDOW"))
 
 
-def light(context: Any) -> None:
+def light(context: Context) -> None:
     """Light the 3D view in use for reliefs, once a screen, unless its shading was changed."""
     shown, screen = find_view(context), context.screen
     if shown is None or screen is None or not preferences.get(context).light_relief or screen.get(LIT):
@@ -49,7 +48,7 @@ def light(context: Any) -> None:
         screen[LIT] = True
 
 
-def frame(context: Any, bed: Any) -> None:
+def frame(context: Context, bed: Object) -> None:
     """Move the 3D view in use so that it shows a bed and its fingertip whole, beside sidebar and overlay."""
     shown = find_view(context)
     if shown is None or not shown[1].data:  # in background mode
@@ -84,7 +83,7 @@ def frame(context: Any, bed: Any) -> None:
     detail.follow()
 
 
-def reveal(context: Any, bed: Any, things: Iterable[Any]) -> None:
+def reveal(context: Context, bed: Object, things: Iterable[Object]) -> None:
     """Show a bed whole, as `frame` does, if some of what has meshes there is not in the view in use."""
     shown = find_view(context)
     if shown is None or not shown[1].data or shown[1].data.view_perspective == "CAMERA":
@@ -99,7 +98,7 @@ def reveal(context: Any, bed: Any, things: Iterable[Any]) -> None:
         frame(context, bed)
 
 
-def _find_room(context: Any, bed: Any, area: Any, region: Any, sidebar: float = 0.0) -> Floats:
+def _find_room(context: Context, bed: Object, area: Area, region: Region, sidebar: float = 0.0) -> Floats:
     """Return the free part of a view and the overlay's box in it, (2, 2, 2), pixels, beside a `sidebar`."""
     room = find_free_room(area, region, {"UI": sidebar * context.preferences.system.ui_scale})
     return np.reshape([room, find_taken(context, bed, room)], (2, 2, 2))
@@ -142,7 +141,7 @@ def place_eye(points: Floats, lens: Floats, room: Floats, parallel: bool, farthe
     return np.array([*np.clip(middle, least - high * z / lens, most - low * z / lens), z])
 
 
-def _list_corners(things: list[tuple[Any, Any]]) -> Floats:
+def _list_corners(things: list[tuple[Object, Matrix]]) -> Floats:
     """Return the corners (k, 3) of the boxes about shapes of placed objects, world."""
     boxes = []
     for shape, placed in things:
@@ -152,12 +151,12 @@ def _list_corners(things: list[tuple[Any, Any]]) -> Floats:
     return np.concatenate(boxes)
 
 
-def _list_points(thing: Any) -> Floats:
+def _list_points(thing: Object) -> Floats:
     """Return the points (k, 3) of an object's mesh."""
     return np.array([vertex.co for vertex in thing.data.vertices])
 
 
-def _place(points: Floats, placed: Any) -> Floats:
+def _place(points: Floats, placed: Matrix) -> Floats:
     """Return points (k, 3) of an object, world."""
     matrix = np.array(placed.matrix_world)
     return np.asarray(points @ matrix[:3, :3].T + matrix[:3, 3])

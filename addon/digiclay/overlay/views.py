@@ -14,7 +14,7 @@ import numpy as np
 
 from .. import preferences
 from ..bridge import project
-from ..compat import bpy
+from ..compat import Area, Context, Object, Region, bpy
 from ..core.base.modes import COLORS, Mode
 from ..core.model.control_interface import find_set_point
 from ..core.session.recent_trace import exceeds_law
@@ -82,7 +82,7 @@ def _again() -> float:
 
 
 def read_session(
-    bed: Any, session: running.Running, colors: dict[Mode, tuple[float, float, float]]
+    bed: Object, session: running.Running, colors: dict[Mode, tuple[float, float, float]]
 ) -> Readings:
     """Return the content of the overlay for a bed and its session."""
     trace, scene = session.trace, session.scene
@@ -116,26 +116,26 @@ def _list_numbers(session: running.Running) -> tuple[int, ...]:
     return session.numbers if len(session.numbers) > 1 else ()
 
 
-def _beds() -> list[Any]:
+def _beds() -> list[Object]:
     """Return the beds with a running session; fetched anew each time, since undo invalidates them."""
     uids = {session.uid for session in running.list_sessions()}
     return [thing for thing in bpy.data.objects if thing.session_uid in uids] if uids else []
 
 
-def _is_wanted(bed: Any) -> bool:
+def _is_wanted(bed: Object) -> bool:
     """Return whether the overlay is enabled for a bed."""
     display = getattr(bed, "digiclay_display", None)
     return display is not None and bool(display.overlay)
 
 
-def _choose_bed(context: Any) -> Any | None:
+def _choose_bed(context: Context) -> Object | None:
     """Return the bed of a view's overlay: the active one, or the first one in the view's scene."""
     beds = [bed for bed in _beds() if _is_wanted(bed) and bed.name in context.scene.objects]
     active = bed_of(context)
     return active if active in beds else beds[0] if beds else None
 
 
-def find_free_room(area: Any, region: Any, closed: Mapping[str, float] = MappingProxyType({})) -> Room:
+def find_free_room(area: Area, region: Region, closed: Mapping[str, float] = MappingProxyType({})) -> Room:
     """Return the part of a view, pixels, that toolbar, sidebar and headers leave free.
 
     `closed`: how wide or high regions are to be taken that are closed, by their types.
@@ -153,7 +153,7 @@ def find_free_room(area: Any, region: Any, closed: Mapping[str, float] = Mapping
     return find_room(region.width, region.height, covered)
 
 
-def find_taken(context: Any, bed: Any, room: Room) -> Room:
+def find_taken(context: Context, bed: Object, room: Room) -> Room:
     """Return what the overlay of a bed takes of a room, pixels, as soon as it tells all fingertips."""
     scale, corner = context.preferences.system.ui_scale, preferences.get(context).overlay_corner
     session, numbers = running.find(bed), tuple(fingertips_of(bed))
@@ -193,7 +193,7 @@ def _draw() -> None:
 
 
 def _mark(
-    context: Any, bed: Any, session: running.Running, colors: Look, picture: Picture, scale: float
+    context: Context, bed: Object, session: running.Running, colors: Look, picture: Picture, scale: float
 ) -> None:
     """Add dots on picked pins in the colors of their curves, and numbered ones beside several fingertips.
 

@@ -4,7 +4,7 @@ import textwrap
 from collections.abc import Callable
 from typing import Any
 
-from ..compat import bpy
+from ..compat import Context, Menu, UILayout, bpy, bpy_struct
 from ..roles import bed_of
 
 CATEGORY = "Digital Clay"
@@ -27,13 +27,13 @@ class Panel:
     with_bed = True
 
     @classmethod
-    def poll(cls, context: Any) -> bool:
+    def poll(cls, context: Context) -> bool:
         """Show the panel when there is a bed it can be about, or one of none when there is none."""
         return (bed_of(context) is not None) == cls.with_bed
 
 
 def declare(
-    bases: tuple[type, ...], method: str, idname: str, label: str, **entries: Any
+    bases: tuple[type, ...], method: str, idname: str, label: str, **entries: Menu
 ) -> Callable[[Callable[..., Any]], Any]:
     """Return a decorator that makes a class for Blender of its one method, the docstring included."""
 
@@ -46,7 +46,7 @@ def declare(
 
 def panel(
     idname: str, label: str, order: int, *, parent: str = "", closed: bool = True, with_bed: bool = True
-) -> Callable[[Callable[[Any, Any], None]], Any]:
+) -> Callable[[Callable[[bpy.types.Panel, Context], None]], Any]:
     """Return a decorator that makes a panel of its `draw`, a sub-panel of `parent` if that is given."""
 
     return declare(
@@ -61,12 +61,12 @@ def panel(
     )
 
 
-def menu(idname: str, label: str) -> Callable[[Callable[[Any, Any], None]], Any]:
+def menu(idname: str, label: str) -> Callable[[Callable[[Menu, Context], None]], Any]:
     """Return a decorator that makes a menu of its `draw`."""
     return declare((bpy.types.Menu,), "draw", idname, label)
 
 
-def draw_lines(layout: Any, words: str, icon: str) -> None:
+def draw_lines(layout: UILayout, words: str, icon: str) -> None:
     """Draw words on as many lines as they need."""
     column = layout.column(align=True)
     column.scale_y = 0.8
@@ -74,7 +74,9 @@ def draw_lines(layout: Any, words: str, icon: str) -> None:
         column.label(text=line, icon=icon if number == 0 else "BLANK1")
 
 
-def draw_property(layout: Any, owner: Any, name: str, active: bool = True, expand: bool = False) -> None:
+def draw_property(
+    layout: UILayout, owner: bpy_struct, name: str, active: bool = True, expand: bool = False
+) -> None:
     """Draw a property in a row of its own; a number's label in its field: beside it the unit is cut off."""
     row = layout.row(align=True)
     row.active = active

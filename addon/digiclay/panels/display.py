@@ -8,7 +8,7 @@ them there, so that there is one place they stand in.
 from collections.abc import Callable
 from typing import Any
 
-from ..compat import bpy
+from ..compat import Context, Object, bpy
 from ..core.base.errors import DigiclayError
 from ..core.scene.assembly import assemble
 from ..core.session import snapshot
@@ -41,7 +41,7 @@ SKINS = (
 )
 
 
-def _write_forces(bed: Any) -> None:
+def _write_forces(bed: Object) -> None:
     """Write the forces, which nothing drew until now; those stored last where no session runs."""
     session, stored = running.find(bed), beds.read_snapshot(bed)
     try:
@@ -67,17 +67,17 @@ def _in_nodes(
     return {"get": lambda display: view.read_setting(display.id_data, name, default), "set": put}
 
 
-def _color(bed: Any, code: int) -> None:
+def _color(bed: Object, code: int) -> None:
     view.color_by(bed, COLORINGS[code][0])
     _write_forces(bed)
 
 
-def _arrows(bed: Any, on: bool) -> None:
+def _arrows(bed: Object, on: bool) -> None:
     view.show_arrows(bed, on)
     _write_forces(bed)
 
 
-def show_details(display: Any, context: Any) -> None:
+def show_details(display: Any, context: Context) -> None:
     """Show the bed beside the overlay, which is larger now."""
     views.follow()
     bed = display.id_data
@@ -168,7 +168,7 @@ class Display(bpy.types.PropertyGroup):
 
 
 @panel("DIGICLAY_PT_show", "Show", 20, closed=False)
-def show(sidebar: Any, context: Any) -> None:
+def show(sidebar: bpy.types.Panel, context: Context) -> None:
     """What is seen of the bed."""
     bed, layout = bed_of(context), sidebar.layout
     layout.enabled = not is_edited(context)
@@ -182,7 +182,7 @@ def show(sidebar: Any, context: Any) -> None:
 
 
 @panel("DIGICLAY_PT_display", "View Details", 0, parent=LABORATORY)
-def details(sidebar: Any, context: Any) -> None:
+def details(sidebar: bpy.types.Panel, context: Context) -> None:
     """Skin, colors and arrows of the bed, details of the overlay; a disabled item takes no time."""
     bed, layout = bed_of(context), sidebar.layout
     layout.enabled = not is_edited(context)

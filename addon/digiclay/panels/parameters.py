@@ -1,8 +1,6 @@
 """Panels Device and Control: presets, method, and a sub-panel of parameters for each part."""
 
-from typing import Any
-
-from ..compat import bpy
+from ..compat import Context, Menu, PropertyGroup, bpy
 from ..core.base.quantity import list_quantities
 from ..core.control.methods import list_methods
 from ..core.scene.schema import NEEDS, OPTIONAL, SECTIONS, import_parameters
@@ -22,7 +20,7 @@ BESIDE = {"ENUM", "STRING"}
 
 
 @panel("DIGICLAY_PT_start", "Digital Clay", 0, closed=False, with_bed=False)
-def start(sidebar: Any, context: Any) -> None:
+def start(sidebar: bpy.types.Panel, context: Context) -> None:
     """Content of the tab without an active bed: how to add one."""
     column = sidebar.layout.column()
     column.label(text="Select a bed or its fingertip,")
@@ -32,7 +30,7 @@ def start(sidebar: Any, context: Any) -> None:
 
 
 @menu("DIGICLAY_MT_presets", "Presets")
-def presets(entries: Any, context: Any) -> None:
+def presets(entries: Menu, context: Context) -> None:
     """Presets of the core and of the user."""
     for name in PRESETS:
         entries.layout.operator("digiclay.preset_apply", text=title(name)).preset = name
@@ -44,7 +42,7 @@ def presets(entries: Any, context: Any) -> None:
 
 
 @panel("DIGICLAY_PT_device", "Device", 2, parent=LABORATORY)
-def device(sidebar: Any, context: Any) -> None:
+def device(sidebar: bpy.types.Panel, context: Context) -> None:
     """Type of device."""
     bed = bed_of(context)
     settings = bed.digiclay
@@ -61,7 +59,7 @@ def device(sidebar: Any, context: Any) -> None:
 
 
 @panel("DIGICLAY_PT_control", "Control", 3, parent=LABORATORY)
-def control(sidebar: Any, context: Any) -> None:
+def control(sidebar: bpy.types.Panel, context: Context) -> None:
     """Control of the cells."""
     settings = bed_of(context).digiclay
     row = sidebar.layout.row()
@@ -85,7 +83,7 @@ def section_panel(section: str, parent: str, order: int, words: str = "") -> typ
         bl_options = {"DEFAULT_CLOSED"}
 
         @classmethod
-        def poll(cls, context: Any) -> bool:
+        def poll(cls, context: Context) -> bool:
             """Show a blister only where the method forms one, and parameters of a method that is known."""
             bed = bed_of(context)
             if bed is None or section not in ("blister", "control"):
@@ -93,12 +91,12 @@ def section_panel(section: str, parent: str, order: int, words: str = "") -> typ
             method = list_methods().get(method_of(bed.digiclay))
             return method is not None and (section == "control" or method.blister is not None)
 
-        def draw_header(self, context: Any) -> None:
+        def draw_header(self, context: Context) -> None:
             self.layout.enabled = not is_edited(context)
             if section in OPTIONAL:
                 self.layout.prop(bed_of(context).digiclay, f"use_{section}", text="")
 
-        def draw(self, context: Any) -> None:
+        def draw(self, context: Context) -> None:
             settings = bed_of(context).digiclay
             column = self.layout.column(align=True)
             column.active, column.enabled = in_use(settings, section), not is_edited(context)
@@ -119,7 +117,7 @@ def section_panel(section: str, parent: str, order: int, words: str = "") -> typ
     return Section
 
 
-def in_use(settings: Any, section: str) -> bool:
+def in_use(settings: PropertyGroup, section: str) -> bool:
     """Return whether a part is simulated: neither it nor the one it belongs to is switched off."""
     needed = NEEDS.get(section)
     switches = [name for name in (section, needed) if name in OPTIONAL]

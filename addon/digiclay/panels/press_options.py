@@ -4,17 +4,17 @@ from collections.abc import Callable
 from functools import wraps
 from typing import Any
 
-from ..compat import bpy
+from ..compat import Context, OperatorProperties, UILayout, bpy
 from ..press.brush import tool_settings
 from ..press.tool import draw_presets
 from .base import declare
 
 
-def popover(idname: str, label: str) -> Callable[[Callable[[Any, Any], None]], Any]:
+def popover(idname: str, label: str) -> Callable[[Callable[[UILayout, Context], None]], Any]:
     """Return a decorator that makes a panel, opened from the tool's header, of what draws its settings."""
 
-    def make(draw_settings: Callable[[Any, Any], None]) -> Any:
-        def draw(panel: Any, context: Any) -> None:
+    def make(draw_settings: Callable[[UILayout, Context], None]) -> Any:
+        def draw(panel: bpy.types.Panel, context: Context) -> None:
             panel.layout.use_property_split = True
             panel.layout.use_property_decorate = False
             settings = tool_settings(context)
@@ -36,7 +36,7 @@ def popover(idname: str, label: str) -> Callable[[Callable[[Any, Any], None]], A
 
 
 @popover("DIGICLAY_PT_press_stroke", "Stroke")
-def stroke_options(column: Any, settings: Any) -> None:
+def stroke_options(column: UILayout, settings: OperatorProperties) -> None:
     """Path, stabilizer and symmetry of a stroke."""
     draw_presets(column)  # a narrow header has them here alone
     column.prop(settings, "path")
@@ -58,7 +58,7 @@ def stroke_options(column: Any, settings: Any) -> None:
 
 
 @popover("DIGICLAY_PT_press_pen", "Pen")
-def pen_options(column: Any, settings: Any) -> None:
+def pen_options(column: UILayout, settings: OperatorProperties) -> None:
     """Effects of a pen's pressure and tilt."""
     column.prop(settings, "use_pressure")
     row = column.column()

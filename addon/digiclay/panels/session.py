@@ -1,7 +1,6 @@
 """Panels Session, Takes and Laboratory: start and stop, recordings, speed and error."""
 
-from typing import Any
-
+from ..compat import Context, UILayout, bpy
 from ..live import beds, follow
 from ..overlay.sections import effort_message, error_message
 from ..recorded import bake, takes
@@ -13,7 +12,7 @@ from .base import LABORATORY, SESSION, draw_lines, panel
 
 
 @panel(SESSION, "Session", 10, closed=False)
-def session_panel(sidebar: Any, context: Any) -> None:
+def session_panel(sidebar: bpy.types.Panel, context: Context) -> None:
     """Live sculpting."""
     bed = bed_of(context)
     session, column = running.find(bed), sidebar.layout.column(align=True)
@@ -44,7 +43,7 @@ def session_panel(sidebar: Any, context: Any) -> None:
         draw_lines(sidebar.layout, words, "ERROR" if session else "INFO")
 
 
-def _buttons(column: Any, session: Running) -> None:
+def _buttons(column: UILayout, session: Running) -> None:
     """Draw the buttons of a session."""
     row = column.row(align=True)
     row.scale_y = 1.4
@@ -58,7 +57,7 @@ def _buttons(column: Any, session: Running) -> None:
     column.operator("digiclay.session_rewind", text=words, icon="REW")
 
 
-def _numbers(layout: Any, session: Running) -> None:
+def _numbers(layout: UILayout, session: Running) -> None:
     """Draw how a session fares."""
     column = layout.column(align=True)
     period = session.system.period
@@ -83,7 +82,7 @@ def error_line(session: Running) -> str:
 
 
 @panel(LABORATORY, "Laboratory", 40)
-def laboratory(sidebar: Any, context: Any) -> None:
+def laboratory(sidebar: bpy.types.Panel, context: Context) -> None:
     """Single steps, speed and error of a session, and the server that it follows."""
     session, column = running.find(bed_of(context)), sidebar.layout.column(align=True)
     column.operator("digiclay.session_step", icon="FRAME_NEXT")
@@ -99,7 +98,7 @@ def laboratory(sidebar: Any, context: Any) -> None:
 
 
 @panel("DIGICLAY_PT_takes", "Takes", 1, parent=SESSION)
-def takes_panel(sidebar: Any, context: Any) -> None:
+def takes_panel(sidebar: bpy.types.Panel, context: Context) -> None:
     """Takes of the bed, and its bake."""
     layout, bed = sidebar.layout, bed_of(context)
     session = running.find(bed)

@@ -2,6 +2,7 @@
 
 from typing import Any
 
+from ..compat import Context, UILayout, bpy
 from ..exchange import formed_bed
 from ..roles import bed_of, is_edited
 from .base import EXPORT, SESSION, panel
@@ -13,7 +14,7 @@ MOST = 24
 
 
 @panel("DIGICLAY_PT_shapes", "Shapes", 0, parent=SESSION)
-def shapes(sidebar: Any, context: Any) -> None:
+def shapes(sidebar: bpy.types.Panel, context: Context) -> None:
     """Initial shape of the bed."""
     settings = bed_of(context).digiclay
     sidebar.layout.enabled = not is_edited(context)
@@ -31,7 +32,7 @@ def shapes(sidebar: Any, context: Any) -> None:
     column.operator("mesh.digital_clay_make", icon="OUTLINER_OB_MESH")
 
 
-def _draw_shape(layout: Any, shape: Any) -> None:
+def _draw_shape(layout: UILayout, shape: Any) -> None:
     """Draw what is displayed, and how the surface gets there."""
     box = layout.box()
     row = box.row()
@@ -46,7 +47,7 @@ def _draw_shape(layout: Any, shape: Any) -> None:
 
 
 @panel(EXPORT, "Export", 30, closed=False)
-def export(sidebar: Any, context: Any) -> None:
+def export(sidebar: bpy.types.Panel, context: Context) -> None:
     """Formed surface as meshes."""
     column = sidebar.layout.column(align=True)
     column.operator_menu_enum("mesh.digital_clay_make", "kind", text="Make Mesh", icon="MESH_DATA")
@@ -54,7 +55,7 @@ def export(sidebar: Any, context: Any) -> None:
 
 
 @panel("DIGICLAY_PT_features", "Features", 0, parent=EXPORT)
-def features(sidebar: Any, context: Any) -> None:
+def features(sidebar: bpy.types.Panel, context: Context) -> None:
     """List of bosses and creases, and the surface they are measured from."""
     bed, layout = bed_of(context), sidebar.layout
     column = layout.column(align=True)

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..bridge import SCALE
-from ..compat import bpy, quiet, strips, to_video
+from ..compat import Object, bpy, quiet, strips, to_video
 from ..core.base.arrays import Floats
 from ..core.base.errors import OutputError
 from ..core.base.modes import Mode
@@ -97,7 +97,7 @@ LOOKS = 24
 class Shots:
     """Frames of a film, which can be drawn in any order."""
 
-    scene: Any
+    scene: bpy.types.Scene
     #: Number of frames.
     count: int
     #: Changes the scene to what a frame shows, by its number from 0.
@@ -164,7 +164,7 @@ def stage_turntable(instant: Instant, looks: Turntable) -> Iterator[Shots]:
 
 
 def _visible_points(
-    bed: Any, history: Mapping[str, NDArray[Any]], rows: NDArray[np.intp], sizes: Mapping[str, Any]
+    bed: Object, history: Mapping[str, NDArray[Any]], rows: NDArray[np.intp], sizes: Mapping[str, Any]
 ) -> Floats:
     """Return what must be in the frame, (k, 3), Blender units: all pins, the fingertips that are near."""
     used = slice(int(rows[0]), int(rows[-1]) + 1)

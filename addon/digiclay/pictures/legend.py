@@ -12,7 +12,7 @@ import numpy as np
 
 from .. import bridge
 from ..bridge import linear
-from ..compat import bpy, shader_nodes
+from ..compat import Material, Object, bpy, shader_nodes
 from ..core.base.arrays import Floats
 from ..core.base.modes import MEANINGS, Mode
 from ..device import heat, palettes, primitives
@@ -38,8 +38,8 @@ class Front:
     """Plane in front of the camera, without shadow or shading."""
 
     #: Blender's.
-    scene: Any
-    camera: Any
+    scene: bpy.types.Scene
+    camera: Object
     #: Distance from the camera, Blender units.
     depth: float
     #: Half the picture's size there, Blender units.
@@ -47,7 +47,7 @@ class Front:
     height: float
 
     @classmethod
-    def before(cls, scene: Any, camera: Any, half: tuple[float, float]) -> Front:
+    def before(cls, scene: bpy.types.Scene, camera: Object, half: tuple[float, float]) -> Front:
         """Return the plane of a camera; `half` of the frame's width and height at depth 1."""
         depth = camera.data.clip_start * 20.0
         return cls(scene, camera, depth, half[0] * depth, half[1] * depth)
@@ -77,7 +77,7 @@ class Front:
         """Whether notes could be read."""
         return self.note >= READ_NOTE * self.pixel
 
-    def put(self, part: Any, x: float, y: float, color: Color, layer: float = 0) -> Any:
+    def put(self, part: Object, x: float, y: float, color: Color, layer: float = 0) -> Object:
         """Hang an object at a place of the plane; layers with a higher number lie behind."""
         behind = 1.0 + LAYER * layer
         part.parent = self.camera
@@ -89,7 +89,7 @@ class Front:
         self.scene.collection.objects.link(part)
         return part
 
-    def write(self, body: str, size: float, x: float, y: float, color: Color, align: str = "LEFT") -> Any:
+    def write(self, body: str, size: float, x: float, y: float, color: Color, align: str = "LEFT") -> Object:
         """Write a text at a place; return the object, whose `data.body` may be changed."""
         text = bpy.data.curves.new(body, "FONT")
         text.body, text.size, text.align_x = body, size, align
@@ -97,7 +97,7 @@ class Front:
 
     def box(
         self, name: str, low: tuple[float, float], high: tuple[float, float], color: Color, layer: int
-    ) -> Any:
+    ) -> Object:
         """Fill a rectangle from its lower left to its upper right corner; its origin is the lower left."""
         width, height = high[0] - low[0], high[1] - low[1]
         corners = np.array([[0.0, 0.0, 0.0], [width, 0, 0], [width, height, 0], [0, height, 0]])
@@ -146,7 +146,7 @@ def write_force_legend(front: Front) -> None:
         front.write(label, small, x, low + step * (level + (0.3 if level == 0 else 0.75)), FADED)
 
 
-def flat(name: str, color: Color) -> Any:
+def flat(name: str, color: Color) -> Material:
     """Make a material of one color that no light changes. `color` (float, float, float)."""
     material = bpy.data.materials.new(name)
     *light, alpha = linear(color)
@@ -180,10 +180,10 @@ class ForcePlot:
     #: What the force is called.
     called: str
     #: Objects that change from frame to frame, the first one for each curve.
-    been: Sequence[Any]
-    cursor: Any
-    force: Any
-    time: Any
+    been: Sequence[Object]
+    cursor: Object
+    force: Object
+    time: Object
     #: (k,), where each column stands, plane units, and.
     place: Floats
     #: (f, k), from where to where it reaches.

@@ -2,12 +2,11 @@
 
 import math
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
 from .. import bridge
-from ..compat import bpy, shader_nodes
+from ..compat import Object, bpy, shader_nodes
 from ..core.base.arrays import Floats
 from ..core.base.modes import Mode
 from ..device import parts, view
@@ -25,8 +24,8 @@ FLOOR = (0.80, 0.81, 0.82)
 
 
 def set_up(
-    scene: Any,
-    bed: Any,
+    scene: bpy.types.Scene,
+    bed: Object,
     instant: Instant,
     *,
     points: Floats | None = None,
@@ -60,7 +59,7 @@ def camera_place(points: Floats, axes: Floats, low: Floats, high: Floats) -> Flo
     return np.array([*offset, depth]) @ axes
 
 
-def outline(bed: Any) -> Floats:
+def outline(bed: Object) -> Floats:
     """Return points of housing, fingertip and pin tops, (k, 3), Blender units; the bed is at the origin."""
     clouds = []
     # The housing's shape is that of an object which stands in no scene: what it is drawn by is the bed.
@@ -79,7 +78,7 @@ def outline(bed: Any) -> Floats:
     return np.concatenate(clouds)
 
 
-def _camera(scene: Any, points: Floats, margins: Margins) -> Any:
+def _camera(scene: bpy.types.Scene, points: Floats, margins: Margins) -> Object:
     """Add the camera that frames the points."""
     data = bpy.data.cameras.new("Digital Clay Camera")
     data.lens, data.sensor_width, data.sensor_fit = LENS, SENSOR, "HORIZONTAL"
@@ -104,13 +103,13 @@ def _camera(scene: Any, points: Floats, margins: Margins) -> Any:
     return camera
 
 
-def half_frame(scene: Any) -> tuple[float, float]:
+def half_frame(scene: bpy.types.Scene) -> tuple[float, float]:
     """Return half the frame's width and height at depth 1."""
     width = SENSOR / 2 / LENS
     return width, width * scene.render.resolution_y / scene.render.resolution_x
 
 
-def _floor(scene: Any, height: float, size: float) -> None:
+def _floor(scene: bpy.types.Scene, height: float, size: float) -> None:
     """Add the plane the housing stands on."""
     square = np.array([[-size, -size], [size, -size], [size, size], [-size, size]])
     square = np.column_stack([square, np.full(4, height)])
@@ -119,7 +118,7 @@ def _floor(scene: Any, height: float, size: float) -> None:
     scene.collection.objects.link(bpy.data.objects.new(mesh.name, mesh))
 
 
-def _lights(scene: Any) -> None:
+def _lights(scene: bpy.types.Scene) -> None:
     """Light from the left and behind, low enough that slopes show; the sky fills the shadows."""
     data = bpy.data.lights.new("Digital Clay Sun", "SUN")
     data.energy, data.angle = 2.6, math.radians(5.0)

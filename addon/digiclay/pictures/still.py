@@ -5,9 +5,8 @@ import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any
 
-from ..compat import bpy, has_denoiser, quiet, scratch
+from ..compat import Object, PropertyGroup, View3DShading, bpy, has_denoiser, quiet, scratch
 from ..core.base.errors import OutputError
 from ..core.files.formats import is_whole_picture
 from ..core.files.run_folder import name_unfinished
@@ -33,7 +32,7 @@ def render_still(instant: Instant, out: Path, looks: Still) -> Path:
 @contextmanager
 def stage_bed(
     name: str, instant: Instant, looks: Picture, lowest: float | None = None
-) -> Iterator[tuple[Any, Any]]:
+) -> Iterator[tuple[bpy.types.Scene, Object]]:
     """Give a scene that draws pictures and a bed in it, for the block; `lowest` of the pins ever, m."""
     with scratch():
         scene = add_picture_scene(name, looks)
@@ -43,7 +42,7 @@ def stage_bed(
         yield scene, bed
 
 
-def render_picture(scene: Any, file: Path, out: Path) -> None:
+def render_picture(scene: bpy.types.Scene, file: Path, out: Path) -> None:
     """Draw a scene into a PNG file, whole or not at all; messages name `out`, which the user knows."""
     part = name_unfinished(file)
     scene.render.filepath = str(part)
@@ -70,7 +69,7 @@ def failure_reason(path: Path) -> str:
     return "no space is left on the disk" if full else "Blender wrote no whole file"
 
 
-def add_picture_scene(name: str, looks: Picture) -> Any:
+def add_picture_scene(name: str, looks: Picture) -> bpy.types.Scene:
     """Add a scene with all that decides a picture besides the scene's contents."""
     scene = bpy.data.scenes.new(name)
     render, engine = scene.render, looks.engine
@@ -90,7 +89,7 @@ def add_picture_scene(name: str, looks: Picture) -> Any:
     return scene
 
 
-def _cycles(cycles: Any, samples: int) -> None:
+def _cycles(cycles: PropertyGroup, samples: int) -> None:
     """Few samples, no surprises: the same picture each time, on any machine."""
     cycles.device = "CPU"
     cycles.samples = samples
@@ -106,7 +105,7 @@ def _cycles(cycles: Any, samples: int) -> None:
     cycles.caustics_reflective = cycles.caustics_refractive = False
 
 
-def _workbench(display: Any) -> None:
+def _workbench(display: View3DShading) -> None:
     """Plain colors, with shadows and edges that show slopes."""
     shading = display.shading
     display.render_aa = "16"

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from .. import bridge
 from ..bridge import SCALE
+from ..compat import Context, Matrix, Object, View3DShading
 from ..core.base.arrays import Floats
 from ..core.base.errors import DigiclayError
 from ..core.model.layout import Grid, make_grid
@@ -26,7 +26,7 @@ class Target:
     """Point on the pins of a bed."""
 
     #: Not to be kept: undo invalidates it.
-    bed: Any
+    bed: Object
     grid: Grid
     #: (n,), heights of the pin tops, m.
     height: Floats
@@ -39,13 +39,13 @@ class Target:
         return int(self.grid.at(self.point[:1], self.point[1:2])[0])
 
 
-def find_target(context: Any, xy: tuple[float, float]) -> Target | None:
+def find_target(context: Context, xy: tuple[float, float]) -> Target | None:
     """Return the nearest place on a bed that is seen under a pixel of the context's region."""
     target, hider = look_at(context, xy)
     return target if hider is None else None
 
 
-def look_at(context: Any, xy: tuple[float, float]) -> tuple[Target | None, Any | None]:
+def look_at(context: Context, xy: tuple[float, float]) -> tuple[Target | None, Object | None]:
     """Return the nearest place on a visible bed under a pixel, and the object that hides it there, if any."""
     target, nearest, eye = None, np.inf, np.zeros(3)
     for bed in context.visible_objects:
@@ -67,7 +67,7 @@ def look_at(context: Any, xy: tuple[float, float]) -> tuple[Target | None, Any |
     return target, find_hider(context, target.bed, _place(target.bed, eye), _place(target.bed, target.point))
 
 
-def read_surface(bed: Any) -> tuple[Grid, Floats]:
+def read_surface(bed: Object) -> tuple[Grid, Floats]:
     """Return where a bed's pins stand, and their heights (n,), m: of its session, or as they are drawn."""
     session = running.find(bed)
     if session is not None:
@@ -75,7 +75,9 @@ def read_surface(bed: Any) -> tuple[Grid, Floats]:
     return make_grid(properties.scene_of(bed).layout), bridge.read_cells(bed.data)["height"]
 
 
-def hit_point(context: Any, bed: Any, cells: Grid, height: Floats, xy: tuple[float, float]) -> Floats | None:
+def hit_point(
+    context: Context, bed: Object, cells: Grid, height: Floats, xy: tuple[float, float]
+) -> Floats | None:
     """Return where the ray through a pixel of the region meets pins of heights (n,), m; None if it misses."""
     origin, direction = _ray(context, bed, xy)
     first, last = shown_stretch(context, _place(bed, origin), _place(bed, origin + direction))
@@ -85,19 +87,19 @@ def hit_point(context: Any, bed: Any, cells: Grid, height: Floats, xy: tuple[flo
     return point if point is not None and (point - origin) @ direction <= last else None
 
 
-def find_view(context: Any, bed: Any) -> Floats:
+def find_view(context: Context, bed: Object) -> Floats:
     """Return right, up and towards the eye of the context's view in a bed's space, (3, 3), a column each."""
     seen = np.array(context.region_data.view_matrix @ bed.matrix_world, np.float64)[:3, :3].T
     return np.asarray(seen / np.linalg.norm(seen, axis=0))
 
 
-def _place(bed: Any, point: Floats) -> Floats:
+def _place(bed: Object, point: Floats) -> Floats:
     """Return where a point of a bed's space (3,), m, is in the world."""
     placed = np.array(bed.matrix_world, np.float64)
     return np.asarray(placed[:3, :3] @ (point * SCALE) + placed[:3, 3])
 
 
-def _ray(context: Any, bed: Any, xy: tuple[float, float]) -> tuple[Floats, Floats]:
+def _ray(context: Context, bed: Object, xy: tuple[float, float]) -> tuple[Floats, Floats]:
     """Return the ray through a pixel in the bed's space: origin, m, and direction of length 1."""
     bridge.uniform(bed)
     looking, region = context.region_data, context.region
@@ -116,7 +118,7 @@ OPEN = frozenset({"WIRE", "BOUNDS"})
 NEAR = 1e-6
 
 
-def shown_stretch(context: Any, start: Floats, end: Floats) -> tuple[float, float]:
+def shown_stretch(context: Context, start: Floats, end: Floats) -> tuple[float, float]:
     """Return the stretch of a ray that a view shows, 0 its start, 1 its end; first > last: nothing of it."""
     looking = context.region_data
     clip = np.array(looking.perspective_matrix, np.float64)
@@ -136,8 +138,12 @@ def shown_stretch(context: Any, start: Floats, end: Floats) -> tuple[float, floa
 
 
 def find_hider(
-    context: Any, bed: Any, start: Floats, end: Floats, surfaces: Iterable[tuple[Any, Any]] | None = None
-) -> Any | None:
+    context: Context,
+    bed: Object,
+    start: Floats,
+    end: Floats,
+    surfaces: Iterable[tuple[Object, Matrix]] | None = None,
+) -> Object | None:
     """Return the object that the 3D view shows in front of the end of a ray, (3,) in the world; or None."""
     if _shows_through(context.space_data.shading):
         return None
@@ -154,14 +160,14 @@ def find_hider(
     return None
 
 
-def _shows_through(shading: Any) -> bool:
+def _shows_through(shading: View3DShading) -> bool:
     """Return whether a view shows what lies behind surfaces, and so selects it too."""
     if shading.type == "WIREFRAME":
         return bool(shading.show_xray_wireframe)
     return bool(shading.type == "SOLID" and shading.show_xray)
 
 
-def list_surfaces(context: Any, bed: Any) -> Iterator[tuple[Any, Any]]:
+def list_surfaces(context: Context, bed: Object) -> Iterator[tuple[Object, Matrix]]:
     """Yield the objects that may hide a bed, and their places in the world."""
     graph, instancers = context.evaluated_depsgraph_get(), set()
     for thing in context.visible_objects:
@@ -180,7 +186,7 @@ def list_surfaces(context: Any, bed: Any) -> Iterator[tuple[Any, Any]]:
             yield instance.object if mesh else instance.object.original, instance.matrix_world
 
 
-def _hides(thing: Any) -> bool:
+def _hides(thing: Object) -> bool:
     """Return whether an object may have a surface, and is displayed with it."""
     if thing.type not in SOLID or thing.display_type in OPEN:
         return False
@@ -191,20 +197,20 @@ def _hides(thing: Any) -> bool:
     return bool(filled or curve.extrude or curve.bevel_depth or curve.bevel_object or thing.modifiers)
 
 
-def _belongs(thing: Any, bed: Any) -> bool:
+def _belongs(thing: Object, bed: Object) -> bool:
     """Return whether an object is a bed or a part of it; what a user has parented to it is none."""
     while thing is not None and thing != bed:
         thing = find_whole(thing) if ROLE in thing else None
     return thing is not None
 
 
-def _instances(thing: Any) -> bool:
+def _instances(thing: Object) -> bool:
     """Return whether an object may draw others as its instances."""
     makers = ("NODES", "PARTICLE_SYSTEM")
     return thing.instance_type != "NONE" or any(modifier.type in makers for modifier in thing.modifiers)
 
 
-def _meets(thing: Any, matrix: Any, start: Floats, way: Floats, reach: float) -> bool:
+def _meets(thing: Object, matrix: Matrix, start: Floats, way: Floats, reach: float) -> bool:
     """Return whether a ray in the world meets an object within a reach, in lengths of its way."""
     placed = np.array(matrix, np.float64)
     if not np.isfinite(placed).all() or abs(np.linalg.det(placed[:3, :3])) < np.finfo(np.float32).tiny:
@@ -230,16 +236,16 @@ BESIDE = "{} is at the 3D cursor and would hide the bed: it stands beside it"
 NOWHERE = "{} hides the bed, which stands at the 3D cursor: move or hide one of them"
 
 
-def find_free_place(context: Any, bed: Any) -> tuple[Floats, str]:
+def find_free_place(context: Context, bed: Object) -> tuple[Floats, str]:
     """Return where the middle of a new bed's underside goes (3,), world, and words if not the 3D cursor."""
     cursor, (low, high) = np.array(context.scene.cursor.location), _box(bed)
     # Only what reaches into the bed's own box moves it: what stands before it leaves as the view is turned.
     surfaces = [(thing, matrix, *_bounds(thing, matrix)) for thing, matrix in list_surfaces(context, bed)]
 
-    def overlapping(place: Floats) -> list[Any]:
+    def overlapping(place: Floats) -> list[tuple[Object, Matrix, Floats, Floats]]:
         return [row for row in surfaces if (row[2] < place + high).all() and (row[3] > place + low).all()]
 
-    def hider(place: Floats, among: list[Any]) -> Any:
+    def hider(place: Floats, among: list[tuple[Object, Matrix, Floats, Floats]]) -> Object | None:
         beds = [row[0] for row in overlapping(place) if is_bed(row[0])]
         return beds[0] if beds else _find_hider(context, bed, place, (low, high), [row[:2] for row in among])
 
@@ -261,22 +267,28 @@ def find_free_place(context: Any, bed: Any) -> tuple[Floats, str]:
     return cursor, localize(NOWHERE, hides.name)
 
 
-def _box(bed: Any) -> Floats:
+def _box(bed: Object) -> Floats:
     """Return the corners (2, 3) of a bed's housing and pins, from the middle of its underside."""
-    housing: Any = view.housing_of(bed)
+    housing: Object = view.housing_of(bed)
     points = np.array([thing.co for mesh in (housing.data, bed.data) for thing in mesh.vertices])
     corners = np.array([points.min(axis=0), points.max(axis=0)]) * np.array(bed.scale)
     return np.asarray(corners - [0.0, 0.0, corners[0, 2]])
 
 
-def _bounds(thing: Any, matrix: Any) -> Floats:
+def _bounds(thing: Object, matrix: Matrix) -> Floats:
     """Return the corners (2, 3) of the box about an object in the world."""
     placed = np.array(matrix, np.float64)
     corners = np.array(thing.bound_box) @ placed[:3, :3].T + placed[:3, 3]
     return np.array([corners.min(axis=0), corners.max(axis=0)])
 
 
-def _find_hider(context: Any, bed: Any, place: Floats, box: Any, surfaces: list[Any]) -> Any | None:
+def _find_hider(
+    context: Context,
+    bed: Object,
+    place: Floats,
+    box: tuple[Floats, Floats],
+    surfaces: list[tuple[Object, Matrix]],
+) -> Object | None:
     """Return the object that hides more of the pins of a bed at a place than may be; None without."""
     (left, front, _), (right, back, top) = box
     eye, hiders = context.region_data.view_matrix.inverted(), []

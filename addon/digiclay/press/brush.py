@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ..compat import bpy
+from ..compat import Context, Event, Object, OperatorProperties, bpy
 from ..core.model.fingertip import Fingertip
 from ..core.shapes.fitting import list_shapes
 from ..core.shapes.heightmap import HeightMap
@@ -92,25 +92,25 @@ SYMMETRY_ITEMS = (
 PLACED, SHORT = ("symmetry", "center_x", "center_y", "axis"), 1e-3
 
 
-def find_images(settings: Any) -> tuple[Image, ...]:
+def find_images(settings: OperatorProperties) -> tuple[Image, ...]:
     """Return a stroke's path and its images, by the settings of the tool."""
     center = 1e-3 * settings.center_x, 1e-3 * settings.center_y
     return make_images(settings.symmetry, settings.radial, center, settings.axis)
 
 
-def read_center(settings: Any) -> dict[str, Any]:
+def read_center(settings: OperatorProperties) -> dict[str, Any]:
     """Return the settings that `put_center` and `turn_axis` change."""
     return {name: getattr(settings, name) for name in PLACED}
 
 
-def put_center(settings: Any, x: float, y: float) -> None:
+def put_center(settings: OperatorProperties, x: float, y: float) -> None:
     """Place the center of symmetry, m; without symmetry from now on with one axis."""
     settings.center_x, settings.center_y = 1e3 * x, 1e3 * y
     if settings.symmetry == "NONE":
         settings.symmetry = "X"
 
 
-def turn_axis(settings: Any, x: float, y: float) -> None:
+def turn_axis(settings: OperatorProperties, x: float, y: float) -> None:
     """Turn the first axis of symmetry into a direction."""
     if math.hypot(x, y) >= SHORT:
         upright = math.pi / 2.0 if settings.symmetry == "X" else 0.0
@@ -130,18 +130,18 @@ PATH_ITEMS = (
 )
 
 
-def tool_settings(context: Any) -> Any | None:
+def tool_settings(context: Context) -> OperatorProperties | None:
     """Return the settings of the Press tool, or None while another tool is in use."""
     tool = context.workspace.tools.from_space_view3d_mode("OBJECT", create=False)
     return tool.operator_properties(OPERATOR) if tool is not None and tool.idname == TOOL else None
 
 
-def find_bed(context: Any, uid: int) -> Any | None:
+def find_bed(context: Context, uid: int) -> Object | None:
     """Return the bed of a `session_uid`, fetched anew, since undo invalidates what is kept."""
     return next((thing for thing in context.scene.objects if thing.session_uid == uid), None)
 
 
-def bed_in_use(context: Any) -> Any | None:
+def bed_in_use(context: Context) -> Object | None:
     """Return the bed that the tool's settings are about: active, in a session, or the only one seen."""
     active = beds.active_session(context)
     bed = bed_of(context) or (active and active[0])
@@ -151,25 +151,25 @@ def bed_in_use(context: Any) -> Any | None:
     return seen[0] if len(seen) == 1 else None
 
 
-def choose_brush(name: str, event: Any) -> Brush:
+def choose_brush(name: str, event: Event) -> Brush:
     """Return the brush of a stroke that an event begins: Shift smooths, Ctrl inverts the tool's brush."""
     brush = Brush.SMOOTH if event.shift else Brush(name)
     return brush.inverse if event.ctrl else brush
 
 
-def find_press(context: Any, event: Any) -> tuple[int, int]:
+def find_press(context: Context, event: Event) -> tuple[int, int]:
     """Return where the mouse went down, pixels of the region; a CLICK_DRAG comes from a place further on."""
     if event.value != "CLICK_DRAG":
         return event.mouse_region_x, event.mouse_region_y
     return event.mouse_prev_press_x - context.region.x, event.mouse_prev_press_y - context.region.y
 
 
-def find_path(settings: Any, brush: Brush) -> str:
+def find_path(settings: OperatorProperties, brush: Brush) -> str:
     """Return the path of a stroke: that of the settings, or STAMP."""
     return "STAMP" if brush in STAMPS else str(settings.path)
 
 
-def find_stamp(settings: Any, brush: Brush) -> HeightMap | None:
+def find_stamp(settings: OperatorProperties, brush: Brush) -> HeightMap | None:
     """Return what a brush stamps; a DigiclayError where it cannot be read."""
     if brush not in STAMPS:
         return None
@@ -215,12 +215,12 @@ DEFINES = (
 HOME = str(Path(__file__).parents[1])
 
 
-def list_settings(settings: Any) -> list[str]:
+def list_settings(settings: OperatorProperties) -> list[str]:
     """Return the names of all settings of the tool."""
     return [rna.identifier for rna in settings.bl_rna.properties if rna.identifier != "rna_type"]
 
 
-def preset_values(settings: Any) -> list[str]:
+def preset_values(settings: OperatorProperties) -> list[str]:
     """Return what a preset keeps: the form of the fingertip, and every setting of the tool."""
     return ["wm.digiclay_finger", *(f"settings.{name}" for name in list_settings(settings))]
 
@@ -250,7 +250,7 @@ def _read_finger() -> tuple[float, float, float]:
     return 2e3 * finger.length, 2e3 * finger.width, 2e3 * finger.height
 
 
-def _take_finger(axes: Any) -> None:
+def _take_finger(axes: Sequence[float]) -> None:
     """Give the fingertip a length, width and height, mm."""
     bed = bed_in_use(bpy.context)
     if bed is not None and not beds.find_obstacle(bpy.context, bed, beds.Use.CHANGE):

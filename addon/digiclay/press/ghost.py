@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import bridge
-from ..compat import bpy
+from ..compat import Object, bpy
 from ..core.base.arrays import Floats
 from ..core.model.layout import Grid, Layout
 from ..core.surface.formed import take_corners
@@ -121,7 +121,7 @@ def _make_batch(grid: Grid, surface: Floats, light: Floats, height: Floats) -> A
     place = np.column_stack([grid.positions, surface]) * bridge.SCALE
     points.attr_fill("pos", np.ascontiguousarray(place, np.float32))
     points.attr_fill("color", find_colors(light, way))
-    return gpu.types.GPUBatch(type="TRIS", buf=points, elem=gpu.types.GPUIndexBuf(type="TRIS", seq=chosen))
+    return gpu.types.Any(type="TRIS", buf=points, elem=gpu.types.GPUIndexBuf(type="TRIS", seq=chosen))
 
 
 def _draw() -> None:
@@ -135,7 +135,7 @@ def _draw() -> None:
             _draw_surface(bed, session, ghost)
 
 
-def _draw_surface(bed: Any, session: Running, ghost: Floats) -> None:
+def _draw_surface(bed: Object, session: Running, ghost: Floats) -> None:
     """Draw a surface (n,), m, over a bed."""
     import gpu
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from .. import bridge, preferences
-from ..compat import bpy
+from ..compat import Context, Object, OperatorProperties, UILayout, WorkSpaceTool, bpy
 from ..core.base.arrays import Floats
 from ..core.base.modes import COLORS, Mode
 from ..core.model.fingertip import Fingertip
@@ -62,7 +62,7 @@ def make_lines(paths: Sequence[Floats], width: float, color: Color = LIGHT) -> l
 
 
 def make_label(
-    context: Any, text: str, xy: tuple[float, float], corner: tuple[float, float] = (0.0, 0.0)
+    context: Context, text: str, xy: tuple[float, float], corner: tuple[float, float] = (0.0, 0.0)
 ) -> list[Words]:
     """Return text beside a place, light on a dark edge, where no panel covers it; see `draw_on_bed`."""
     from ..overlay.draw import measure
@@ -93,8 +93,8 @@ def map_paths(change: Callable[[Floats], Floats], paths: Sequence[Floats]) -> li
 
 
 def draw_on_bed(
-    context: Any,
-    bed: Any,
+    context: Context,
+    bed: Object,
     paths: Sequence[Floats],
     text: str,
     xy: tuple[float, float],
@@ -117,7 +117,7 @@ WIDE, WIDEST = 1000, 1450
 BRUSH, SIZE, AMOUNT, STRENGTH = 4.6, 6.6, 6.6, 5.4
 
 
-def draw_header(context: Any, layout: Any, settings: Any) -> None:
+def draw_header(context: Context, layout: UILayout, settings: OperatorProperties) -> None:
     """Draw the tool's settings into the header."""
     width = context.region.width / context.preferences.system.ui_scale
     wide = width >= WIDE
@@ -156,7 +156,7 @@ def draw_header(context: Any, layout: Any, settings: Any) -> None:
     layout.operator("digiclay.skin_toggle", text="", icon="SURFACE_DATA")
 
 
-def draw_presets(layout: Any) -> None:
+def draw_presets(layout: UILayout) -> None:
     """Draw the menu of brush presets, and what keeps and removes one. `layout` bpy.types.UILayout."""
     row = layout.row(align=True)
     row.menu("DIGICLAY_MT_brushes", text=bpy.types.DIGICLAY_MT_brushes.bl_label)
@@ -164,7 +164,7 @@ def draw_presets(layout: Any) -> None:
     row.operator("digiclay.press_brush_save", text="", icon="REMOVE").remove_active = True
 
 
-def _number(layout: Any, owner: Any, name: str, units: float) -> None:
+def _number(layout: UILayout, owner: OperatorProperties, name: str, units: float) -> None:
     """Draw a number no wider than it needs."""
     row = layout.row(align=True)
     row.ui_units_x = units
@@ -172,7 +172,7 @@ def _number(layout: Any, owner: Any, name: str, units: float) -> None:
 
 
 def touch_outline(
-    bed: Any, layout: Layout, place: Floats, depth: float, brush: Brush = Brush.LOWER
+    bed: Object, layout: Layout, place: Floats, depth: float, brush: Brush = Brush.LOWER
 ) -> Floats:
     """Return the rim of what a brush would form at a place (2,), m, (k, 2), m."""
     tip = fingertip_of(bed)
@@ -189,7 +189,7 @@ def find_outline(finger: Fingertip, turn: Floats, depth: float, brush: Brush, la
     return find_contact_outline(finger, turn, depth)
 
 
-def _draw_cursor(context: Any, tool: Any, xy: tuple[int, int]) -> None:
+def _draw_cursor(context: Context, tool: WorkSpaceTool, xy: tuple[int, int]) -> None:
     """Draw the patch under the mouse; Blender hands the place over in pixels of the window."""
     from ..overlay.draw import cursor
 
@@ -217,7 +217,7 @@ def _draw_cursor(context: Any, tool: Any, xy: tuple[int, int]) -> None:
     draw_on_bed(context, target.bed, paths, text, xy, color, corner)
 
 
-def describe(bed: Any, settings: Any) -> str:
+def describe(bed: Object, settings: OperatorProperties) -> str:
     """Return what is shown beside the cursor: what the press does, and what the bed's session forms."""
     words = describe_brush(bridge.finger_of(fingertip_of(bed)), *find_shown(bed, settings))
     session = running.find(bed)
@@ -228,7 +228,7 @@ def describe(bed: Any, settings: Any) -> str:
     return words + describe_queue(session.strokes[0].brush, len(session.strokes) - 1, left)
 
 
-def find_axes(grid: Grid, height: Floats, settings: Any) -> list[Floats]:
+def find_axes(grid: Grid, height: Floats, settings: OperatorProperties) -> list[Floats]:
     """Return axes and center of the tool's symmetry, lying on pins at heights (n,), m; (k, 3), m."""
     if settings.symmetry == "NONE":
         return []
@@ -244,7 +244,7 @@ def find_axes(grid: Grid, height: Floats, settings: Any) -> list[Floats]:
     return [drape(grid, height, line) for line in lines if len(line) > 1]
 
 
-def find_shown(bed: Any, settings: Any) -> tuple[Brush, float, float]:
+def find_shown(bed: Object, settings: OperatorProperties) -> tuple[Brush, float, float]:
     """Return brush, depth or height, m, and strength of the stroke that is drawn, or of a press now."""
     session = running.find(bed)
     stroke = session.strokes[-1] if session is not None and session.strokes else None
@@ -315,7 +315,7 @@ class PressTool(bpy.types.WorkSpaceTool):
     draw_cursor = staticmethod(_draw_cursor)
 
     @staticmethod
-    def draw_settings(context: Any, layout: Any, tool: Any) -> None:
+    def draw_settings(context: Context, layout: UILayout, tool: WorkSpaceTool) -> None:
         """Draw the tool's settings into the header."""
         draw_header(context, layout, tool.operator_properties(OPERATOR))
 
@@ -331,7 +331,7 @@ def unregister() -> None:
     bpy.utils.unregister_tool(PressTool)
 
 
-def take_up(context: Any) -> None:
+def take_up(context: Context) -> None:
     """Take the tool in hand in the 3D views of the context's workspace."""
     window = context.window
     views = [area for area in (context.area, *window.screen.areas) if area and area.type == "VIEW_3D"]

@@ -9,7 +9,16 @@ from numpy.typing import NDArray
 
 from .. import bridge
 from ..bridge import ATTRIBUTES
-from ..compat import bpy, curves, keyframe_node_setting, own_curves, set_node_setting
+from ..compat import (
+    Modifier,
+    NodeTree,
+    Object,
+    bpy,
+    curves,
+    keyframe_node_setting,
+    own_curves,
+    set_node_setting,
+)
 from ..core.base.arrays import Floats
 from ..core.base.errors import DigiclayError
 from ..core.model.fingertip import Fingertip
@@ -23,7 +32,7 @@ from ..roles import BAKE, PALM, ROLE, fingertips_of, owner_of
 MOMENT = "Moment"
 
 
-def playback_nodes(bake: Any, moments: int) -> Any:
+def playback_nodes(bake: Object, moments: int) -> NodeTree:
     """Make the node group that moves the pins of a bed to where object `bake` has them at a moment."""
     tree = new_tree("Digital Clay Bake")
     socket(tree, MOMENT, "NodeSocketFloat", 0.0, "Which baked moment to show, counted from 0")
@@ -101,7 +110,7 @@ def simulate_frames(take: Take, rate: float) -> Iterator[float | BakedFrames]:
 
 
 def apply(
-    bed: Any, moments: BakedFrames, first: int, fingers: Sequence[Fingertip], numbers: Sequence[int]
+    bed: Object, moments: BakedFrames, first: int, fingers: Sequence[Fingertip], numbers: Sequence[int]
 ) -> None:
     """Give a bed a bake from a frame on, in place of an older one, and some fingertips keyframes."""
     free(bed)
@@ -135,12 +144,12 @@ def apply(
             thing.keyframe_insert("rotation_quaternion", frame=first + row)
 
 
-def is_baked(bed: Any) -> bool:
+def is_baked(bed: Object) -> bool:
     """Return whether a bed plays a bake."""
     return _modifier(bed) is not None
 
 
-def free(bed: Any) -> bool:
+def free(bed: Object) -> bool:
     """Take a bed's bake away; return whether it had one. Keyframes of the fingertip stay."""
     modifier = _modifier(bed)
     if modifier is None:
@@ -158,7 +167,7 @@ def free(bed: Any) -> bool:
     return True
 
 
-def read_rate(scene: Any) -> float:
+def read_rate(scene: bpy.types.Scene) -> float:
     """Return the frames of a scene per second; DigiclayError where its time is stretched."""
     render = scene.render
     if render.frame_map_old != render.frame_map_new:
@@ -167,7 +176,9 @@ def read_rate(scene: Any) -> float:
     return float(render.fps / render.fps_base)
 
 
-def sample_path(scene: Any, bed: Any, first: int, last: int, period: float) -> Iterator[float | Floats]:
+def sample_path(
+    scene: bpy.types.Scene, bed: Object, first: int, last: int, period: float
+) -> Iterator[float | Floats]:
     """Read the paths of the fingertips as animated; yield the share done, at last the poses (t + 1, f, 7)."""
     if not 0 < last - first <= MOST_FRAMES:
         rule = f"must have from 1 to {MOST_FRAMES} frames after its first"
@@ -190,7 +201,7 @@ def sample_path(scene: Any, bed: Any, first: int, last: int, period: float) -> I
     yield poses
 
 
-def _modifier(bed: Any) -> Any | None:
+def _modifier(bed: Object) -> Modifier | None:
     """Return the modifier that plays a bake, whatever its name is now, or None."""
     for modifier in bed.modifiers:
         if modifier.type == "NODES" and modifier.node_group and _source(modifier.node_group) is not None:
@@ -198,14 +209,14 @@ def _modifier(bed: Any) -> Any | None:
     return None
 
 
-def _source(tree: Any) -> Any | None:
+def _source(tree: NodeTree) -> Object | None:
     """Return the object that holds the baked pins a tree plays, or None when it plays none."""
     infos = [item for item in tree.nodes if item.bl_idname == "GeometryNodeObjectInfo"]
     sources = (info.inputs["Object"].default_value for info in infos)
     return next((source for source in sources if source is not None and source.get(ROLE) == BAKE), None)
 
 
-def _curves(bed: Any) -> Iterator[tuple[Any, Any]]:
+def _curves(bed: Object) -> Iterator[tuple[Any, Any]]:
     """Give the curves that drive a bed's bake, each with what it can be removed from."""
     modifier = _modifier(bed)
     start = f'modifiers["{bpy.utils.escape_identifier(modifier.name)}"]' if modifier else None
@@ -213,7 +224,7 @@ def _curves(bed: Any) -> Iterator[tuple[Any, Any]]:
         yield from ((group, curve) for curve in group if start and curve.data_path.startswith(start))
 
 
-def _make_source(moments: BakedFrames) -> Any:
+def _make_source(moments: BakedFrames) -> Object:
     """Make the object that holds the pins moment after moment; it stands in no scene."""
     count, pins = moments.height.shape
     mesh = bridge.points("Digital Clay Bake", count * pins)

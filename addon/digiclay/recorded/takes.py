@@ -1,7 +1,9 @@
 """Takes of a bed in the .blend: properties that copies, appends and undo include."""
 
+from __future__ import annotations
+
 from collections import deque
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -16,6 +18,9 @@ from ..core.session.take import Take, from_bytes, make_take, to_bytes
 from ..roles import fingertips_of
 from ..sessions.running import Running
 from ..ui_text import localize
+
+if TYPE_CHECKING:
+    from bpy.types import Object
 
 #: The bed's property that holds them, by number.
 PROPERTY = "digiclay_takes"
@@ -37,7 +42,7 @@ class Entry(NamedTuple):
     effort: tuple[float, ...]
 
 
-def list_takes(bed: Any) -> list[Entry]:
+def list_takes(bed: Object) -> list[Entry]:
     """Return the takes of a bed, oldest first."""
     takes = bed.get(PROPERTY) or {}
     numbers = sorted(takes.keys(), key=int)
@@ -45,7 +50,7 @@ def list_takes(bed: Any) -> list[Entry]:
     return [Entry(number, row["name"], row["seconds"], tuple(row.get("effort", ()))) for number, row in rows]
 
 
-def find(bed: Any, number: str = "") -> Entry:
+def find(bed: Object, number: str = "") -> Entry:
     """Return the row of one take of a bed, by default the last; raise DigiclayError where there is none."""
     entries = list_takes(bed)
     if not entries and not number:
@@ -63,7 +68,7 @@ def read_recording(session: Running) -> Take | None:
     return None if recording is None else make_take(session.scene, recording, session.snapshot)
 
 
-def add(bed: Any, take: Take, name: str = "", session: Running | None = None) -> Entry:
+def add(bed: Object, take: Take, name: str = "", session: Running | None = None) -> Entry:
     """Add a take to a bed, with fingertips, time and errors of its session; without a name by its number."""
     if PROPERTY not in bed:
         bed[PROPERTY] = {}
@@ -76,7 +81,7 @@ def add(bed: Any, take: Take, name: str = "", session: Running | None = None) ->
     return find(bed, number)
 
 
-def keep_recording(bed: Any, session: Running) -> str:
+def keep_recording(bed: Object, session: Running) -> str:
     """Keep what a session has recorded before its recording ends; return words about it, empty without."""
     take = read_recording(session)
     if take is None:
@@ -85,20 +90,20 @@ def keep_recording(bed: Any, session: Running) -> str:
     return localize("The recording ended and was kept as {} ({:.1f} s)", entry.name, entry.seconds)
 
 
-def read(bed: Any, number: str = "") -> Take:
+def read(bed: Object, number: str = "") -> Take:
     """Return a take of a bed, by default the last; raise DigiclayError if it is missing or damaged."""
     number = find(bed, number).number  # first: a bed without takes has no such property
     return from_bytes(bytes(bed[PROPERTY][number]["data"]))
 
 
-def list_fingers(bed: Any, number: str, count: int) -> tuple[int, ...]:
+def list_fingers(bed: Object, number: str, count: int) -> tuple[int, ...]:
     """Return the numbers of so many fingertips of a take; where it has none, those of the bed, if as many."""
     kept = bed[PROPERTY][find(bed, number).number].get("fingers")
     every = (kept if isinstance(kept, bytes) else b"", tuple(fingertips_of(bed)), range(1, count + 1))
     return next(tuple(numbers) for numbers in every if len(numbers) == count)
 
 
-def remove(bed: Any, number: str) -> None:
+def remove(bed: Object, number: str) -> None:
     """Remove a take of a bed; raise DigiclayError where there is none of that number."""
     number = find(bed, number).number
     del bed[PROPERTY][number]

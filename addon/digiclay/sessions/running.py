@@ -1,12 +1,17 @@
 """Live sessions as values, and the table of those of this Blender; no Blender in here."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ..core.model.fingers import MOST_FINGERS
 from ..core.session.live_session import Clock, LiveSession, Moment
 from ..core.session.recent_trace import RecentTrace
 from ..strokes.stroke import Stroke
+
+if TYPE_CHECKING:
+    from bpy.types import Object
 
 #: Number of the first fingertip that is no object of Blender.
 OWN = MOST_FINGERS + 1
@@ -104,7 +109,7 @@ class Table:
 TABLE = Table()
 
 
-def find(bed: Any) -> Running | None:
+def find(bed: Object) -> Running | None:
     """Return the session of a bed's object, or None."""
     return TABLE.sessions.get(bed.session_uid) if bed is not None else None
 
@@ -129,7 +134,7 @@ def set_message(words: str, *uids: int) -> None:
     TABLE.message, TABLE.subjects = words, uids
 
 
-def last_message(bed: Any = None) -> str:
+def last_message(bed: Object | None = None) -> str:
     """Return the last message; for a bed's panel, unless it is about others."""
     of_bed = bed is None or not TABLE.subjects or bed.session_uid in TABLE.subjects
     return TABLE.message if of_bed else ""

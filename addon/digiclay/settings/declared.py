@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable, Mapping
 from decimal import Decimal, InvalidOperation
 from typing import Any
 
-from ..compat import bpy
+from ..compat import Context, PropertyGroup, bpy
 from ..core.base.errors import ParameterError
 from ..core.base.quantity import EXTENTS, Parameters, Quantity
 from ..core.control.displays import SHAPES
@@ -57,7 +57,7 @@ def make_group(name: str, words: str, properties: dict[str, Any]) -> type:
     return type(f"DIGICLAY_PG_{name}", (bpy.types.PropertyGroup,), content)
 
 
-def whole(field: dataclasses.Field[Any], get: Callable[[Any], float], put: Update) -> Any:
+def whole(field: dataclasses.Field[Any], get: Callable[[PropertyGroup], float], put: Update) -> Any:
     """Make the property of twice a parameter, computed by `get` and taken by `put`; no keyframes."""
     quantity: Quantity = field.metadata["quantity"]
     quantity = quantity._replace(doc=quantity.whole, symbol=f"2 {quantity.symbol}")
@@ -155,7 +155,7 @@ def _tooltip(quantity: Quantity, default: object, unit: str, power: int) -> str:
     return "; ".join(parts)
 
 
-def _shapes(group: Any, context: Any, text: str) -> list[str]:
+def _shapes(group: PropertyGroup, context: Context, text: str) -> list[str]:
     """Suggest the shapes that have a name; a file's path may be typed as well."""
     return [name for name in SHAPES if text.lower() in name]
 
@@ -164,7 +164,7 @@ def _shapes(group: Any, context: Any, text: str) -> list[str]:
 Notes = dict[str, tuple[Any, Any]]
 
 
-def write(group: Any, part: Parameters) -> Notes:
+def write(group: PropertyGroup, part: Parameters) -> Notes:
     """Write a part's parameters into its property group; return what the properties cannot hold."""
     notes: Notes = {}
     for name, field in _fields(type(part)).items():
@@ -176,7 +176,7 @@ def write(group: Any, part: Parameters) -> Notes:
     return notes
 
 
-def assign(group: Any, kind: type[Parameters], name: str, value: Any) -> None:
+def assign(group: PropertyGroup, kind: type[Parameters], name: str, value: Any) -> None:
     """Write one parameter, in SI, into its property."""
     power = _power(_fields(kind)[name])
     if isinstance(value, tuple):
@@ -188,14 +188,16 @@ def assign(group: Any, kind: type[Parameters], name: str, value: Any) -> None:
     setattr(group, name, value)
 
 
-def fill(group: Any, kind: type[Parameters], names: Iterable[str], values: Mapping[str, Any]) -> None:
+def fill(
+    group: PropertyGroup, kind: type[Parameters], names: Iterable[str], values: Mapping[str, Any]
+) -> None:
     """Write some parameters into their properties: those that values give, and defaults of the others."""
     fields = _fields(kind)
     for name in names:
         assign(group, kind, name, values.get(name, fields[name].default))
 
 
-def read(group: Any, kind: type[Parameters], notes: Notes, section: str) -> dict[str, Any]:
+def read(group: PropertyGroup, kind: type[Parameters], notes: Notes, section: str) -> dict[str, Any]:
     """Return a part's parameters in SI, as a scene file's section would give them."""
     values = {}
     for name, field in _fields(kind).items():

@@ -1,10 +1,10 @@
 """Device of a new bed as one valid scene; size of a bed's fingertip, and of the blister that follows it."""
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 from .. import bridge
-from ..compat import read_stored
+from ..compat import Context, Object, PropertyGroup, read_stored
+from ..core.base.arrays import Floats
 from ..core.base.errors import DigiclayError
 from ..core.base.quantity import list_quantities
 from ..core.control.blister import Blister
@@ -154,49 +154,49 @@ def scale_blister(blister: Blister, share: float) -> Blister:
 SMALLEST, LARGEST = 1e-3, 0.2
 
 
-def read_finger(settings: Any) -> Fingertip:
+def read_finger(settings: PropertyGroup) -> Fingertip:
     """Return the fingertip of a bed's settings."""
     return Fingertip(**read(settings.fingertip, Fingertip, {}, "fingertip"))
 
 
-def read_size(settings: Any) -> float:
+def read_size(settings: PropertyGroup) -> float:
     """Return the size of the fingertip of a bed's settings: how wide it is, m."""
     return 2.0 * read_finger(settings).width
 
 
-def set_axis(settings: Any, name: str, size: float) -> None:
+def set_axis(settings: PropertyGroup, name: str, size: float) -> None:
     """Give a bed's fingertip another length, width or height, mm; the other two stay."""
     half = 0.5 * to_si(size, SHOWN["m"][1])
     resize(settings, replace(read_finger(settings), **{name: half}))
 
 
-def set_size(settings: Any, size: float) -> None:
+def set_size(settings: PropertyGroup, size: float) -> None:
     """Make a bed's fingertip as wide as a size, m, in the same proportions; within what a finger can have."""
     finger = read_finger(settings)
     share = min(max(size, SMALLEST), LARGEST) / (2.0 * finger.width)
     resize(settings, Fingertip(finger.length * share, finger.width * share, finger.height * share))
 
 
-def find_first(owner: Any) -> Any:
+def find_first(owner: Object) -> PropertyGroup:
     """Return the settings of the fingertip that press strokes move: the first one left of a bed."""
     return owner.digiclay if owner.get(ROLE) == FINGERTIP else list_settings(owner)[0]
 
 
-def list_settings(bed: Any) -> tuple[Any, ...]:
+def list_settings(bed: Object) -> tuple[PropertyGroup, ...]:
     """Return the settings that hold the parts of each finger: the bed's of the first, the others' own."""
     tips = fingertips_of(bed).items()
     return tuple(bed.digiclay if number == 1 else tip.digiclay for number, tip in tips) or (bed.digiclay,)
 
 
-def find_tip(owner: Any) -> Any | None:
+def find_tip(owner: Object) -> Object | None:
     """Return the fingertip whose settings an object holds: itself, or number 1 of a bed; None without."""
     return owner if owner.get(ROLE) == FINGERTIP else fingertips_of(owner).get(1)
 
 
-def find_settings(context: Any) -> tuple[int, Any]:
+def find_settings(context: Context) -> tuple[int, PropertyGroup]:
     """Return number and settings of the active fingertip, or those of a bed for its first one."""
-    bed: Any = bed_of(context)
-    thing: Any = context.object
+    bed: Object = bed_of(context)
+    thing: Object = context.object
     tips = {tip: number for number, tip in fingertips_of(bed).items()}
     while thing not in tips and thing not in (bed, None):
         thing = thing.parent
@@ -204,7 +204,7 @@ def find_settings(context: Any) -> tuple[int, Any]:
     return number, bed.digiclay if number == 1 else thing.digiclay
 
 
-def give_settings(bed: Any, tip: Any) -> None:
+def give_settings(bed: Object, tip: Object) -> None:
     """Give a further fingertip the size and pulp of the first one, unless it has its own."""
     if read_stored(tip, "digiclay"):
         return
@@ -215,10 +215,10 @@ def give_settings(bed: Any, tip: Any) -> None:
     bridge.resize_fingertip(tip, read_finger(tip.digiclay))
 
 
-def resize(settings: Any, finger: Fingertip) -> None:
+def resize(settings: PropertyGroup, finger: Fingertip) -> None:
     """Give a fingertip another size; its lowest point stays, and a bed's blister follows, if that is on."""
     before, tip = read_finger(settings), find_tip(settings.id_data)
-    bed: Any = settings.id_data if tip is None else owner_of(tip)
+    bed: Object = settings.id_data if tip is None else owner_of(tip)
     lowest = _poses(bed)
     for name in ("length", "width", "height"):
         assign(settings.fingertip, Fingertip, name, getattr(finger, name))
@@ -230,7 +230,7 @@ def resize(settings: Any, finger: Fingertip) -> None:
         _scale_blister(bed.digiclay, before, finger)
 
 
-def _poses(bed: Any) -> Any | None:
+def _poses(bed: Object) -> Floats | None:
     """Return the poses (f, 7) of the fingertips of a bed; None where they have no meaning."""
     try:
         return bridge.poses(bed)
@@ -238,14 +238,14 @@ def _poses(bed: Any) -> Any | None:
         return None
 
 
-def suit_blister(settings: Any) -> None:
+def suit_blister(settings: PropertyGroup) -> None:
     """Have the blister of a method, made for the paper's fingertip, suit that of a bed, and the bed."""
     finger = read_finger(find_first(settings.id_data))
     settings.blister_suits = 0.0
     _scale_blister(settings, Fingertip() if settings.blister_follows else finger, finger)
 
 
-def _scale_blister(settings: Any, before: Fingertip, after: Fingertip) -> None:
+def _scale_blister(settings: PropertyGroup, before: Fingertip, after: Fingertip) -> None:
     """Scale the blister with the width of the fingertip, no wider than the bed."""
     # One that the bed has limited remembers the width of the fingertip that it suits, so that a palm and then
     # a fingertip again leave it as it was.

@@ -5,7 +5,7 @@ import importlib
 from typing import Any
 
 from .. import bridge
-from ..compat import bpy
+from ..compat import Context, PropertyGroup, bpy
 from ..core.base.quantity import list_quantities
 from ..core.control.methods import METHODS, list_added, list_methods
 from ..core.model.fingertip import Fingertip
@@ -20,7 +20,7 @@ from .declared import WHOLE, Update, choice, fill, flag, group, make_group, numb
 OFFERED: list[tuple[str, str, str, int]] = []
 
 
-def method_of(settings: Any) -> str:
+def method_of(settings: PropertyGroup) -> str:
     """Return the name of a bed's control method, whether or not it is known here."""
     name: str = settings.own_method or settings.method
     return name
@@ -31,17 +31,17 @@ def name_pointer(name: str) -> str:
     return name if name in METHODS else f"own_{name}"
 
 
-def find_group(settings: Any) -> Any:
+def find_group(settings: PropertyGroup) -> PropertyGroup | None:
     """Return the properties of the parameters of a bed's control method; None where it is not known here."""
     return getattr(settings.control, name_pointer(method_of(settings)), None)
 
 
-def method_property(settings: Any) -> str:
+def method_property(settings: PropertyGroup) -> str:
     """Return the property that offers the methods: the plain one while there are built-in ones only."""
     return "chosen_method" if settings.own_method or list_added() else "method"
 
 
-def list_offered(settings: Any, context: Any) -> list[tuple[str, str, str, int]]:
+def list_offered(settings: PropertyGroup, context: Context) -> list[tuple[str, str, str, int]]:
     """Return the methods to choose from, and the bed's own where that is not known here."""
     added = list_added()
     offered = [(name, localize(title(name)), "") for name in METHODS]
@@ -53,13 +53,13 @@ def list_offered(settings: Any, context: Any) -> list[tuple[str, str, str, int]]
     return OFFERED
 
 
-def place_of(settings: Any) -> int:
+def place_of(settings: PropertyGroup) -> int:
     """Return the place of a bed's method among those offered."""
     names = [name for name, *_ in list_offered(settings, None)]
     return names.index(method_of(settings))
 
 
-def choose(settings: Any, place: int) -> None:
+def choose(settings: PropertyGroup, place: int) -> None:
     """Set the method by its place among those offered."""
     name = list_offered(settings, None)[place][0]
     if name in METHODS:
@@ -79,7 +79,7 @@ PRESET_WORDS = {
 }
 
 
-def take_preset(settings: Any, context: Any) -> None:
+def take_preset(settings: PropertyGroup, context: Context) -> None:
     """Set what the chosen preset, or another one, changes of the defaults."""
     for section in sorted({section for preset in PRESETS.values() for section in preset}):
         names = sorted({name for preset in PRESETS.values() for name in preset.get(section, {})})
@@ -87,14 +87,14 @@ def take_preset(settings: Any, context: Any) -> None:
         fill(getattr(settings, section), import_parameters(section, ""), names, values)
 
 
-def take_method(settings: Any, context: Any) -> None:
+def take_method(settings: PropertyGroup, context: Context) -> None:
     """Set the blister the chosen built-in method is made for; it takes the place of one of one's own."""
     if settings.own_method:
         settings.own_method = ""
     take_blister(settings, context)
 
 
-def take_blister(settings: Any, context: Any) -> None:
+def take_blister(settings: PropertyGroup, context: Context) -> None:
     """Set the blister that the method is made for; none where it forms none, or is not known here."""
     method = list_methods().get(method_of(settings))
     values = method.blister if method is not None else None
@@ -104,7 +104,7 @@ def take_blister(settings: Any, context: Any) -> None:
         devices.suit_blister(settings)
 
 
-def take_arrangement(layout: Any, context: Any) -> None:
+def take_arrangement(layout: PropertyGroup, context: Context) -> None:
     """Set the share of the contact laws a cell carries, which depends on how close the cells stand."""
     share = ARRANGEMENTS[layout.arrangement].share
     values = {} if share is None else {"share": share}
@@ -112,7 +112,7 @@ def take_arrangement(layout: Any, context: Any) -> None:
         fill(own.contact, import_parameters("contact", ""), ("share",), values)
 
 
-def take_size(fingertip: Any, context: Any) -> None:
+def take_size(fingertip: PropertyGroup, context: Context) -> None:
     """Show the fingertip in its new size."""
     tip = devices.find_tip(fingertip.id_data)
     if tip is not None:

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .. import bridge
-from ..compat import bpy, read_stored
+from ..compat import Object, PropertyGroup, bpy, read_stored
 from ..core.base.arrays import Floats
 from ..core.base.errors import ParameterError
 from ..core.base.quantity import Parameters, list_quantities
@@ -69,14 +69,14 @@ class StoredSettings(NamedTuple):
     fingers: tuple[tuple[int, dict[str, Any]], ...]
 
 
-def read_stored_settings(bed: Any) -> StoredSettings:
+def read_stored_settings(bed: Object) -> StoredSettings:
     """Return what `read_scene` makes the scene of, in a small part of its time."""
     tips = fingertips_of(bed).items()
     fingers = tuple((number, read_stored(tip, "digiclay") if number > 1 else {}) for number, tip in tips)
     return StoredSettings(bed.name, bpy.data.filepath, read_stored(bed, "digiclay"), fingers)
 
 
-def scene_of(bed: Any) -> Scene:
+def scene_of(bed: Object) -> Scene:
     """Return the scene a bed's settings describe; the fingertip's path is one press in the middle."""
     scene = read_scene(bed)
     reason = find_layout_mismatch(bed, scene.layout)
@@ -87,7 +87,7 @@ def scene_of(bed: Any) -> Scene:
     return scene
 
 
-def read_scene(bed: Any) -> Scene:
+def read_scene(bed: Object) -> Scene:
     """Return the scene a bed's settings describe, whatever the bed looks like by now; as `scene_of`."""
     try:
         return resolve(table_of(bed))
@@ -95,7 +95,7 @@ def read_scene(bed: Any) -> Scene:
         raise relabel(error, tuple(fingertips_of(bed))) from None
 
 
-def table_of(bed: Any) -> dict[str, Any]:
+def table_of(bed: Object) -> dict[str, Any]:
     """Return a bed's settings as the tables of a scene file."""
     settings = bed.digiclay
     method = method_of(settings)
@@ -121,7 +121,7 @@ def table_of(bed: Any) -> dict[str, Any]:
     return table | (fingers[0] if len(fingers) == 1 else {FINGERS: fingers})
 
 
-def write_scene(bed: Any, scene: Scene) -> None:
+def write_scene(bed: Object, scene: Scene) -> None:
     """Write a scene's values into a bed's settings; a part it leaves out keeps its own, unused."""
     settings = bed.digiclay
     # These two first: choosing them by hand sets others along with them.
@@ -129,7 +129,7 @@ def write_scene(bed: Any, scene: Scene) -> None:
     setattr(settings, "method" if scene.method in METHODS else "own_method", scene.method)
     notes = _notes(settings)
     for section in SECTIONS:
-        owner: Any = scene.fingers[0] if section in FINGER_PARTS else scene
+        owner: Object = scene.fingers[0] if section in FINGER_PARTS else scene
         part: Parameters | None = getattr(owner, section)
         if section in OPTIONAL:
             setattr(settings, f"use_{section}", part is not None)
@@ -143,19 +143,19 @@ def write_scene(bed: Any, scene: Scene) -> None:
             _keep_notes(own, {section: write(getattr(own, section), part) for section, part in given.items()})
 
 
-def _keep_notes(settings: Any, notes: dict[str, Notes]) -> None:
+def _keep_notes(settings: PropertyGroup, notes: dict[str, Notes]) -> None:
     """Store what properties cannot hold, by part."""
     settings.notes = json.dumps({key: noted for key, noted in notes.items() if noted})
 
 
-def rebuild_reason(bed: Any) -> str:
+def rebuild_reason(bed: Object) -> str:
     """Return why a bed no longer shows the pins its settings describe, or an empty text."""
     settings = bed.digiclay
     notes = _notes(settings).get("layout", {})
     return find_layout_mismatch(bed, Layout(**read(settings.layout, Layout, notes, "layout")))
 
 
-def part_group(settings: Any, section: str) -> Any:
+def part_group(settings: PropertyGroup, section: str) -> PropertyGroup:
     """Return the property group of a section; that of the control is its method's."""
     if section == "control":
         return find_group(settings)  # None: the method is not known here
@@ -176,7 +176,7 @@ def unregister() -> None:
         bpy.utils.unregister_class(kind)
 
 
-def _notes(settings: Any) -> dict[str, Notes]:
+def _notes(settings: PropertyGroup) -> dict[str, Notes]:
     """Return what was noted of values the properties cannot hold, by part."""
     return json.loads(settings.notes) if settings.notes else {}
 
@@ -192,7 +192,7 @@ def _path(value: Any) -> Any:
     return bpy.path.abspath(value) if relative else value
 
 
-def find_layout_mismatch(bed: Any, layout: Layout) -> str:
+def find_layout_mismatch(bed: Object, layout: Layout) -> str:
     """Return why a bed is not the one a layout describes, or an empty text."""
     pins, wanted = len(bed.data.vertices), layout.rows * layout.columns
     if pins != wanted:

@@ -5,10 +5,9 @@ import tomllib
 from collections.abc import Iterable, Iterator
 from functools import cache
 from pathlib import Path
-from typing import Any
 
 from .. import operators, panels, preferences, ui_text
-from ..compat import bpy
+from ..compat import bpy, bpy_struct
 from ..core.scene.toml_table import PRESETS
 from ..panels import display
 from ..press.tool import PressTool
@@ -70,13 +69,13 @@ def collect_strings() -> set[str]:
     return texts - {""}
 
 
-def _property_strings(owner: Any) -> Iterator[str]:
+def _property_strings(owner: type[bpy_struct]) -> Iterator[str]:
     """Yield labels and tooltips of the properties that a class or a mixin of it declares, and shows."""
     if issubclass(owner, bpy.types.Menu | bpy.types.Panel):  # their annotations are of Blender's own
         return
     own = [kind for kind in owner.__mro__ if kind.__module__.startswith(EXTENSION)]
     declared = {name for kind in own for name in inspect.get_annotations(kind)}
-    described: Any = getattr(owner, "bl_rna", None)
+    described: bpy_struct | None = getattr(owner, "bl_rna", None)
     if issubclass(owner, bpy.types.Operator):  # its class does not list them
         area, _, name = owner.bl_idname.partition(".")
         described = getattr(getattr(bpy.ops, area), name).get_rna_type()
