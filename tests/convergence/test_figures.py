@@ -1,5 +1,7 @@
 """Figures of the pages are what the commands give now, or stored; one that is stale is told."""
 
+import re
+from fnmatch import fnmatch
 from pathlib import Path
 from typing import Any
 
@@ -40,6 +42,15 @@ def test_each_page_with_a_table_of_figures_has_rows_or_says_why_not() -> None:
         if len(figures.list_measured_rows(text)) > 2 or "| commit |" in text
     }
     assert measured - (told[0] | told[1]) == set()
+
+
+def test_each_stored_result_has_a_row_with_its_command_date_and_commit() -> None:
+    page = (figures.ROOT / "benchmarks/README.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\|.*\| 20\d\d-\d\d-\d\d \| [0-9a-f]{7} \|$", page, re.MULTILINE)
+    patterns = re.findall(r"`([\w.*]+)`", "".join(rows))
+    files = [path.name for path in figures.RESULTS.iterdir()]
+    assert len(files) > 20
+    assert [name for name in files if not any(fnmatch(name, pattern) for pattern in patterns)] == []
 
 
 @pytest.mark.parametrize(

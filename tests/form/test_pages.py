@@ -41,6 +41,8 @@ SENTENCE = re.compile(
 )
 #: A program and its arguments; a number behind a name is a version.
 COMMAND = re.compile(r"^\$? *(?:blender --command )?(digiclay|python -m benchmarks) (?!\d)(.*)")
+#: End of a line of a command that goes on in the next.
+CONTINUED = re.compile(r" *\\\n\s*")
 #: Files of the user: a method of one's own, and its copy beside a run.
 USERS = ("mine.py", "method.py", "softer.py", "yielding.py")
 #: The parsers that the commands of the pages must pass; they only read, nothing is carried out.
@@ -70,7 +72,7 @@ def _anchors(text: str) -> set[str]:
 
 def find_commands(text: str) -> list[tuple[str, str]]:
     """Return program and arguments of every command of a page, in blocks of code and within sentences."""
-    lines = list(_lines(text))
+    lines = list(_lines(CONTINUED.sub(" ", text)))
     blocks = [line.strip() for line, code in lines if code]
     prose = " ".join(line for line, code in lines if not code)
     matches = [COMMAND.match(line) for line in (*blocks, *re.findall(r"`([^`]+)`", prose))]

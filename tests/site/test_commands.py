@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import pytest
 
-from tests.form.test_pages import PAGES
+from tests.form.test_pages import CONTINUED, PAGES
 
 ROOT = Path(__file__).parents[2]
 LIST = Path(__file__).with_name("not_executed.toml")
@@ -47,7 +47,7 @@ def find_commands(text: str) -> list[Command]:
     One of a sentence with a placeholder is a form, and one without arguments a name.
     """
     found, fenced = [], False
-    for line in text.splitlines():
+    for line in CONTINUED.sub(" ", text).splitlines():
         fence = line.lstrip().startswith("```")
         fenced ^= fence
         if fenced or line.startswith("    "):
@@ -118,7 +118,7 @@ def test_every_make_of_the_pages_is_carried_out_in_the_checkout_where_it_belongs
 
 
 def test_a_command_that_fails_is_noticed(tmp_path: Path) -> None:
-    text = "    digiclay run absent_scene\n    digiclay --version\n`digiclay run`, `digiclay run SCENE`\n"
+    text = "    digiclay run \\\n    absent_scene\n    digiclay --version\n`digiclay run`, `digiclay run SCENE`\n"
     (failure,) = play(text, tmp_path, set())
     assert "digiclay run absent_scene: status 2" in failure
     assert play(text, tmp_path, {"digiclay run absent_scene"}) == []
