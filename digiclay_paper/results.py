@@ -1,13 +1,12 @@
 """Measurements of `digiclay paper` as one value, for figures and claims."""
 
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-from digiclay.core.base.arrays import Floats
+from digiclay.core.base.arrays import Array, Floats
 from digiclay.core.scene.schema import Scene
 from digiclay.core.session.run_scene import Result
 from digiclay.core.studies.speed_limits import Criterion, Drag, Follows
-from numpy.typing import NDArray
 
 from .scenes import SINK, TALL
 
@@ -118,10 +117,10 @@ class Session(NamedTuple):
     """Quantities of a session for figures and claims."""
 
     scene: Scene
-    history: dict[str, NDArray[Any]]
+    history: dict[str, Array]
     """Every fourth row of time, height, total force, total force asked for (``set_point``), number of cells
     that follow and fingertip; and the positions."""
-    detail: dict[str, NDArray[Any]]
+    detail: dict[str, Array]
     """Every row of time and height in the first seconds."""
     metrics: dict[str, float | None]
     """As `Result.figures`."""

@@ -5,10 +5,9 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .compat import Context, Mesh, Object, bpy
-from .core.base.arrays import Floats
+from .core.base.arrays import Array, Floats
 from .core.base.errors import DigiclayError
 from .core.model.fingertip import LEVEL, Fingertip, make_matrices
 from .roles import BED, ELLIPSOID, PALM, ROLE, fingertips_of, owner_of
@@ -69,7 +68,7 @@ def _require_cells(bed: Mesh, pins: int | None = None) -> None:
         raise DigiclayError(f"{bed.name}: {fault}.")
 
 
-def write_cells(bed: Mesh, position: Floats, height: Floats, **values: NDArray[Any]) -> None:
+def write_cells(bed: Mesh, position: Floats, height: Floats, **values: Array) -> None:
     """Write pins into a mesh: axes (n, 2), m, tops (n,), m, and of `mode` and `force` (n,) what changed."""
     _require_cells(bed, len(height))
     placed = np.column_stack([position, height]) * SCALE
@@ -81,14 +80,14 @@ def write_cells(bed: Mesh, position: Floats, height: Floats, **values: NDArray[A
     bed.update()  # 4.2 shows stale data without
 
 
-def read_cells(bed: Mesh) -> dict[str, NDArray[Any]]:
+def read_cells(bed: Mesh) -> dict[str, Array]:
     """Return `position` (n, 2) and `height` (n,), m, `mode` and `force` of a bed's mesh."""
     _require_cells(bed)
     count = len(bed.vertices)
     placed = np.empty(3 * count, np.float32)
     bed.vertices.foreach_get("co", placed)
     table = placed.reshape(count, 3).astype(np.float64) / SCALE
-    cells: dict[str, NDArray[Any]] = {"position": table[:, :2], "height": table[:, 2]}
+    cells: dict[str, Array] = {"position": table[:, :2], "height": table[:, 2]}
     for name, (_, value, kind) in ATTRIBUTES.items():
         array = np.empty(count, kind)
         bed.attributes[name].data.foreach_get(value, array)

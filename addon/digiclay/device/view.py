@@ -11,7 +11,6 @@ copies of a bed keep theirs, undo and files carry them.
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .. import bridge
 from ..bridge import SCALE
@@ -26,6 +25,7 @@ from ..compat import (
     node_setting,
     set_node_setting,
 )
+from ..core.base.arrays import Array
 from ..core.base.errors import DigiclayError
 from ..core.engine.state import State
 from ..core.engine.system import System
@@ -105,7 +105,7 @@ def show(bed: Object, instant: Instant) -> None:
 def show_state(bed: Object, system: System, state: State) -> None:
     """Show the pins of a running session; the fingertip is the user's and stays where it is."""
     # Forces are gathered and written only while something drawn tells them.
-    shown: dict[str, NDArray[Any]] = {"mode": state.mode()}
+    shown: dict[str, Array] = {"mode": state.mode()}
     if wants_force(bed):
         shown["force"] = state.row(system.rows.force)
     bridge.write_cells(bed.data, system.grid.positions, state.row(0), **shown)

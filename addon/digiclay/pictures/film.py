@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from ..bridge import SCALE
 from ..compat import Object, bpy, quiet, strips, to_video
-from ..core.base.arrays import Floats
+from ..core.base.arrays import Array, Floats
 from ..core.base.errors import OutputError
 from ..core.base.modes import Mode
 from ..core.files.run_folder import name_unfinished
@@ -106,7 +106,7 @@ class Shots:
 
 @contextmanager
 def stage_film(
-    history: Mapping[str, NDArray[Any]],
+    history: Mapping[str, Array],
     looks: Film,
     plotted: tuple[str, Floats],
     *,
@@ -164,7 +164,7 @@ def stage_turntable(instant: Instant, looks: Turntable) -> Iterator[Shots]:
 
 
 def _visible_points(
-    bed: Object, history: Mapping[str, NDArray[Any]], rows: NDArray[np.intp], sizes: Mapping[str, Any]
+    bed: Object, history: Mapping[str, Array], rows: NDArray[np.intp], sizes: Mapping[str, Any]
 ) -> Floats:
     """Return what must be in the frame, (k, 3), Blender units: all pins, the fingertips that are near."""
     used = slice(int(rows[0]), int(rows[-1]) + 1)

@@ -12,6 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
+#: Numbers of any kind: a column of a run's history, say.
+Array = NDArray[Any]
 Flags = NDArray[np.bool_]
 #: Codes of `Mode`.
 Modes = NDArray[np.int8]
@@ -51,7 +53,7 @@ class Constants(dict[tuple[int, ...], tuple[Any, ...]]):
             self.clear()
         numbers = self._numbers
         if len(shape) == 1:
-            rows: NDArray[Any] = np.array(numbers, self._kind).repeat(*shape).reshape(len(numbers), *shape)
+            rows: Array = np.array(numbers, self._kind).repeat(*shape).reshape(len(numbers), *shape)
             rows.flags.writeable = False
             numbers = tuple(rows)
         elif self._kind is not np.float64:

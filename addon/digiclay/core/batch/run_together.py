@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.arrays import Floats
+from ..base.arrays import Array, Floats
 from ..base.errors import DigiclayError, ParameterError
 from ..base.modes import Mode
 from ..engine.simulation import repeat_period
@@ -65,7 +65,7 @@ class Histories:
         rows = self._write(self._recording, run, now.play.state.period) if self._recording else {}
         return evaluate(self._scenes[run], now.play.batch.systems[index], rows, now.ended(index))
 
-    def _write(self, recording: Recording, run: int, period: int) -> dict[str, NDArray[Any]]:
+    def _write(self, recording: Recording, run: int, period: int) -> dict[str, Array]:
         """Write the history of a run up to a period; return its rows."""
         recording.flush()
         count, column = 1 - (-period // recording.every), self._runs.index(run)

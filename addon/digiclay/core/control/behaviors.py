@@ -13,7 +13,7 @@ from ..base.errors import ParameterError
 from ..base.modes import Mode
 from ..base.quantity import quantity
 from ..model.actuator import Actuator
-from ..model.control_interface import Commands, Measurement
+from ..model.control_interface import Commands, Measurement, Memory
 from ..model.layout import Disc
 from .device_info import DeviceInfo, check_floor
 from .drive import CellwiseControl, Drive, TouchParameters, check_damping, make_drive, raise_felt_force
@@ -42,7 +42,7 @@ class ElasticControl(CellwiseControl):
 
     parameters: Elastic
 
-    def command(self, memory: Any, seen: Measurement) -> tuple[Any, Commands]:
+    def command(self, memory: Memory, seen: Measurement) -> tuple[Memory, Commands]:
         """Let pressed cells give way, and the others spring back; see `Controller`."""
         gains, rest = self.parameters, self.actuator.rest_height
         error = rest - seen.height
@@ -80,7 +80,7 @@ class PlasticControl(CellwiseControl):
 
     parameters: Plastic
 
-    def command(self, memory: Any, seen: Measurement) -> tuple[Any, Commands]:
+    def command(self, memory: Memory, seen: Measurement) -> tuple[Memory, Commands]:
         """Let cells give way that are pressed beyond yield, hold the others; see `Controller`."""
         limits = self.parameters
         pressed = seen.force >= limits.felt_force

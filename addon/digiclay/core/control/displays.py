@@ -17,7 +17,7 @@ from ..base.modes import Mode
 from ..base.quantity import quantity
 from ..files.formats import map_array
 from ..model.actuator import Actuator
-from ..model.control_interface import Commands, Controller, Measurement, count_losses
+from ..model.control_interface import Commands, Controller, Measurement, Memory, count_losses
 from ..model.layout import Disc, Grid
 from ..shapes.request import Shape
 from .device_info import DeviceInfo, check_floor
@@ -130,7 +130,7 @@ class ForceDisplayControl(CellwiseControl):
 
     rows = 1
 
-    def command(self, memory: Any, seen: Measurement) -> tuple[Any, Commands]:
+    def command(self, memory: Memory, seen: Measurement) -> tuple[Memory, Commands]:
         """Control the force of touched cells and the height of the others; see `Controller`."""
         gains, rest = self.parameters, self.actuator.rest_height
         asked = take_cells(self.field, seen.cells)

@@ -20,7 +20,7 @@ import numpy as np
 from ..base.arrays import TIE, Constants, Floats
 from ..base.quantity import quantity
 from ..model.contact import Contact
-from ..model.control_interface import Commands, Measurement, SetPoint
+from ..model.control_interface import Commands, Measurement, Memory, SetPoint
 from ..model.fingertip import Fingertip
 from ..model.layout import enclose_discs
 from ..model.null_parts import Unrelaxed
@@ -215,12 +215,12 @@ class HybridControl:
         """Return the memory before a session."""
         return Follower(due=self._unknown)
 
-    def locate(self, memory: Any, touched: Measurement) -> tuple[Any, Any]:
+    def locate(self, memory: Memory, touched: Measurement) -> tuple[Any, Any]:
         """Observe the pulp, and fit the fingertip; see `Controller`."""
         (memory,), (disc,) = self.locate_all([memory], touched)
         return memory, disc
 
-    def command(self, memory: Any, seen: Measurement) -> tuple[Any, Commands]:
+    def command(self, memory: Memory, seen: Measurement) -> tuple[Memory, Commands]:
         """Form the blister, and drive all pins to their heights; see `Controller`."""
         (memory,), commands = self.command_all([memory], seen)
         return memory, commands

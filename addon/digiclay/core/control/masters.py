@@ -14,6 +14,7 @@ import numpy as np
 
 from ..base.arrays import Flags, Floats
 from ..base.modes import FORCE_FOLLOW, SPRING
+from ..model.control_interface import Memory
 from ..model.layout import Disc
 from .travel import PARTS, Heading
 from .virtual_master import (
@@ -122,7 +123,7 @@ class VirtualMasterColumns(VirtualMasterControl):
         """Return the sums, (b,), as they are."""
         return sums
 
-    def follow(self, memory: Any, *sums: Any) -> Any:
+    def follow(self, memory: Memory, *sums: Any) -> Any:
         """VM Locate: see `VirtualMasterControl.follow`."""
         masters, gains = gather(memory).copy(), self.parameters
         numbers, felt = masters.numbers, gains.felt_force
@@ -140,11 +141,11 @@ class VirtualMasterColumns(VirtualMasterControl):
         masters.put(others, alone)
         return masters
 
-    def is_new(self, memory: Any) -> bool:
+    def is_new(self, memory: Memory) -> bool:
         """Tell whether some master has found a fingertip, and has no height yet."""
         return bool(np.isnan(memory.numbers[HEIGHT]).any())
 
-    def lead(self, memory: Any, force: Any, surface: Any, noise: Any = 0.0) -> Any:
+    def lead(self, memory: Memory, force: Any, surface: Any, noise: Any = 0.0) -> Any:
         """VM Control and VM Model: see `VirtualMasterControl.lead`."""
         masters, gains, cell = memory.copy(), self.parameters, self.model
         numbers = masters.numbers
@@ -170,7 +171,7 @@ class VirtualMasterColumns(VirtualMasterControl):
         masters.put(others, alone)
         return masters
 
-    def find_disc(self, memory: Any) -> Any:
+    def find_disc(self, memory: Memory) -> Any:
         """Return the discs that the masters control, m, or None of each."""
         radius = np.broadcast_to(self.blister.edge_radius, len(memory)).tolist()
         phase, x, y = memory.numbers[:3].tolist()
@@ -179,18 +180,18 @@ class VirtualMasterColumns(VirtualMasterControl):
         ]
         return discs
 
-    def is_active(self, memory: Any) -> bool:
+    def is_active(self, memory: Memory) -> bool:
         """Tell whether some master follows a fingertip."""
         return bool(memory.numbers[PHASE].any())
 
-    def get_pose(self, memory: Any) -> tuple[Any, Any, Any, Any]:
+    def get_pose(self, memory: Memory) -> tuple[Any, Any, Any, Any]:
         """Return where the masters are, (b,), m, and their directions of travel."""
         numbers = gather(memory).numbers
         idle = numbers[PHASE] == AWAY
         x, y = np.where(idle, NOWHERE, numbers[X : Y + 1])
         return x, y, numbers[TOWARD_X], numbers[TOWARD_Y]
 
-    def set_edge(self, memory: Any, level: Any, count: Any) -> Any:
+    def set_edge(self, memory: Memory, level: Any, count: Any) -> Any:
         """Put masters into surfaces: see `VirtualMasterControl.set_edge`."""
         masters, cells = memory.copy(), np.array(count)
         edge = level / np.maximum(cells, 1)
@@ -198,7 +199,7 @@ class VirtualMasterColumns(VirtualMasterControl):
         np.copyto(masters.numbers[EDGE], edge, where=cells > 0)
         return masters
 
-    def get_heights(self, memory: Any) -> tuple[Any, Any, Any, Any]:
+    def get_heights(self, memory: Memory) -> tuple[Any, Any, Any, Any]:
         """Return heights around and of the masters, (b,), and the rest of `VirtualMasterControl`'s."""
         phase, height, edge, felt, alone = memory.numbers[[PHASE, HEIGHT, EDGE, FELT, ALONE]]
         kind = np.where(phase == SPRUNG, SPRING, FORCE_FOLLOW)

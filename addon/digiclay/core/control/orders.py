@@ -25,14 +25,13 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import Any
 
 import numpy as np
 
 from ..base.arrays import Flags, Floats, any_true
 from ..base.modes import Mode
 from ..model.actuator import Actuator
-from ..model.control_interface import Commands, Controller, Measurement
+from ..model.control_interface import Commands, Controller, Measurement, Memory
 from ..model.layout import Disc, Grid, add_disc, widen_disc
 from ..model.null_parts import Uncontrolled
 from ..model.physics import Cell
@@ -119,7 +118,7 @@ class Around:
         """State rows a cell needs."""
         return self.method.rows
 
-    def begin(self) -> Any:
+    def begin(self) -> Memory:
         """Return the memory before a session."""
         return self.method.begin()
 
@@ -135,12 +134,12 @@ class DrivingControl(Around):
     reach: Disc
     """Cells to be driven, and those whose heights that takes, m."""
 
-    def locate(self, memory: Any, touched: Measurement) -> tuple[Any, Disc | None]:
+    def locate(self, memory: Memory, touched: Measurement) -> tuple[Memory, Disc | None]:
         """Request the order's disc, and the method's; see `Controller`."""
         memory, disc = self.method.locate(memory, touched)
         return memory, add_disc(disc, self.reach)
 
-    def command(self, memory: Any, seen: Measurement) -> tuple[Any, Commands]:
+    def command(self, memory: Memory, seen: Measurement) -> tuple[Memory, Commands]:
         """Drive the pins of the order, and those still on their way; the method commands all others."""
         moved = seen.mode == Mode.BLISTER
         memory, orders = self.method.command(memory, seen)
@@ -256,12 +255,12 @@ class LockingControl(Around):
     disc: Disc | None = None
     """Pins to be locked or unlocked; None: the locked ones stay as they are."""
 
-    def locate(self, memory: Any, touched: Measurement) -> tuple[Any, Disc | None]:
+    def locate(self, memory: Memory, touched: Measurement) -> tuple[Memory, Disc | None]:
         """Request the disc, and the method's; see `Controller`."""
         memory, disc = self.method.locate(memory, self._mask(touched))
         return memory, disc if self.disc is None else add_disc(disc, self.disc)
 
-    def command(self, memory: Any, seen: Measurement) -> tuple[Any, Commands]:
+    def command(self, memory: Memory, seen: Measurement) -> tuple[Memory, Commands]:
         """Shut the valves of locked pins; the method commands all others. See `Controller`."""
         locked = self._choose(seen)
         memory, orders = self.method.command(memory, self._mask(seen))

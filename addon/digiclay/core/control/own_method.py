@@ -22,7 +22,7 @@ from ..base.arrays import Floats, Modes
 from ..base.errors import DigiclayError, MethodError
 from ..base.modes import Mode
 from ..base.quantity import quantity
-from ..model.control_interface import Commands, Controller, Measurement
+from ..model.control_interface import Commands, Controller, Measurement, Memory
 from ..model.layout import Disc
 from .device_info import DeviceInfo, suppress_noise
 from .drive import Drive, DriveParameters, make_drive
@@ -90,10 +90,10 @@ class OwnMethod(DriveParameters):
         at_least=0.0,
     )
 
-    def begin(self, device: DeviceInfo) -> Any:
+    def begin(self, device: DeviceInfo) -> Memory:
         """Return the memory before a session: None, numbers, arrays, and (named) tuples of them."""
 
-    def locate(self, memory: Any, touched: Cells, device: DeviceInfo) -> tuple[Any, Disc | None]:
+    def locate(self, memory: Memory, touched: Cells, device: DeviceInfo) -> tuple[Memory, Disc | None]:
         """Return memory and the disc x, y, radius of the cells to command, m; None: those that move.
 
         `memory`: from `begin`, or `command` a period before; `touched`: those the fingertip may touch.
@@ -104,7 +104,7 @@ class OwnMethod(DriveParameters):
             return memory, None
         return memory, (float(force.dot(touched.x)) / total, float(force.dot(touched.y)) / total, self.reach)
 
-    def command(self, memory: Any, cells: Cells, device: DeviceInfo) -> tuple[Any, Orders]:
+    def command(self, memory: Memory, cells: Cells, device: DeviceInfo) -> tuple[Any, Orders]:
         """Return memory and orders for the cells of the disc and all that still move.
 
         `memory`: from `locate`; `device`: control period, cylinders, fluid and noise; see `DeviceInfo`.
@@ -129,15 +129,15 @@ class OwnControl:
         """State rows a cell needs."""
         return self.parameters.rows
 
-    def begin(self) -> Any:
+    def begin(self) -> Memory:
         """Return the memory before a session."""
         return self.parameters.begin(self.device)
 
-    def locate(self, memory: Any, touched: Measurement) -> Any:
+    def locate(self, memory: Memory, touched: Measurement) -> Any:
         """Let the method choose the cells it commands; see `Controller`."""
         return self.parameters.locate(memory, show_cells(touched), self.device)
 
-    def command(self, memory: Any, seen: Measurement) -> tuple[Any, Commands]:
+    def command(self, memory: Memory, seen: Measurement) -> tuple[Memory, Commands]:
         """Check the method's orders, and fill in what it leaves open; see `Controller`."""
         given = self.parameters.command(memory, show_cells(seen), self.device)
         memory, orders = take_results(given, 2, "memory and orders")
@@ -246,14 +246,14 @@ class Guarded:
     """Control period, s; state rows a cell needs."""
     pace: Pace = field(default_factory=Pace)
 
-    def begin(self) -> Any:
+    def begin(self) -> Memory:
         """Return the memory before a session."""
         with self._report("begin"):
             memory = self.inner.begin()
             _check_memory(memory)
         return memory
 
-    def locate(self, memory: Any, touched: Measurement) -> tuple[Any, Disc | None]:
+    def locate(self, memory: Memory, touched: Measurement) -> tuple[Memory, Disc | None]:
         """Let the method choose the cells it commands; see `Controller`."""
         start = time.thread_time()
         with self._report("locate"), np.errstate(all="ignore"):
@@ -267,7 +267,7 @@ class Guarded:
         self.pace.spent += time.thread_time() - start
         return after, disc
 
-    def command(self, memory: Any, seen: Measurement) -> tuple[Any, Commands]:
+    def command(self, memory: Memory, seen: Measurement) -> tuple[Memory, Commands]:
         """Let the method command the cells; see `Controller`."""
         start = time.thread_time()
         with self._report("command"), np.errstate(all="ignore"):
@@ -346,7 +346,7 @@ def _copy_read_only(seen: Measurement) -> Measurement:
     return given
 
 
-def _check_memory(memory: Any) -> None:
+def _check_memory(memory: Memory) -> None:
     """Refuse a memory that a kept state could not hold; see `session.snapshot`."""
     if isinstance(memory, tuple):
         for item in memory:

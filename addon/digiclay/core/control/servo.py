@@ -12,9 +12,8 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..base.arrays import Cells, Constants, Flags, Floats, Modes, any_true
+from ..base.arrays import Array, Cells, Constants, Flags, Floats, Modes, any_true
 from ..base.quantity import Parameters, quantity
 from .methods import ControlParameters
 
@@ -94,7 +93,7 @@ class BatchControl:
         return type(self)
 
 
-def take_cells(values: NDArray[Any], cells: Cells) -> NDArray[Any]:
+def take_cells(values: Array, cells: Cells) -> Array:
     """Return the values of cells (m[, b]) out of those of the bed, (n,), or of each run's bed, (n, b)."""
     return values.take(cells) if values.ndim == 1 else np.take_along_axis(values, cells, axis=0)
 

@@ -22,7 +22,7 @@ from ..base.arrays import Constants, Floats, Modes, count_true
 from ..base.modes import FORCE_FOLLOW, SPRING
 from ..base.quantity import quantity
 from ..model.actuator import Actuator
-from ..model.control_interface import Commands, Measurement, SetPoint
+from ..model.control_interface import Commands, Measurement, Memory, SetPoint
 from ..model.delay import Queue
 from ..model.interfaces import Flow
 from ..model.laws import import_part
@@ -77,7 +77,7 @@ class LossRule:
         """Tell whether a fingertip not felt for some control periods has been away for the loss time."""
         return alone * self.period >= self.time * (1.0 - 1e-9)
 
-    def wait(self, memory: Any) -> Any:
+    def wait(self, memory: Memory) -> Any:
         """Count a period without a fingertip in a `Master` or `Follower`; give it up after the loss time."""
         if memory.phase is IDLE:
             return memory
@@ -361,7 +361,7 @@ class VirtualMasterControl(BatchControl):
         """Return sums as `follow`, `lead` and `set_edge` take them: plain numbers, of a batch (b,)."""
         return sums.tolist()
 
-    def locate(self, memory: Any, touched: Measurement) -> tuple[Any, Any]:
+    def locate(self, memory: Memory, touched: Measurement) -> tuple[Any, Any]:
         """Locate the fingertip and move the master; see `Controller`."""
         basis, force = touched.quadratic_basis, touched.force
         if self._noisy:
@@ -380,7 +380,7 @@ class VirtualMasterControl(BatchControl):
         memory = self.lead(memory, total, surface, *noise)
         return memory, self.find_disc(memory)
 
-    def command(self, memory: Any, seen: Measurement) -> tuple[Any, Commands]:
+    def command(self, memory: Memory, seen: Measurement) -> tuple[Memory, Commands]:
         """Create the blister, freeze what is left behind, command every cell; see `Controller`."""
         target = seen.target
         mode = mark_formed(target, *self._limits[target.shape])
@@ -389,7 +389,7 @@ class VirtualMasterControl(BatchControl):
         command = lock_overloaded(self.parameters.command(target, seen.height), seen.force, self.lift)
         return memory, Commands(target, mode, command)
 
-    def _create_blister(self, memory: Any, seen: Measurement, mode: Modes) -> tuple[Any, Floats]:
+    def _create_blister(self, memory: Memory, seen: Measurement, mode: Modes) -> tuple[Any, Floats]:
         """Blister Creation: edge heights, profile, freezing; modes are set in place."""
         cells = self._rule.divide(self.get_pose(memory), seen.quadratic_basis)
         facing = self._rule.find_edge(cells)

@@ -13,6 +13,8 @@ from typing import IO, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.arrays import Array
+
 #: Errors of a damaged zip.
 BROKEN_ZIP = (zipfile.BadZipFile, zlib.error, struct.error, NotImplementedError, RuntimeError)
 #: Errors of numpy's readers for a malformed head.
@@ -74,14 +76,14 @@ def _head(file: IO[bytes], name: str) -> Head:
         raise ValueError(f"{name} has no head of an array of numbers") from None
 
 
-def read_array(archive: zipfile.ZipFile, name: str) -> NDArray[Any]:
+def read_array(archive: zipfile.ZipFile, name: str) -> Array:
     """Read an array whose head has been checked."""
     with archive.open(f"{name}.npy") as file:
-        read: NDArray[Any] = np.lib.format.read_array(file, allow_pickle=False)  # type: ignore[no-untyped-call]
+        read: Array = np.lib.format.read_array(file, allow_pickle=False)  # type: ignore[no-untyped-call]
         return read
 
 
-def map_array(path: Path) -> NDArray[Any]:
+def map_array(path: Path) -> Array:
     """Return the memory-mapped array of a file .npy; OSError, or ValueError if it has no numbers."""
     try:
         with warnings.catch_warnings(action="error"):

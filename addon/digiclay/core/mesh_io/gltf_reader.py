@@ -15,9 +15,8 @@ from typing import Any
 from urllib.parse import unquote
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..base.arrays import Floats, Indices
+from ..base.arrays import Array, Floats, Indices
 from ..base.errors import ParameterError
 from ..files.formats import read_count
 from .mesh_limits import (
@@ -151,7 +150,7 @@ class _File:
         first, odd = (0 * number, 0) if mode == FAN else (number, number % 2)
         return vertices, corners[np.column_stack([first, number + 1 + odd, number + 2 - odd])]
 
-    def _numbers(self, accessor: Any, kind: str) -> NDArray[Any]:
+    def _numbers(self, accessor: Any, kind: str) -> Array:
         """Return the items of an accessor, (count, numbers per item)."""
         entry = self._entry("accessors", accessor)
         if "bufferView" not in entry or "sparse" in entry:
@@ -174,7 +173,7 @@ class _File:
             content = f"{len(buffer):,} bytes of {start + length:,}"
             raise make_refusal("must be whole", self._path.name, content)
         strides = (stride, number.itemsize)
-        items: NDArray[Any] = np.ndarray((count, width), number, buffer, start + offset, strides)
+        items: Array = np.ndarray((count, width), number, buffer, start + offset, strides)
         if number.kind != "f" and entry.get("normalized", False):
             return np.maximum(items / float(np.iinfo(number).max), -1.0)
         return items

@@ -11,7 +11,7 @@ from typing import IO, Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.arrays import Floats
+from ..base.arrays import Array, Floats
 from ..base.errors import OutputError, ParameterError
 from ..files.run_folder import open_whole
 from ..surface.formed import NO_PIN, Body, split_pieces
@@ -111,7 +111,7 @@ def write_obj(file: BinaryIO, bodies: Sequence[Body], factor: float, up: str = U
         first += len(body.vertices)
 
 
-def _write_rows(file: BinaryIO | IO[bytes], line: str, pieces: Iterable[NDArray[Any]]) -> None:
+def _write_rows(file: BinaryIO | IO[bytes], line: str, pieces: Iterable[Array]) -> None:
     """Write each row of the pieces of a table as a line of text."""
     for rows in pieces:
         file.write(((line * len(rows)) % tuple(rows.ravel().tolist())).encode())

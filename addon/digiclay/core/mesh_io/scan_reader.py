@@ -8,9 +8,8 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..base.arrays import Floats, Indices
+from ..base.arrays import Array, Floats, Indices
 from ..base.errors import ParameterError
 from .mesh_limits import MOST_TRIANGLES, make_refusal, refuse_many_triangles
 
@@ -140,7 +139,7 @@ class _Element:
             at += struct.calcsize(part.code) * size
         return tuple(sizes), at
 
-    def read(self, body: bytes, start: int) -> tuple[dict[str, list[NDArray[Any]]], int]:
+    def read(self, body: bytes, start: int) -> tuple[dict[str, list[Array]], int]:
         """Return the values by property, arrays (rows[, length of a list]), and where they end."""
         sizes = self.measure(body, start)[0] if self.count else (0,) * len(self.properties)
         row = self.make_row(sizes)
@@ -151,7 +150,7 @@ class _Element:
             groups, end = self._read_unlike(body, start)
         return {part.name: [group[part.name] for group in groups] for part in self.properties}, end
 
-    def _read_unlike(self, body: bytes, start: int) -> tuple[list[NDArray[Any]], int]:
+    def _read_unlike(self, body: bytes, start: int) -> tuple[list[Array], int]:
         """Return rows whose lists differ in length, an array for each length, and where they end."""
         starts: dict[tuple[int, ...], list[int]] = {}
         for _ in range(self.count):
@@ -218,7 +217,7 @@ def _read_head(head: str) -> tuple[bool, list[_Element]]:
     return text, [_Element(*element, order) for element in elements]
 
 
-def _cut(polygons: list[NDArray[Any]], name: str) -> Indices:
+def _cut(polygons: list[Array], name: str) -> Indices:
     """Return the triangles (f, 3) of polygons, arrays (count, corners), as fans."""
     refuse_many_triangles(name, sum(len(group) * max(0, group.shape[1] - 2) for group in polygons))
     fans = [np.empty((0, 3), np.int64)]

@@ -6,7 +6,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ..base.arrays import Floats
-from .control_interface import Commands, Measurement
+from .control_interface import Commands, Measurement, Memory
 from .delay import Queue
 from .interfaces import Alike, Sensors
 
@@ -86,10 +86,10 @@ class Uncontrolled:
     def begin(self) -> None:
         """Nothing to remember."""
 
-    def locate(self, memory: Any, touched: Measurement) -> tuple[Any, None]:
+    def locate(self, memory: Memory, touched: Measurement) -> tuple[Any, None]:
         """Control no disc."""
         return memory, None
 
-    def command(self, memory: Any, seen: Measurement) -> tuple[Any, Commands]:
+    def command(self, memory: Memory, seen: Measurement) -> tuple[Memory, Commands]:
         """Leave targets and modes, and shut the valves."""
         return memory, Commands(seen.target, seen.mode, np.zeros(seen.target.shape))

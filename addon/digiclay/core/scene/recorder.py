@@ -6,12 +6,12 @@ import zipfile
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.arrays import Floats, Modes
+from ..base.arrays import Array, Floats, Modes
 from ..base.quantity import Parameters, quantity
 from ..engine.state import ActiveSet, Rows, State
 
@@ -119,7 +119,7 @@ class HistoryWriter:
         self._now[:, cells], self._mode_now[cells] = stretch.last, stretch.last_mode
         self._done, self._given = felt.stop, given.stop
 
-    def finish(self, period: int, every: int) -> dict[str, NDArray[Any]]:
+    def finish(self, period: int, every: int) -> dict[str, Array]:
         """Return the rows: period (t,), height, force, command, mode (t, n); valid until `begin`.
 
         A session that ends between two rows, of `every` periods each, gets another one.
@@ -149,7 +149,7 @@ class RunRecording(Recording):
         if state.active.rows.fingers and state.period % self.every == 0:
             self._pressing.append(state.finger_forces())
 
-    def finish(self, period: int) -> dict[str, NDArray[Any]]:
+    def finish(self, period: int) -> dict[str, Array]:
         """Return the rows up to the last period of the session, see `HistoryWriter.finish`."""
         self.flush()
         rows = self._history.finish(period, self.every)
@@ -159,7 +159,7 @@ class RunRecording(Recording):
         return rows
 
 
-def write(history: dict[str, NDArray[Any]], path: Path) -> None:
+def write(history: dict[str, Array], path: Path) -> None:
     """Write a history as an npz file that ``numpy.load`` reads.
 
     Deflated at the fastest level, because a row repeats most of the previous one. The paper's

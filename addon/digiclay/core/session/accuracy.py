@@ -10,12 +10,11 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..base.arrays import Floats
+from ..base.arrays import Array, Floats
 from ..base.errors import DigiclayError, ParameterError
 from ..engine.simulation import Progress, Stopped, begin, periods, repeat_period, trace_fingers
 from ..engine.state import State
@@ -148,7 +147,7 @@ def compare(height: Floats, force: Floats, other_height: Floats, other_force: Fl
 
 def estimate_errors(
     scene: Scene,
-    history: dict[str, NDArray[Any]],
+    history: dict[str, Array],
     *,
     progress: Progress = None,
     stopped: Stopped = None,

@@ -4,11 +4,10 @@ import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..base.arrays import Array
 from ..base.errors import OutputError
 from ..base.modes import Mode
 from ..files.formats import BROKEN_ZIP, Head, read_array, read_heads
@@ -41,7 +40,7 @@ class Run:
     """Scene and history of a run."""
 
     scene: Scene
-    history: dict[str, NDArray[Any]]
+    history: dict[str, Array]
 
 
 def read_run(folder: Path, *names: str) -> Run:
@@ -107,7 +106,7 @@ def is_whole(folder: Path, scene: Scene) -> bool:
     return whole and (scene.recorder is None or zipfile.is_zipfile(folder / HISTORY))
 
 
-def find_row(history: Mapping[str, NDArray[Any]], time: float, called: str) -> int:
+def find_row(history: Mapping[str, Array], time: float, called: str) -> int:
     """Return the row nearest to a time within the session, s; `called`: its name in messages."""
     moments = history["time"]
     if not moments[0] <= time <= moments[-1]:
@@ -117,7 +116,7 @@ def find_row(history: Mapping[str, NDArray[Any]], time: float, called: str) -> i
     return int(np.argmin(np.abs(moments - time)))
 
 
-def find_last_touch(history: Mapping[str, NDArray[Any]]) -> int:
+def find_last_touch(history: Mapping[str, Array]) -> int:
     """Return the last row with contact, or else the last one: it shows most."""
     touching = np.flatnonzero(history["total_force"] > 0.0)
     return int(touching[-1]) if touching.size else len(history["time"]) - 1

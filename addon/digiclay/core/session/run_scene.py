@@ -12,9 +12,8 @@ from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..base.arrays import Floats
+from ..base.arrays import Array, Floats
 from ..base.errors import explain_os_error
 from ..engine.simulation import Progress, Stopped, begin, periods
 from ..engine.system import System
@@ -31,7 +30,7 @@ from ..version import __version__
 from .accuracy import Errors, describe_bends, estimate_errors, explain_absence
 from .memory_limit import check_memory
 
-History = dict[str, NDArray[Any]]
+History = dict[str, Array]
 
 #: Metrics of every run with a history.
 RUN_METRICS = {**METRICS, **{name: RUN[name] for name in ("losses", "run_time", "real_time_factor")}}

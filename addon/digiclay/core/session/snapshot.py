@@ -13,9 +13,8 @@ from enum import Enum
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..base.arrays import Floats
+from ..base.arrays import Array, Floats
 from ..base.errors import StateError
 from ..base.modes import Mode
 from ..control.pin_division import Hands
@@ -23,13 +22,14 @@ from ..engine.simulation import begin
 from ..engine.state import ActiveSet, Rows, State
 from ..engine.system import System
 from ..files.formats import read_count
+from ..model.control_interface import Memory
 from ..model.layout import Disc, join_discs
 
 #: Largest number of a controller's memory, except those that begin infinite.
 LARGEST_KEPT = 1e75
 
 
-def flatten(memory: Any, arrays: list[NDArray[Any]]) -> Any:
+def flatten(memory: Memory, arrays: list[Array]) -> Any:
     """Return a memory as JSON: named tuples as lists that begin with their names, arrays as indices."""
     if isinstance(memory, np.ndarray):
         arrays.append(np.ascontiguousarray(memory, memory.dtype.newbyteorder("<")))
@@ -42,7 +42,7 @@ def flatten(memory: Any, arrays: list[NDArray[Any]]) -> Any:
     return memory.item() if isinstance(memory, np.generic) else memory
 
 
-def rebuild(template: Any, stored: Any, arrays: list[NDArray[Any]]) -> Any:
+def rebuild(template: Any, stored: Any, arrays: list[Array]) -> Any:
     """Return a flattened memory in the types of a `template` of the same controller, or raise StateError."""
     try:
         return _rebuild_like(template, stored, arrays)
@@ -53,7 +53,7 @@ def rebuild(template: Any, stored: Any, arrays: list[NDArray[Any]]) -> Any:
         ) from None
 
 
-def _rebuild_like(template: Any, stored: Any, arrays: list[NDArray[Any]]) -> Any:
+def _rebuild_like(template: Any, stored: Any, arrays: list[Array]) -> Any:
     """Return a stored memory in the types of the template; any error means another structure."""
     kind = type(template)
     if isinstance(template, np.ndarray):
@@ -109,14 +109,14 @@ class Snapshot:
     """Content of a snapshot: the header, and the arrays by their names in `State` and `ActiveSet`."""
 
     header: dict[str, Any]
-    arrays: dict[str, NDArray[Any]]
-    memory: list[NDArray[Any]]
+    arrays: dict[str, Array]
+    memory: list[Array]
 
 
 def dump(system: System, state: State) -> bytes:
     """Return a state as bytes, which stay as they are when the session continues."""
     active, rows = state.active, system.rows
-    arrays: list[NDArray[Any]] = []
+    arrays: list[Array] = []
     memory = flatten(state.memory, arrays)
     values = state.rows, state.modes, state.aged, active.cells, active.block, active.mode
     body = [np.ascontiguousarray(array, kind) for array, kind in zip(values, ARRAYS.values(), strict=True)]
@@ -248,7 +248,7 @@ def _read(data: bytes) -> Snapshot:
     return stored
 
 
-def _fill(values: NDArray[Any], bits: NDArray[Any], shape: tuple[int, ...]) -> Floats:
+def _fill(values: Array, bits: Array, shape: tuple[int, ...]) -> Floats:
     """Return an array with the values (k,) where the packed bits are 1, and 0 elsewhere."""
     count = math.prod(shape)
     if bits.shape != (-(-count // 8),):
@@ -258,9 +258,7 @@ def _fill(values: NDArray[Any], bits: NDArray[Any], shape: tuple[int, ...]) -> F
     return whole.reshape(shape)
 
 
-def _read_arrays(
-    data: bytes, at: int, shapes: list[tuple[str, tuple[int, ...]]]
-) -> tuple[list[NDArray[Any]], int]:
+def _read_arrays(data: bytes, at: int, shapes: list[tuple[str, tuple[int, ...]]]) -> tuple[list[Array], int]:
     """Return copies of the arrays in `data` from byte `at` on, and the byte after them."""
     arrays = []
     for name, shape in shapes:

@@ -10,12 +10,10 @@ import zipfile
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import groupby, islice
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..base.arrays import Floats
+from ..base.arrays import Array, Floats
 from ..base.errors import OutputError, ParameterError
 from ..control.orders import FARTHEST, STRONGEST, Orders, add_verbs, find_fault
 from ..engine.simulation import begin
@@ -228,7 +226,7 @@ def from_bytes(data: bytes) -> Take:
         raise OutputError(f"The take is damaged and cannot be read: {error}.") from None
 
 
-def _read_orders(parts: dict[str, NDArray[Any]]) -> Orders | None:
+def _read_orders(parts: dict[str, Array]) -> Orders | None:
     """Return the orders in a take's arrays, which some versions lack."""
     if SMOOTHING in parts:
         return Orders(add_verbs(parts[SMOOTHING]))

@@ -14,7 +14,7 @@ from typing import Any, BinaryIO, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.arrays import TIE, Floats
+from ..base.arrays import TIE, Array, Floats
 from ..base.errors import ParameterError
 from ..mesh_io.mesh_limits import LARGEST, make_refusal
 from ..model.layout import RELATIVE_TOLERANCE, Grid
@@ -139,7 +139,7 @@ def _jpeg(head: bytes) -> tuple[int, int]:
         at += 1 + length
 
 
-Pixels = NDArray[Any]
+Pixels = Array
 
 #: Pictures by extension.
 PICTURES = (".png", ".tif", ".tiff", ".jpg", ".jpeg", ".bmp", ".pgm", ".exr", ".hdr")

@@ -8,12 +8,11 @@ d_j is less by the radius of a disc of as many cells as follow, less half a pitc
 """
 
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..base.arrays import Floats
+from ..base.arrays import Array, Floats
 from ..base.modes import Mode
 from ..control.blister import Blister
 from ..metrics.summary import compute_cell_area, find_contact_rows, find_stretches, split_fingers
@@ -35,7 +34,7 @@ class ReliefError(NamedTuple):
 
 
 def find_nominal(
-    scene: Scene, history: Mapping[str, NDArray[Any]], following: NDArray[Any], pressed: float = 0.0
+    scene: Scene, history: Mapping[str, Array], following: Array, pressed: float = 0.0
 ) -> Floats:
     """Return the nominal heights over the bed at rest, (n,), m."""
     assert scene.blister is not None
@@ -51,7 +50,7 @@ def find_nominal(
     return np.where(boss > 0.0, boss, crease)
 
 
-def measure_relief(scene: Scene, history: Mapping[str, NDArray[Any]], pressed: float | None) -> ReliefError:
+def measure_relief(scene: Scene, history: Mapping[str, Array], pressed: float | None) -> ReliefError:
     """Return the deviation of the final heights from the nominal ones, of all fingers together."""
     if scene.blister is None or pressed is None:
         return ReliefError(None, None)
@@ -76,7 +75,7 @@ def measure_relief(scene: Scene, history: Mapping[str, NDArray[Any]], pressed: f
     return ReliefError(float(np.sqrt(np.mean(off**2))), float(np.abs(off).max()))
 
 
-def measure_reach(scene: Scene, position: Floats, following: NDArray[Any]) -> Floats:
+def measure_reach(scene: Scene, position: Floats, following: Array) -> Floats:
     """Return the radius of the cells' axes under the fingertip, (t,), m; 0 except for Method II."""
     if scene.method != "cell_states":
         return np.zeros(len(following))

@@ -17,12 +17,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from ..base.arrays import TIE, Faces, Flags, Floats, Indices
+from ..base.arrays import TIE, Array, Faces, Flags, Floats, Indices
 from ..base.errors import OutputError, ParameterError
 from ..model.layout import find_grid_shape, find_neighbors, name_first_bad, read_places
 
@@ -123,7 +122,7 @@ def measure_areas(position: Floats, faces: Faces) -> Floats:
     return np.asarray(0.5 * ((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]))
 
 
-def take_corners(table: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any], NDArray[Any]]:
+def take_corners(table: Array) -> tuple[Array, Array, Array, Array]:
     """Return the four corners, in sequence, of each cell between the rows and columns of a table."""
     return table[:-1, :-1], table[:-1, 1:], table[1:, 1:], table[1:, :-1]
 
@@ -240,7 +239,7 @@ class Formed:
         return np.where(on_bed, parts[0] * (1.0 - share) + parts[1] * share, np.nan)
 
 
-def make_formed(history: Mapping[str, NDArray[Any]], row: int, former: int | float = 0) -> Formed:
+def make_formed(history: Mapping[str, Array], row: int, former: int | float = 0) -> Formed:
     """Return a row of a history as a formed surface; `former`: a row (int), or one height, m (float)."""
     height = history["height"]
     count = len(height)
@@ -281,7 +280,7 @@ class Body:
     """Whether it encloses a volume."""
 
 
-def split_pieces(table: NDArray[Any]) -> Iterator[NDArray[Any]]:
+def split_pieces(table: Array) -> Iterator[Array]:
     """Yield the rows of a table in order, at most `PIECE` at a time."""
     for start in range(0, len(table), PIECE):
         yield table[start : start + PIECE]

@@ -14,12 +14,10 @@ each row, then across the rows.
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..base.arrays import Faces, Floats
+from ..base.arrays import Array, Faces, Floats
 from ..base.spline import interpolate_monotone
 from .formed import NO_PIN, Formed, make_skin
 
@@ -171,7 +169,7 @@ class SurfaceGrid:
         index = np.arange(self.rows * self.columns, dtype=np.int32).reshape(self.rows, self.columns)
         return index[:: self.parts, :: self.parts].ravel()
 
-    def nearest(self, of_pins: NDArray[Any]) -> NDArray[Any]:
+    def nearest(self, of_pins: Array) -> Array:
         """Return at each point the value of the pin in the nearest row and column."""
         row, column = (
             (np.arange((count - 1) * self.parts + 1) + self.parts // 2) // self.parts
