@@ -118,7 +118,9 @@ def test_every_make_of_the_pages_is_carried_out_in_the_checkout_where_it_belongs
 
 
 def test_a_command_that_fails_is_noticed(tmp_path: Path) -> None:
-    text = "    digiclay run \\\n    absent_scene\n    digiclay --version\n`digiclay run`, `digiclay run SCENE`\n"
+    text = (
+        "    digiclay run \\\n absent_scene\n    digiclay --version\n`digiclay run`, `digiclay run SCENE`\n"
+    )
     (failure,) = play(text, tmp_path, set())
     assert "digiclay run absent_scene: status 2" in failure
     assert play(text, tmp_path, {"digiclay run absent_scene"}) == []
