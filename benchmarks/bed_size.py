@@ -7,10 +7,10 @@ import time
 import tracemalloc
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from digiclay.core.engine.simulation import begin, periods
+from digiclay.core.files.tables import Record
 from digiclay.core.mesh_io.export_model import Model, make_bodies
 from digiclay.core.mesh_io.mesh_writer import FORMATS, find_suffix, write
 from digiclay.core.model.layout import Layout, make_grid
@@ -121,7 +121,7 @@ def formed(side: int) -> Formed:
     return Formed.of(place, 0.04 + 0.01 * wave, 0.04, 0.0, 0)
 
 
-def export(side: int, kind: str, file: str) -> dict[str, Any]:
+def export(side: int, kind: str, file: str) -> Record:
     """Export a bed once for the times, s, and once for the memory, MB; `file`: one of `FORMATS`."""
     bed = formed(side)
     finding = Finding() if kind == "features" else None

@@ -6,12 +6,11 @@ import math
 import re
 import subprocess
 import tomllib
-from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
-from typing import Any
 
 from digiclay.core.base.errors import OutputError
+from digiclay.core.files.tables import Record, Table
 from digiclay.core.metrics.metric_table import ERRORS, FACTORS
 from digiclay.core.scene.scene_source import Setting, find, load
 from digiclay.core.session.run_scene import run
@@ -47,7 +46,7 @@ USUAL: Row = {
 
 
 @cache
-def read_plan() -> dict[str, Any]:
+def read_plan() -> Record:
     """Return figures.toml."""
     return tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
 
@@ -90,7 +89,7 @@ def describe_uncompared(page: str) -> str:
 
 
 @cache
-def measure_scene(name: str, settings: tuple[str, ...], limit: str, *, errors: bool) -> Mapping[str, Any]:
+def measure_scene(name: str, settings: tuple[str, ...], limit: str, *, errors: bool) -> Table:
     """Return a speed by its name in `LIMITS`, or all metrics of a scene with some settings."""
     scene = load(find(name), [Setting(*setting.split("=", 1)) for setting in settings])
     if limit in LIMITS:

@@ -4,10 +4,10 @@ import argparse
 import sys
 import tempfile
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from digiclay.core.engine.simulation import begin, periods
+from digiclay.core.files.tables import Record
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.scene_source import find, list_samples, make_scene, read_table
 from digiclay.core.scene.schema import Scene
@@ -55,7 +55,7 @@ def list_scenes() -> dict[str, Scene]:
     return scenes
 
 
-def record(scene: Scene) -> dict[str, Any]:
+def record(scene: Scene) -> Record:
     """Return heights, m, forces, N, and modes of every so many control periods, (t, n)."""
     system = assemble(scene)
     rows = [

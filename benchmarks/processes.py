@@ -13,10 +13,10 @@ import tempfile
 import time
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from digiclay.core.base.errors import DigiclayError, OutputError
+from digiclay.core.files.tables import Record
 from digiclay.core.model.trajectory import sample_poses
 from digiclay.core.scene.scene_source import find, load
 
@@ -169,7 +169,7 @@ def measure_serve(arguments: argparse.Namespace, steps: Steps) -> Report:
     return Report(lines, rows)
 
 
-def _serve(seconds: float, rate: int, fingers: int) -> tuple[dict[str, Any], int]:
+def _serve(seconds: float, rate: int, fingers: int) -> tuple[Record, int]:
     """Run a server and a client; return what they report, and how many frames the client received."""
     token = secrets.token_urlsafe(18)
     with tempfile.TemporaryDirectory() as folder:
@@ -185,7 +185,7 @@ def _serve(seconds: float, rate: int, fingers: int) -> tuple[dict[str, Any], int
             process.stdout.read()
         if process.returncode or not answers:
             raise OutputError("digiclay serve has ended early: see above.")
-        figures: dict[str, Any] = json.loads(report.read_text(encoding="utf-8"))
+        figures: Record = json.loads(report.read_text(encoding="utf-8"))
     shares = np.quantile(answers, list(SHARES.values())).tolist()
     return {**figures, "answer": dict(zip(SHARES, shares, strict=True))}, frames
 

@@ -13,13 +13,14 @@ from typing import Any, TextIO, TypeVar
 import numpy as np
 from digiclay.commands.progress import Line, draw_share, table
 from digiclay.core.base.errors import explain_os_error
+from digiclay.core.files.tables import Table
 from digiclay.plots.figure import LINES, STYLE, empty, save
 
 from digiclay_study.suite_page import describe_machine
 
 Item = TypeVar("Item")
 #: Row of a CSV by column.
-Row = Mapping[str, Any]
+Row = Table
 
 #: Okabe and Ito's palette: of the first and second line.
 BLUE, RED = LINES[:2]

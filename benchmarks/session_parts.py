@@ -22,6 +22,7 @@ from digiclay.core.base.arrays import Floats
 from digiclay.core.engine.simulation import advance, begin, periods, trace_fingers
 from digiclay.core.engine.state import State
 from digiclay.core.engine.system import System
+from digiclay.core.files.tables import Record
 from digiclay.core.model.trajectory import Trajectory, sample_poses
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.recorder import Recorder, RunRecording
@@ -98,7 +99,7 @@ for _name in ARRAY_METHODS:
     setattr(Counted, _name, _note_method(_name))
 
 
-def _call(name: str, function: Callable[..., Any], arguments: Any, named: dict[str, Any]) -> Any:
+def _call(name: str, function: Callable[..., Any], arguments: Any, named: Record) -> Any:
     """Note a call, and make it with plain arrays; its result is counted."""
     Counted.ledger[name] += 1
     return _counted(function(*_plain(arguments), **named))
@@ -325,7 +326,7 @@ def measure_terms(arguments: argparse.Namespace, steps: Steps) -> Report:
     return Report([title, *tabulate(rows, EFFECTS)], rows, name=f"terms_{scene.name}")
 
 
-def _compare(scene: Scene, full: list[Floats], repeats: int) -> dict[str, Any]:
+def _compare(scene: Scene, full: list[Floats], repeats: int) -> Record:
     """Return a scene's cost, and its differences from the full one, m and N."""
     system = assemble(scene)
     calls = period_calls(system, scene.trajectories(), min(scene.periods, 400))[0]

@@ -5,11 +5,11 @@ import math
 from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
-from typing import Any
 
 import numpy as np
 from digiclay.core.control.blister import Blister
 from digiclay.core.control.methods import find_method
+from digiclay.core.files.tables import Record
 from digiclay.core.metrics.summary import compute_metrics, split_fingers
 from digiclay.core.model.trajectory import Path, Waypoint
 from digiclay.core.scene.assembly import assemble
@@ -106,7 +106,7 @@ def make_scene(method: str, ways: list[Way], size: int = 40, turn: float = TURN)
     """
     paper = load(find("ridge_mound_valley"))
     control = find_method(method).import_parameters()() if method else None
-    other: dict[str, Any] = dict(find_method(method).blister or {}) if method else {}
+    other: Record = dict(find_method(method).blister or {}) if method else {}
     half = math.cos(turn / 2), 0.0, 0.0, math.sin(turn / 2)
 
     def lay(time: float, x: float, y: float, z: float) -> Waypoint:

@@ -5,12 +5,11 @@ import copy
 import statistics
 import time
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import cache
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 from digiclay.commands.progress import table
@@ -18,6 +17,7 @@ from digiclay.core.base.arrays import Floats
 from digiclay.core.base.errors import DivergenceError
 from digiclay.core.engine.simulation import begin, periods
 from digiclay.core.engine.system import System
+from digiclay.core.files.tables import Record, Table
 from digiclay.core.model.fingertip import compute_forms, compute_underside
 from digiclay.core.model.physics import find_speeds
 from digiclay.core.model.trajectory import Trajectory
@@ -45,7 +45,7 @@ PRESS = (
 class Case:
     """A case."""
 
-    changes: Mapping[str, Any] = field(default_factory=dict)
+    changes: Table = field(default_factory=dict)
     """Sections of a scene file."""
     path: Path = PRESS
     """Waypoints: time, s; x, m; height over the bed at rest, m."""
@@ -152,7 +152,7 @@ CASES[ALL] = Case(
 
 def scene(case: Case, stepper: str, step: float, period: float) -> Scene:
     """Return the scene of a case, without recorder: 5 x 5 pins; physics step and control period, s."""
-    sections: dict[str, Any] = {**BED, **copy.deepcopy(dict(case.changes))}
+    sections: Record = {**BED, **copy.deepcopy(dict(case.changes))}
     rest = sections.get("actuator", {}).get("rest_height", 40e-3)
     sections["recorder"] = "absent"
     sections["simulation"] = {

@@ -2,7 +2,9 @@
 
 import tomllib
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
+
+from digiclay.core.files.tables import Record
 
 from . import evidence
 from .evidence import MM
@@ -10,7 +12,7 @@ from .results import AHEAD, PAPER_SPEED, Results
 from .scenes import PRESSED
 
 #: Claims, figures and metrics of the page, in its order.
-TEXTS: dict[str, Any] = tomllib.loads(Path(__file__).with_name("paper.toml").read_text(encoding="utf-8"))
+TEXTS: Record = tomllib.loads(Path(__file__).with_name("paper.toml").read_text(encoding="utf-8"))
 
 
 class Claim(NamedTuple):

@@ -12,6 +12,7 @@ from digiclay import __version__
 from digiclay.core.base.modes import MEANINGS, Mode
 from digiclay.core.control.cell_states import BY_FORCE, BY_PLACE, VIRTUAL_SPRING, Arrow
 from digiclay.core.files.run_folder import format_json, write_whole
+from digiclay.core.files.tables import Record
 from digiclay.core.studies.speed_limits import Follows
 from digiclay.plots.figure import MM, save
 
@@ -128,7 +129,7 @@ def produce(folder: Path, extent: Extent, announce: Announce) -> list[str]:
     return [f"{claim.verdict:14} {claim.printed}" for claim in judged]
 
 
-def _numbers(results: Results) -> dict[str, Any]:
+def _numbers(results: Results) -> Record:
     """Return what was measured, as it is written to ``metrics.json``; SI units."""
     methods = list_methods(results.session)
     numbers = {

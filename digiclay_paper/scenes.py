@@ -3,9 +3,9 @@
 from collections.abc import Mapping
 from dataclasses import replace
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
+from digiclay.core.files.tables import Record
 from digiclay.core.model.trajectory import Path
 from digiclay.core.scene.schema import Scene
 from digiclay.core.scene.toml_table import resolve
@@ -80,7 +80,7 @@ def at_rest(noise: float, radius: float | None = None) -> Scene:
 
 def _table(
     method: str, side: int, control: Mapping[str, float | str], form: Mapping[str, float | str]
-) -> dict[str, Any]:
+) -> Record:
     return {
         "layout": {"rows": side, "columns": side},
         "control": {"method": method, **control},

@@ -2,9 +2,9 @@
 
 import asyncio
 from collections import Counter
-from typing import Any
 
 from digiclay.core.base.errors import DigiclayError, ParameterError
+from digiclay.core.files.tables import Record
 
 from .doors import LatestSlot, Order, pack_order
 from .protocol import Bed, Frame, Pose, Poses, Reset, Status, unpack_frame
@@ -48,7 +48,7 @@ class DoorLink:
             self._frame = unpack_frame(self.packed)
         return self._frame
 
-    def order(self, request: Pose | Poses | Reset | Status, client: object) -> dict[str, Any] | None:
+    def order(self, request: Pose | Poses | Reset | Status, client: object) -> Record | None:
         """Carry out a request of a client, equal to itself alone; return the answer, if there is one.
 
         Raises FrequentError while another client moves the fingertip; and for what was wrong with some of

@@ -12,9 +12,9 @@ import os
 import sys
 from contextlib import AsyncExitStack, suppress
 from pathlib import Path
-from typing import Any
 
 from digiclay.core.base.errors import DigiclayError, OutputError
+from digiclay.core.files.tables import Record
 
 from .door_link import DoorLink
 from .doors import open_slot
@@ -52,7 +52,7 @@ def _allow_many_files() -> None:
         resource.setrlimit(resource.RLIMIT_NOFILE, (min(max(soft, 4096), hard), hard))
 
 
-def _tell(value: dict[str, Any]) -> None:
+def _tell(value: Record) -> None:
     """Write a line of JSON for the process that started this one."""
     with suppress(BrokenPipeError):
         print(json.dumps(value), flush=True)
@@ -70,7 +70,7 @@ class _ErrorCount(logging.Handler):
         self._link.counts[f"errors of {record.name}"] += 1
 
 
-async def _serve(settings: dict[str, Any]) -> None:
+async def _serve(settings: Record) -> None:
     """Open the doors and serve; tell the addresses, and the counts in the end."""
     orders, frames = (open_slot(Path(name)) for name in settings["slots"])
     link = DoorLink(Bed(**settings["bed"]), orders, frames, settings["token"])

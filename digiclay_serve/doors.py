@@ -14,11 +14,12 @@ import zlib
 from contextlib import AbstractContextManager, suppress
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import digiclay
 import numpy as np
 from digiclay.core.base.errors import OutputError
+from digiclay.core.files.tables import Record
 
 from .protocol import MOST_FINGERS, Bed, Poses
 
@@ -214,7 +215,7 @@ class Doors(AbstractContextManager["Doors"]):
         except OSError:
             raise OutputError("The process of the doors has ended.") from None
 
-    def close(self) -> dict[str, Any]:
+    def close(self) -> Record:
         """Close the doors, and return what they have counted."""
         assert self._process.stdin is not None
         self._process.stdin.close()
@@ -226,7 +227,7 @@ class Doors(AbstractContextManager["Doors"]):
     def __exit__(self, *raised: object) -> None:
         self._end(HEEDING)
 
-    def _read_line(self, patience: float) -> dict[str, Any]:
+    def _read_line(self, patience: float) -> Record:
         """Read a line of JSON; an empty answer when there is none in time, s."""
         stdout = self._process.stdout
         assert stdout is not None

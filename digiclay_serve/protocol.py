@@ -19,6 +19,7 @@ import numpy as np
 from digiclay.core.base.arrays import Floats
 from digiclay.core.base.errors import OutputError, ParameterError
 from digiclay.core.engine.system import System
+from digiclay.core.files.tables import Record
 from digiclay.core.model.fingertip import LEVEL
 from digiclay.core.model.touch import MOST_FORCE
 from digiclay.core.scene.schema import Scene
@@ -286,7 +287,7 @@ def read_json(text: str) -> Pose | Poses | Reset | Status:
     )
 
 
-def _list_numbers(finger: dict[str, Any]) -> list[object]:
+def _list_numbers(finger: Record) -> list[object]:
     """Return what a finger has for numbers of a pose, as it stands: `check_fingers` refuses it alone."""
     place, turn = finger.get("position", []), finger.get("orientation", [])
     whole = isinstance(place, list) and isinstance(turn, list) and len(place) in (0, 3)
@@ -302,7 +303,7 @@ KEYS = {
 }
 
 
-def _check_keys(message: dict[str, Any], allowed: set[str]) -> None:
+def _check_keys(message: Record, allowed: set[str]) -> None:
     """Refuse unknown keys."""
     if unknown := sorted(set(message) - allowed):
         rule = f"must have no other keys than {', '.join(sorted(allowed))}"

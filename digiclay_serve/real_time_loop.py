@@ -7,9 +7,9 @@ import time
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
+from digiclay.core.files.tables import Record
 from digiclay.core.session import snapshot
 from digiclay.core.session.take import make_take
 from numpy.typing import NDArray
@@ -80,7 +80,7 @@ class TimeCounts:
                 return min((place + 1) * self.width, self.longest)
         return self.longest
 
-    def describe(self) -> dict[str, Any]:
+    def describe(self) -> Record:
         """Return the figures for a report: shares and longest, s; and the bins that hold something."""
         shares = {f"p{100 * share:g}": self.find_share(share) for share in SHARES}
         table = [[round(place * self.width, 9), count] for place, count in sorted(self.bins.items())]
@@ -106,7 +106,7 @@ def run_session(
     part: float,
     stopped: Callable[[], bool],
     tell: Callable[[str], None],
-) -> tuple[Session, dict[str, Any]]:
+) -> tuple[Session, Record]:
     """Run a session in real time until it is to stop; return it, and the figures of its deadlines.
 
     `session`: used up; `writer`: of a take; `part`: duration of a part of it, s; `stopped`: whether to stop;
@@ -179,7 +179,7 @@ def run_session(
     return replace(session, recording=None), figures
 
 
-def _find_effort(session: Session) -> dict[str, Any]:
+def _find_effort(session: Session) -> Record:
     """Return simulated time, s, and errors since the last reset, as the metrics of a run have them."""
     simulated = {"simulated": session.state.period * session.system.period}
     if session.errors is None:

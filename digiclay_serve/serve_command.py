@@ -4,7 +4,7 @@ import argparse
 import math
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
@@ -16,6 +16,7 @@ from digiclay.commands.stop import Stop
 from digiclay.core.base.addresses import describe_exposure
 from digiclay.core.base.errors import OutputError
 from digiclay.core.files.run_folder import format_json, write_whole
+from digiclay.core.files.tables import Table
 from digiclay.core.metrics.metric_table import describe_errors
 from digiclay.core.scene.scene_source import Setting
 
@@ -152,7 +153,7 @@ def _tell(line: str) -> None:
     print(line, flush=True)
 
 
-def _summary(figures: Mapping[str, Any]) -> Iterator[str]:
+def _summary(figures: Table) -> Iterator[str]:
     """Give the lines about a session that has ended."""
     elapsed, period, periods = figures["elapsed"], figures["period"], figures["periods"]
     shares = ", ".join(f"{name} {1e3 * elapsed[name]:.2f} ms" for name in ("p50", "p99", "p99.9", "longest"))

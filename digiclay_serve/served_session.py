@@ -20,6 +20,7 @@ from digiclay.core.control.travel import measure_square
 from digiclay.core.engine.simulation import begin
 from digiclay.core.engine.system import System
 from digiclay.core.files.run_folder import Content, claim_folder, make_folder, write_whole
+from digiclay.core.files.tables import Record
 from digiclay.core.model.contact import Contact
 from digiclay.core.model.fingertip import Fingertip, compute_forms, compute_underside
 from digiclay.core.model.trajectory import interpolate_poses, sample_poses
@@ -274,7 +275,7 @@ class PartWriter(AbstractContextManager["PartWriter"]):
         self.folder, self._overwrite = folder, overwrite
         self.failure = ""
         #: Simulated time and errors of each take by its number, as the metrics of a run have them.
-        self.efforts: dict[int, dict[str, Any]] = {}
+        self.efforts: dict[int, Record] = {}
         self._old: list[Path] = []
         self._claim = ExitStack()
         self._writing = ThreadPoolExecutor(1)

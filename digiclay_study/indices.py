@@ -1,15 +1,15 @@
 """Sobol samples and indices by SALib: shares of an output's variance by parameter, with intervals."""
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from digiclay.core.base.arrays import Floats
 from digiclay.core.base.errors import OutputError
-from digiclay.core.studies.axes import Record
+from digiclay.core.files.tables import Record
 
 
-def describe_problem(parameters: int) -> dict[str, Any]:
+def describe_problem(parameters: int) -> Record:
     """Return SALib's description of parameters that are shares of their ranges, from 0 to 1."""
     # As an array: pandas, which SALib groups them with, takes no list.
     names = np.array([f"x{number}" for number in range(parameters)], dtype=object)

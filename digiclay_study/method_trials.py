@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from digiclay.core.base.errors import ParameterError
 from digiclay.core.base.quantity import find_nearest_name
+from digiclay.core.files.tables import Record
 from digiclay.core.metrics.metric_table import ERRORS, METHOD, METRICS, Metric
 from digiclay.core.metrics.summary import compute_metrics, perceive
 from digiclay.core.model.trajectory import Path, Waypoint
@@ -180,7 +181,6 @@ def draw_drags(count: int) -> list[Drawn]:
     return drags
 
 
-Record = dict[str, Any]
 Stopped = Callable[[], bool] | None
 Measure = Callable[[Scene, Stopped], Record | None]
 

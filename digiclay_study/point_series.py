@@ -16,6 +16,7 @@ from digiclay.core.base.arrays import Floats
 from digiclay.core.base.errors import DigiclayError, OutputError, ParameterError
 from digiclay.core.base.quantity import UNITS
 from digiclay.core.files.run_folder import write_whole
+from digiclay.core.files.tables import Record, Table
 from digiclay.core.metrics.metric_table import ERRORS
 from digiclay.core.scene.scene_source import Setting, find, load
 from digiclay.core.scene.schema import Scene
@@ -148,7 +149,7 @@ class Subject:
         points = axes.place_points(self.path, self.settings, self.keys, rows, first=first, progress=progress)
         return judge_all(points) if any(name in ERRORS for name in self.names) else points
 
-    def open_folder(self, path: Path, name: str, plan: Mapping[str, Any]) -> AbstractContextManager[Folder]:
+    def open_folder(self, path: Path, name: str, plan: Table) -> AbstractContextManager[Folder]:
         """Open the folder of a study or a tuning, see `open_points`. `plan`: what else points depend on."""
         description = {
             "digiclay": __version__,
@@ -157,7 +158,7 @@ class Subject:
             "scene": hash_points([self.unchanged]),
         }
 
-        def describe(there: Mapping[str, Any]) -> str:
+        def describe(there: Table) -> str:
             for key, here in description.items():
                 if there.get(key) != here:
                     plain = isinstance(there.get(key), (int, str)) and key != "scene"
@@ -166,7 +167,7 @@ class Subject:
 
         return open_points(path, name, description, describe)
 
-    def evaluate_unchanged(self, evaluation: Evaluation, *, quiet: bool) -> axes.Record | None:
+    def evaluate_unchanged(self, evaluation: Evaluation, *, quiet: bool) -> Record | None:
         """Return the record of the unchanged scene, None after a stop; print how long others take."""
         evaluation.finish([(self.unchanged,)], ())
         records = evaluation.collect()
@@ -182,7 +183,7 @@ class Subject:
         return record
 
     def write_table(
-        self, path: Path, points: Sequence[axes.Point], records: Mapping[int, axes.Record], *extra: str
+        self, path: Path, points: Sequence[axes.Point], records: Mapping[int, Record], *extra: str
     ) -> None:
         """Write a table of points, in SI units; the unchanged scene has its own values.
 

@@ -15,7 +15,8 @@ from digiclay.commands.refusals import refuse_without
 from digiclay.core.base.arrays import Floats
 from digiclay.core.base.errors import OutputError
 from digiclay.core.files.run_folder import write_whole
-from digiclay.core.studies.axes import Point, Record, find_ends
+from digiclay.core.files.tables import Record
+from digiclay.core.studies.axes import Point, find_ends
 from digiclay.core.studies.evaluation import FIGURES, describe_effort, make_bundles
 from digiclay.core.studies.sweep_plan import format_csv
 from digiclay.plots.sweep import read_unit

@@ -1,10 +1,9 @@
 """``digiclay compare --suite``: control methods over many trajectories with noise, and their league."""
 
 import argparse
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
 
 from digiclay import __version__
 from digiclay.commands.arguments import METHOD, add_options, settings_of, whole_number
@@ -13,9 +12,10 @@ from digiclay.commands.progress import format_command
 from digiclay.commands.refusals import refuse_without
 from digiclay.core.base.errors import DigiclayError, OutputError, ParameterError
 from digiclay.core.control.methods import METHODS
+from digiclay.core.files import tables
 from digiclay.core.files.run_folder import find_name, write_whole
 from digiclay.core.scene.scene_source import Setting, find, load
-from digiclay.core.studies.axes import Point, Record
+from digiclay.core.studies.axes import Point
 from digiclay.core.studies.sweep_plan import hash_points, open_points
 from digiclay.plots.figure import save
 
@@ -72,7 +72,7 @@ def run_suite(arguments: argparse.Namespace, methods: Sequence[str], words: Sequ
         "scenes": plan.identity,
     }
 
-    def describe(there: Mapping[str, Any]) -> str:
+    def describe(there: tables.Table) -> str:
         return f"{there.get('points', '?')} trials, digiclay {there.get('digiclay', '?')}"
 
     return run_series(
@@ -132,7 +132,7 @@ def _count_drags(arguments: argparse.Namespace) -> int:
     return arguments.drags or (2 if arguments.quick else 20)
 
 
-def _write(out: Path, plan: Plan, records: dict[int, Record], command: str) -> list[str]:
+def _write(out: Path, plan: Plan, records: dict[int, tables.Record], command: str) -> list[str]:
     """Write tables, plots and page of finished trials; return the lines to print."""
     table: Table = {
         (point.words[0], point.words[1], int(point.words[2])): records[point.index]["figures"]

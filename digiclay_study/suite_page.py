@@ -13,7 +13,8 @@ import numpy as np
 from digiclay import __version__
 from digiclay.commands.gallery import make_links, make_table, wrap
 from digiclay.commands.progress import table as aligned
-from digiclay.core.studies.axes import Point, Record
+from digiclay.core.files.tables import Record
+from digiclay.core.studies.axes import Point
 from digiclay.core.studies.speed_limits import describe_end
 from digiclay.core.studies.sweep_plan import format_csv
 

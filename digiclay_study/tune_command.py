@@ -15,8 +15,9 @@ from digiclay.commands.refusals import refuse_without
 from digiclay.core.base.arrays import Floats
 from digiclay.core.base.errors import OutputError, ParameterError
 from digiclay.core.files.run_folder import write_whole
+from digiclay.core.files.tables import Record
 from digiclay.core.scene.toml_table import format_scene
-from digiclay.core.studies.axes import Point, Record, find_ends
+from digiclay.core.studies.axes import Point, find_ends
 from digiclay.core.studies.evaluation import FIGURES, describe_effort, find_figure, make_bundles
 from digiclay.plots.sweep import read_unit
 from numpy.typing import NDArray

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 from digiclay.core.base.arrays import Floats
+from digiclay.core.files.tables import Record
 from numpy.typing import NDArray
 
 FOLDER = Path(__file__).parent / "problems"
@@ -24,7 +25,7 @@ class Problem:
     """A problem: its file, SI units; n pins, pin ``row * columns + column``."""
 
     name: str
-    file: dict[str, Any]
+    file: Record
 
     @cached_property
     def places(self) -> tuple[Floats, Floats]:

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 from digiclay.core.base.arrays import Floats
+from digiclay.core.files.tables import Record
 
 from .problem import FOLDER, Law, Problem
 
@@ -52,7 +53,7 @@ def solve_pins(problem: Problem, pins: Any, method: str, tolerance: float) -> Fl
     return np.array(solved).transpose(2, 1, 0)
 
 
-def make(problem: Problem) -> dict[str, Any]:
+def make(problem: Problem) -> Record:
     """Return the reference of a problem, and how far another method is from it."""
     exact = solve_pins(problem, problem.pins, *METHODS[0])
     checked = solve_pins(problem, problem.pins[::4], *METHODS[1])

@@ -2,13 +2,14 @@
 
 import argparse
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from ..core.base.errors import MethodError, OutputError, ParameterError
 from ..core.base.quantity import parse
+from ..core.files.tables import Table
 from ..core.scene.scene_source import Setting, find, load
 from ..core.scene.schema import Scene
 
@@ -16,7 +17,7 @@ from ..core.scene.schema import Scene
 METHOD = "control.method"
 #: Options by ``"--name METAVAR"``: the help; type or choices, help, and perhaps the default; or a dict of
 #: arguments of `argparse`.
-Options = Mapping[str, Any]
+Options = Table
 #: Keys in scene files of options that change a scene.
 SET_BY = {"method": METHOD, "stepper": "simulation.stepper", "tolerance": "simulation.tolerance"}
 #: Arguments of a command on a finished run.

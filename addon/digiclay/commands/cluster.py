@@ -12,7 +12,7 @@ import sys
 import time
 import warnings
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor, Executor, Future
 from contextlib import contextmanager, suppress
 from functools import partial
@@ -23,7 +23,8 @@ import numpy as np
 
 from ..core.base.addresses import describe_exposure
 from ..core.base.errors import DigiclayError, one_line
-from ..core.studies.axes import Point, Record
+from ..core.files.tables import Record, Table
+from ..core.studies.axes import Point
 from ..core.studies.evaluation import evaluate_bundle
 from ..core.version import __version__
 from .stop import allow_interrupt
@@ -227,7 +228,7 @@ def _is_lost(answer: Any) -> bool:
     return isinstance(answer, ConnectionError) or (isinstance(answer, OSError) and answer.errno is None)
 
 
-def _refuse_others(versions_of: Mapping[str, Any], here: Versions) -> None:
+def _refuse_others(versions_of: Table, here: Versions) -> None:
     """Refuse versions other than those here; one without digiclay has an error in their place."""
     others = {name: versions for name, versions in versions_of.items() if versions != here}
     if not others:

@@ -15,6 +15,7 @@ from ..core.base.errors import OutputError, ParameterError
 from ..core.base.quantity import find_nearest_name
 from ..core.control.methods import list_methods
 from ..core.files.run_folder import MARK, find_name, format_json, write_whole
+from ..core.files.tables import Record, Table
 from ..core.metrics.metric_table import ERRORS, SPEEDS, describe_errors
 from ..core.metrics.summary import find_worst_finger, sum_cells
 from ..core.model.control_interface import find_set_point
@@ -22,7 +23,7 @@ from ..core.scene.recorder import Recorder
 from ..core.scene.scene_source import Setting, find, load
 from ..core.scene.schema import Scene
 from ..core.session.run_scene import RUN_METRICS, run
-from ..core.studies.axes import Point, Record
+from ..core.studies.axes import Point
 from ..core.studies.speed_limits import HIGH, LOW, Criterion, Drag, Lift, describe_end, find_largest_speed
 from ..core.studies.sweep_plan import Folder, hash_points, open_points
 from ..core.version import __version__
@@ -163,10 +164,10 @@ def _open_folder(
     methods = [point.words[0] for point in points]
     plan = {"digiclay": __version__, "methods": methods, "speed": arguments.speed}
 
-    def describe(there: Mapping[str, Any]) -> str:
+    def describe(there: Table) -> str:
         return f"{', '.join(there['methods'])}, digiclay {there['digiclay']}"
 
-    def accept(there: Mapping[str, Any], folder: Folder) -> bool:
+    def accept(there: Table, folder: Folder) -> bool:
         if arguments.overwrite:
             folder.clear()
         return bool(arguments.overwrite)

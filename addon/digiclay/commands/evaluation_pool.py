@@ -9,8 +9,9 @@ from itertools import takewhile
 from pathlib import Path
 
 from ..core.base.errors import DigiclayError
+from ..core.files.tables import Record
 from ..core.metrics.metric_table import ERRORS
-from ..core.studies.axes import Point, Record
+from ..core.studies.axes import Point
 from ..core.studies.evaluation import Pool, evaluate_bundle, has_errors, judge_all, make_bundles
 from ..core.studies.series import finish
 from ..core.studies.sweep_plan import Folder

@@ -16,7 +16,8 @@ from queue import Empty, SimpleQueue
 from typing import Any
 
 from ..core.base.errors import DigiclayError, OutputError, one_line
-from ..core.studies.axes import Point, Record
+from ..core.files.tables import Record
+from ..core.studies.axes import Point
 from ..core.studies.evaluation import Pool, evaluate_bundle
 from ..core.studies.series import Outcome, Piece, Results
 from .worker import Process, Processes

@@ -11,10 +11,10 @@ from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 from ..core.base.errors import BusyError, DigiclayError, OutputError, one_line
 from ..core.files.run_folder import claim_folder, format_json, write_whole
+from ..core.files.tables import Record
 from ..core.scene.scene_source import load
 from ..core.studies.job_table import JOB, MOVING, SCENE, Outputs, read_outputs
 from ..core.studies.series import describe_error
@@ -150,7 +150,7 @@ def _write_run(arguments: argparse.Namespace, work: Work, outputs: Outputs) -> b
     folder, out = work.job, work.run
     scene = load(folder / SCENE)
     check_outputs(scene, outputs)
-    timing: dict[str, Any] = {"start_up": time.time() - arguments.since if arguments.since else None}
+    timing: Record = {"start_up": time.time() - arguments.since if arguments.since else None}
     # What a series keeps there is its own; a folder elsewhere may be the user's.
     overwrite = arguments.overwrite or out.resolve() == _find_place(folder)
     patience = GRACE if arguments.follow else 0.0

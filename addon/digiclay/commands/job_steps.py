@@ -13,6 +13,7 @@ from typing import Any
 
 from ..core.base.errors import DigiclayError, OutputError, one_line
 from ..core.files import run_folder
+from ..core.files.tables import Record
 from ..core.scene.scene_source import load, load_recorded
 from ..core.scene.schema import Scene
 from ..core.session.finished_run import Run, has_files, is_whole, read_run
@@ -95,7 +96,7 @@ def is_done(job: Path, run: Path) -> bool:
 def note_film(run: Path, kind: str, seconds: float, *, encoded: bool) -> None:
     """Note in a run what was drawn for one of its films, and its file once there is one."""
     with run_folder.lock_name(run / TIMING, PATIENCE):
-        timing: dict[str, Any] = run_folder.read_json(run / TIMING) or {}
+        timing: Record = run_folder.read_json(run / TIMING) or {}
         timing[kind] = (timing.get(kind) or 0.0) + seconds
         if encoded and isinstance(timing.get(FILES), dict):
             name = f"{kind}.mp4"
@@ -177,7 +178,7 @@ class Work:
     stopped: Callable[[], bool]
     tell: Tell
 
-    def make_outputs(self, scene: Scene, outputs: Outputs, out: Path, timing: dict[str, Any]) -> None:
+    def make_outputs(self, scene: Scene, outputs: Outputs, out: Path, timing: Record) -> None:
         """Run the session, and make all outputs in a folder; `timing` gets the seconds of each step."""
         names = ["run", *(n for n in ("errors", "export", "still", *MOVING) if getattr(outputs, n))]
         drawn, stopped = 0.0, self.stopped

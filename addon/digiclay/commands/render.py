@@ -8,10 +8,11 @@ from collections.abc import Callable
 from contextlib import AbstractContextManager
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from ..core.base.errors import DigiclayError
 from ..core.files.run_folder import claim_files
+from ..core.files.tables import Record
 from ..core.metrics.summary import compute_metrics, find_worst_finger
 from ..core.scene.schema import Scene
 from ..core.session.finished_run import SHAPES, find_last_touch, find_row, read_run
@@ -122,7 +123,7 @@ def _looks(arguments: argparse.Namespace) -> Still | Turntable | Film:
     return replace(STILL, **given) if kind is Still else kind(**given)
 
 
-def sizes(scene: Scene) -> dict[str, Any]:
+def sizes(scene: Scene) -> Record:
     """Return the sizes of the device for drawing."""
     from ..device.instant import find_ellipsoids
 

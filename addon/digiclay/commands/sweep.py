@@ -8,9 +8,10 @@ from pathlib import Path
 
 from ..core.base.errors import DigiclayError, OutputError
 from ..core.files.run_folder import write_whole
+from ..core.files.tables import Record
 from ..core.metrics.metric_table import ERRORS
 from ..core.scene.scene_source import find
-from ..core.studies.axes import Axis, Column, Record, find_ends, make_columns, make_points, read_axis
+from ..core.studies.axes import Axis, Column, find_ends, make_columns, make_points, read_axis
 from ..core.studies.evaluation import (
     describe_effort,
     explain_failed_batches,

@@ -11,6 +11,7 @@ from ..core.base.arrays import Flags, Floats
 from ..core.base.errors import DigiclayError
 from ..core.engine.state import State
 from ..core.engine.system import System
+from ..core.files.tables import Record
 from ..core.mesh_io.export_model import Model
 from ..core.scene.assembly import assemble
 from ..core.scene.schema import Scene
@@ -64,7 +65,7 @@ def model(bed: Object, **fields: Any) -> Model:
     return Model(cap=_scene(bed).actuator.bore / 2.0, **fields)
 
 
-def _of_session(bed: Object) -> dict[str, Any]:
+def _of_session(bed: Object) -> Record:
     """Return heights, forces and modes of the session if that is shown: the mesh may not have its forces."""
     current = _state(bed)
     if current is None:

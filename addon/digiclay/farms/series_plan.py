@@ -12,10 +12,10 @@ import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 from ..core.base.errors import DigiclayError, OutputError
 from ..core.files.run_folder import format_json
+from ..core.files.tables import Record
 from ..core.studies.job_table import MOVING, Job, JobSeries, Outputs
 from ..plugins.method_loader import find_word
 
@@ -166,10 +166,10 @@ def _name_steps(tasks: Sequence[Task]) -> dict[str, str]:
     return steps
 
 
-def _make_step(task: Task, steps: dict[str, str], program: str, leading: Sequence[str]) -> dict[str, Any]:
+def _make_step(task: Task, steps: dict[str, str], program: str, leading: Sequence[str]) -> Record:
     """Return a step, with a parameter space where it draws frames."""
     arguments = [*leading, *task.list_arguments("{{Param.Series}}")]
-    step: dict[str, Any] = {"name": steps[task.name]}
+    step: Record = {"name": steps[task.name]}
     if task.needs:
         step["dependencies"] = [{"dependsOn": steps[need]} for need in task.needs]
     if task.frames:

@@ -8,6 +8,7 @@ from typing import Any
 from .. import bridge, preferences
 from ..compat import Context, Event, Menu, NodeTree, Object, Operator, UILayout, bpy
 from ..core.control.methods import METHODS
+from ..core.files.tables import Record
 from ..core.model.layout import ARRANGEMENTS, Layout
 from ..core.model.trajectory import sample_poses
 from ..core.scene.scene_source import find, list_samples, load
@@ -49,7 +50,7 @@ def offered(operator: Operator, context: Context) -> list[tuple[str, str, str]]:
     return OFFERED
 
 
-def plan(name: str) -> dict[str, Any]:
+def plan(name: str) -> Record:
     """Return what a bed of `BEDS` sets in the operator: its plan, and what it is made with."""
     bed = BEDS[name]
     size = {"rows": bed.rows, "columns": bed.columns, "pitch": bed.pitch * 1e3}

@@ -23,6 +23,7 @@ from ..core.base.arrays import Array, Floats
 from ..core.base.errors import OutputError
 from ..core.base.modes import Mode
 from ..core.files.run_folder import name_unfinished
+from ..core.files.tables import Table
 from ..core.session.render_settings import Film, Moving, Turntable, name_frame
 from ..device import view
 from ..device.instant import Instant
@@ -164,7 +165,7 @@ def stage_turntable(instant: Instant, looks: Turntable) -> Iterator[Shots]:
 
 
 def _visible_points(
-    bed: Object, history: Mapping[str, Array], rows: NDArray[np.intp], sizes: Mapping[str, Any]
+    bed: Object, history: Mapping[str, Array], rows: NDArray[np.intp], sizes: Table
 ) -> Floats:
     """Return what must be in the frame, (k, 3), Blender units: all pins, the fingertips that are near."""
     used = slice(int(rows[0]), int(rows[-1]) + 1)

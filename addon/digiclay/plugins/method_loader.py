@@ -27,6 +27,7 @@ from ..core.control.blister import Blister
 from ..core.control.methods import METHODS, ControlParameters, Method, add_method, list_added
 from ..core.control.own_method import MOST_ROWS, Guarded, OwnMethod, describe_failure, guard
 from ..core.files.run_folder import write_whole
+from ..core.files.tables import Record
 from ..core.model.control_interface import SetPoint
 from ..core.scene.schema import Scene
 
@@ -286,7 +287,7 @@ def add_class(name: str, source: MethodSource, kind: Any) -> OwnRow:
     return row
 
 
-def restore_parameters(name: str, source: MethodSource, values: dict[str, Any]) -> ControlParameters:
+def restore_parameters(name: str, source: MethodSource, values: Record) -> ControlParameters:
     """Return parameters that another process has pickled, with their class: its code comes along."""
     row = list_added().get(name)
     if not isinstance(row, OwnRow) or row.source[1:] != source[1:]:

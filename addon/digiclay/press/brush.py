@@ -6,9 +6,9 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from ..compat import Context, Event, Object, OperatorProperties, bpy
+from ..core.files.tables import Record
 from ..core.model.fingertip import Fingertip
 from ..core.shapes.fitting import list_shapes
 from ..core.shapes.heightmap import HeightMap
@@ -98,7 +98,7 @@ def find_images(settings: OperatorProperties) -> tuple[Image, ...]:
     return make_images(settings.symmetry, settings.radial, center, settings.axis)
 
 
-def read_center(settings: OperatorProperties) -> dict[str, Any]:
+def read_center(settings: OperatorProperties) -> Record:
     """Return the settings that `put_center` and `turn_axis` change."""
     return {name: getattr(settings, name) for name in PLACED}
 

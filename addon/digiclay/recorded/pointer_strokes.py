@@ -5,15 +5,14 @@ places of the pointer. What is formed follows from the places; the times say how
 """
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
 
 from ..core.base.errors import ParameterError, SceneError, StateError
 from ..core.base.quantity import Parameters, quantity
-from ..core.files.tables import read_part, refuse_unknown, show_value
+from ..core.files.tables import Table, read_part, refuse_unknown, show_value
 from ..core.model.fingertip import Fingertip
 from ..core.scene.scene_source import read_table
 from ..core.scene.schema import Scene
@@ -142,7 +141,7 @@ def read_strokes(path: Path) -> Recorded:
     return Recorded(name, bed, strokes)
 
 
-def _read_text(table: Mapping[str, Any], key: str, usual: str) -> str:
+def _read_text(table: Table, key: str, usual: str) -> str:
     """Return a text of the file."""
     value = table.get(key, usual)
     if not isinstance(value, str):

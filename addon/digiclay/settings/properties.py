@@ -17,6 +17,7 @@ from ..core.base.arrays import Floats
 from ..core.base.errors import ParameterError
 from ..core.base.quantity import Parameters, list_quantities
 from ..core.control.methods import METHODS, find_method, list_methods
+from ..core.files.tables import Record
 from ..core.model.layout import Layout, make_grid
 from ..core.scene.schema import NEEDS, OPTIONAL, SECTIONS, Scene, import_parameters
 from ..core.scene.toml_table import ABSENT, FINGER_PARTS, FINGERS, resolve
@@ -64,9 +65,9 @@ class StoredSettings(NamedTuple):
     #: Path of the .blend, at whose folder other paths may start.
     file: str
     #: As Blender stores them.
-    values: dict[str, Any]
+    values: Record
     #: Numbers of the fingertips, and what further ones store of their own.
-    fingers: tuple[tuple[int, dict[str, Any]], ...]
+    fingers: tuple[tuple[int, Record], ...]
 
 
 def read_stored_settings(bed: Object) -> StoredSettings:
@@ -95,15 +96,15 @@ def read_scene(bed: Object) -> Scene:
         raise relabel(error, tuple(fingertips_of(bed))) from None
 
 
-def table_of(bed: Object) -> dict[str, Any]:
+def table_of(bed: Object) -> Record:
     """Return a bed's settings as the tables of a scene file."""
     settings = bed.digiclay
     method = method_of(settings)
     formed = find_method(method).blister is not None  # refuses one that is not known here
     name = "".join(letter if letter.isprintable() else " " for letter in bed.name)
-    table: dict[str, Any] = {"name": name, "preset": settings.preset}
+    table: Record = {"name": name, "preset": settings.preset}
     each = devices.list_settings(bed)
-    fingers: list[dict[str, Any]] = [{} for _ in each]
+    fingers: list[Record] = [{} for _ in each]
     for section in SECTIONS:
         holders = zip(each, fingers, strict=True) if section in FINGER_PARTS else [(settings, table)]
         for row, (own, part) in enumerate(holders, 1):

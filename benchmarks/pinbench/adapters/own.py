@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 from digiclay.core.base.errors import DivergenceError
+from digiclay.core.files.tables import Record
 from digiclay.core.scene.toml_table import resolve
 
 from ...session_parts import run
@@ -39,10 +40,10 @@ def prepare(problem: Any, method: str, setting: float) -> Any:
     return solve
 
 
-def make_tables(file: dict[str, Any], stepper: str, step: float) -> dict[str, Any]:
+def make_tables(file: Record, stepper: str, step: float) -> Record:
     """Return the tables of a scene file."""
     absent = ("recorder", "control", "valve_lag", "delay", "relaxation")
-    tables: dict[str, Any] = dict.fromkeys(absent, "absent")
+    tables: Record = dict.fromkeys(absent, "absent")
     tables |= {"layout": file["bed"], "actuator": file["pin"], "fingertip": file["fingertip"]}
     exponent, unit = file["contact"]["exponent"], file["contact"]["unit"]
     tables["contact"] = {"stiffness": exponent * unit, "exponent": exponent, "share": 1.0}
@@ -59,7 +60,7 @@ def make_tables(file: dict[str, Any], stepper: str, step: float) -> dict[str, An
     return tables
 
 
-def make_valve(file: dict[str, Any]) -> dict[str, Any]:
+def make_valve(file: Record) -> Record:
     """Return the tables of a valve with given coefficients; a damper is one that is open to no pressure."""
     density, viscosity, diameter = 855.0, 1.6e-6, 0.5e-3
     area = np.pi * file["pin"]["bore"] ** 2 / 4.0

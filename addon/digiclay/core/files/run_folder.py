@@ -9,11 +9,12 @@ import unicodedata
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, ExitStack, contextmanager, suppress
 from pathlib import Path
-from typing import Any, BinaryIO, NamedTuple
+from typing import BinaryIO, NamedTuple
 
 from ..base.errors import VALUE, OutputError, SceneError, explain_os_error, one_line
 from ..base.quantity import find_nearest_name
 from .file_lock import find_host, hold_lock, may_have_made
+from .tables import Record
 
 #: Most bytes of a name in UTF-8; file systems permit 255, of which unfinished files need some.
 LONGEST = 120
@@ -122,7 +123,7 @@ def open_whole(path: Path) -> Iterator[BinaryIO]:
         raise
 
 
-def read_json(path: Path) -> dict[str, Any] | None:
+def read_json(path: Path) -> Record | None:
     """Return the table in a small JSON file; None if it cannot be read."""
     try:
         content = json.loads(path.read_text(encoding="utf-8-sig"))

@@ -9,6 +9,10 @@ from typing import Any, TypeVar
 from ..base.errors import ParameterError
 from ..base.quantity import Parameters, find_nearest_name, list_quantities, parse
 
+#: Named values, as TOML and JSON have them: those that are read only, and those that may be changed.
+Table = Mapping[str, Any]
+Record = dict[str, Any]
+
 #: Most bytes of a text: the packed heights of the largest bed, 20 million cells, take 107 MB.
 LARGEST = 128_000_000
 #: Most names of a dotted key, each stored with all before it, and most letters of a word or a number.
@@ -24,7 +28,7 @@ _PIECES = re.compile(
 )
 
 
-def parse_tables(text: str) -> dict[str, Any]:
+def parse_tables(text: str) -> Record:
     """Return the tables of a TOML text; ValueError with ``(at line ...)`` if known, or RecursionError."""
     if len(text) > LARGEST:
         raise ValueError(f"must have at most {LARGEST // 1_000_000} MB (got {len(text) / 1e6:.0f} MB)")
@@ -52,7 +56,6 @@ def format_value(value: object) -> str:
     return repr(value)
 
 
-Table = Mapping[str, Any]
 Part = TypeVar("Part", bound=Parameters)
 
 

@@ -19,6 +19,7 @@ import numpy as np
 from ..base.arrays import Array, Floats, Indices
 from ..base.errors import ParameterError
 from ..files.formats import read_count
+from ..files.tables import Record
 from .mesh_limits import (
     IDENTITY,
     join_meshes,
@@ -89,7 +90,7 @@ def _chunks(data: bytes, name: str) -> tuple[Any, bytes | None]:
 class _File:
     """Tables of a glTF, and the buffers read so far."""
 
-    def __init__(self, path: Path, tree: dict[str, Any], binary: bytes | None) -> None:
+    def __init__(self, path: Path, tree: Record, binary: bytes | None) -> None:
         self._path, self._tree, self._binary = path, tree, binary
         self._buffers: dict[int, bytes] = {}
         self._bytes = 0

@@ -6,7 +6,7 @@ import zipfile
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
-from typing import IO, Any, BinaryIO
+from typing import IO, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from ..base.arrays import Array, Floats
 from ..base.errors import OutputError, ParameterError
 from ..files.run_folder import open_whole
+from ..files.tables import Record
 from ..surface.formed import NO_PIN, Body, split_pieces
 from .obj_reader import UP, find_forward, make_axes
 
@@ -141,11 +142,11 @@ def write_glb(file: BinaryIO, bodies: Sequence[Body], factor: float) -> None:
             file.write(faces.astype("<u4").tobytes())
 
 
-def _describe(bodies: Sequence[Body]) -> dict[str, Any]:
+def _describe(bodies: Sequence[Body]) -> Record:
     """Return the JSON part: the layout of the bodies' vertices and faces in the binary part."""
     views: list[dict[str, int]] = []
-    accessors: list[dict[str, Any]] = []
-    meshes: list[dict[str, Any]] = []
+    accessors: list[Record] = []
+    meshes: list[Record] = []
     start = 0
     for number, body in enumerate(bodies):
         for count, target in ((len(body.vertices), VERTICES), (len(body.faces), INDICES)):

@@ -2,7 +2,7 @@
 
 import os
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 from ..base.errors import ParameterError, SceneError
 from ..control.methods import list_methods
 from ..files.run_folder import find_file, list_files
-from ..files.tables import LARGEST, ReadParts, parse_tables
+from ..files.tables import LARGEST, ReadParts, Record, Table, parse_tables
 from .schema import FINGER_SECTIONS, Scene
 from .toml_table import ABSENT, FINGERS, merge_one_finger, resolve
 
@@ -59,7 +59,7 @@ def load_recorded(path: Path) -> Scene:
 
 
 def make_scene(
-    path: Path, table: Mapping[str, Any], settings: Sequence[Setting] = (), cache: ReadParts | None = None
+    path: Path, table: Table, settings: Sequence[Setting] = (), cache: ReadParts | None = None
 ) -> Scene:
     """Return a scene from the `read_table` of its file, overridden by settings; SceneError as `load`.
 
@@ -81,7 +81,7 @@ def make_scene(
         raise SceneError(f"{origins[-1]}: {error}") from None
 
 
-def read_table(path: Path) -> dict[str, Any]:
+def read_table(path: Path) -> Record:
     """Return the tables of a TOML file."""
     try:
         size = path.stat().st_size
@@ -102,7 +102,7 @@ def read_table(path: Path) -> dict[str, Any]:
         raise SceneError(f"{path}, line {number}: {rule}.") from None
 
 
-def _find_beside(table: Mapping[str, Any], folder: Path) -> Mapping[str, Any]:
+def _find_beside(table: Table, folder: Path) -> Table:
     """Return the table with the path of a shape's file beside the scene file, or in a folder there."""
     shape = table.get("shape")
     name = shape.get("file") if isinstance(shape, dict) else None
@@ -112,7 +112,7 @@ def _find_beside(table: Mapping[str, Any], folder: Path) -> Mapping[str, Any]:
     return {**table, "shape": {**table["shape"], "file": str(file.resolve())}} if file.is_file() else table
 
 
-def _override(table: Mapping[str, Any], settings: Sequence[Setting]) -> dict[str, Any]:
+def _override(table: Table, settings: Sequence[Setting]) -> Record:
     """Return the tables of a scene file, overridden by settings."""
     whole = dict(table)
     for key, text, _ in settings:

@@ -2,23 +2,30 @@
 
 import dataclasses
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from typing import Any
 
 from ..base.errors import ParameterError
 from ..base.quantity import Parameters, list_quantities
 from ..control.methods import find_method
-from ..files.tables import ReadParts, format_value, read_part, refuse_unknown, shorten, show_value
+from ..files.tables import (
+    ReadParts,
+    Record,
+    Table,
+    format_value,
+    read_part,
+    refuse_unknown,
+    shorten,
+    show_value,
+)
 from ..model.layout import ARRANGEMENTS
 from ..model.trajectory import Path, Waypoint
 from .schema import FINGER_SECTIONS, NEEDS, OPTIONAL, SECTIONS, UNASKED, Finger, Scene, import_parameters
 
-Table = Mapping[str, Any]
 Writer = Callable[..., Iterable[str]]
 
 #: Value of the section of an omitted part.
 ABSENT = "absent"
 #: Changes of the defaults by a preset; a .blend stores its number: new ones are added at the end.
-PRESETS: dict[str, dict[str, dict[str, Any]]] = {
+PRESETS: dict[str, dict[str, Record]] = {
     "paper": {},
     "fast": {"valve": {"orifice_diameter": 0.6e-3}},
     "viscous": {"fluid": {"viscosity": 3.2e-6, "density": 908.0}, "valve": {"orifice_diameter": 0.6e-3}},
@@ -42,7 +49,7 @@ def resolve(table: Table, name: str = "", cache: ReadParts | None = None) -> Sce
     """
     cache = cache or ReadParts()
     refuse_unknown("", table, TOP_LEVEL)
-    texts: dict[str, Any] = {
+    texts: Record = {
         key: _check_text(key, table.get(key, default))
         for key, default in zip(TEXTS, (name, "", "paper"), strict=True)
     }
@@ -86,7 +93,7 @@ def _split_fingers(table: Table) -> list[tuple[str, Table]]:
     return list(zip(owners, given, strict=True))
 
 
-def merge_one_finger(table: Table) -> dict[str, Any]:
+def merge_one_finger(table: Table) -> Record:
     """Return the tables with the sections of the only finger beside the others, where settings change them.
 
     `resolve` refuses what is not a list of one table, or would be given twice.
@@ -105,9 +112,9 @@ def _read_parts(
     cache: ReadParts,
     method: str = "",
     owner: str = "",
-) -> dict[str, Any]:
+) -> Record:
     """Return the parts of sections; `owner`: prefix of their names in messages."""
-    parts: dict[str, Any] = dict.fromkeys(tables)
+    parts: Record = dict.fromkeys(tables)
     for section, given in tables.items():
         if given is None or (section in NEEDS and tables[NEEDS[section]] is None):
             continue
@@ -137,7 +144,7 @@ def _check_text(key: str, value: object) -> str:
     return value
 
 
-def _read_section(section: str, value: object, owner: str = "") -> dict[str, Any] | None:
+def _read_section(section: str, value: object, owner: str = "") -> Record | None:
     """Return the table of a section, or None for an omitted part."""
     if value == ABSENT and section in OPTIONAL:
         return None

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from ..base.arrays import Array, Floats
 from ..base.errors import explain_os_error
 from ..engine.simulation import Progress, Stopped, begin, periods
 from ..engine.system import System
+from ..files.tables import Record, Table
 from ..metrics.metric_table import ERRORS, METRICS, RUN, describe_errors, describe_losses, describe_time
 from ..metrics.summary import compute_metrics, find_losses, split_fingers, take_worst
 from ..model.control_interface import count_losses
@@ -47,7 +48,7 @@ class Result:
     """Simulated control periods."""
     run_time: float
     """Wall time of the simulation, s, without building and writing."""
-    metrics: dict[str, Any]
+    metrics: Record
     """Content of ``metrics.json``, in SI units."""
 
     @property
@@ -143,7 +144,7 @@ def evaluate(
         felt.append((of_finger["total_force"], of_finger["fingertip"][:, 2]))
         if system.cell.touch is not None and finger.fingertip:
             depths.append(find_indentations(finger.fingertip, of_finger))
-    metrics: dict[str, Any] = take_worst(each)
+    metrics: Record = take_worst(each)
     if system.fingers > 1:
         metrics["fingers"] = each
     metrics |= measure_losses(scene, system, moments, felt)
@@ -160,12 +161,12 @@ def evaluate(
 def report(
     scene: Scene,
     ended: Ended,
-    figures: Mapping[str, Any],
+    figures: Table,
     versions: Mapping[str, str] = MappingProxyType({}),
 ) -> Result:
     """Return the result of an ended session without its history, but with figures of it."""
     simulated = ended.periods * scene.simulation.control_period
-    metrics: dict[str, Any] = {
+    metrics: Record = {
         "scene": scene.name,
         "incomplete": ended.periods < scene.periods,
         "simulated": simulated,

@@ -22,6 +22,7 @@ from ..engine.simulation import begin
 from ..engine.state import ActiveSet, Rows, State
 from ..engine.system import System
 from ..files.formats import read_count
+from ..files.tables import Record
 from ..model.control_interface import Memory
 from ..model.layout import Disc, join_discs
 
@@ -108,7 +109,7 @@ REMEDY = "Reset the session to begin with a bed at rest."
 class Snapshot:
     """Content of a snapshot: the header, and the arrays by their names in `State` and `ActiveSet`."""
 
-    header: dict[str, Any]
+    header: Record
     arrays: dict[str, Array]
     memory: list[Array]
 
@@ -295,7 +296,7 @@ def _list_discs(discs: Any, fingers: int) -> list[Any]:
     return [None if disc[2] < 0.0 else disc for disc in np.transpose(discs).tolist()]
 
 
-def _read_discs(gathered: dict[str, Any]) -> tuple[list[Disc | None], list[Disc | None]]:
+def _read_discs(gathered: Record) -> tuple[list[Disc | None], list[Disc | None]]:
     """Return the discs that the fingers may touch, and the controlled discs."""
     fingers = gathered["fingers"]
     controls = gathered["control"] if len(fingers) > 1 else [gathered["control"]]

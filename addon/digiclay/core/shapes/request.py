@@ -1,11 +1,12 @@
 """Section [shape] of a scene: source and placement of a shape; the top surface of a shape at the pins."""
 
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from ..base.arrays import Flags, Floats
 from ..base.errors import ParameterError
 from ..base.quantity import Parameters, quantity
+from ..files.tables import Record
 
 #: Units of length of a file, in meters.
 LENGTHS = {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "inch": 25.4e-3}
@@ -20,7 +21,7 @@ UPWARDS: dict[str, tuple[tuple[int, int, int], tuple[int, int, int]]] = {
 }
 AUTO = "auto"
 #: Unit and bounds of a length that places a shape.
-LENGTH: dict[str, Any] = {"unit": "m", "at_least": -100.0, "at_most": 100.0}
+LENGTH: Record = {"unit": "m", "at_least": -100.0, "at_most": 100.0}
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -12,13 +12,12 @@ import numpy as np
 from ..base.errors import ParameterError, SceneError
 from ..base.quantity import Parameters, Quantity, list_quantities, normalize
 from ..engine.simulation import Progress, Stopped
-from ..files.tables import ReadParts
+from ..files.tables import ReadParts, Record
 from ..scene.scene_source import Setting, load, make_scene, read_table, split_key
 from ..scene.schema import Scene
 from ..scene.toml_table import FINGERS
 
 #: Result of a point: its ``figures``, or the ``error`` it ended in.
-Record = dict[str, Any]
 #: Measurement of a scene, given a function that tells whether to stop; None after a stop.
 Measure = Callable[[Scene, Stopped], Record | None]
 #: Most points: more are a typing error, not a sweep.

@@ -12,11 +12,12 @@ from ..batch.run_together import measure_together
 from ..batch.structure import Findings, describe_structure
 from ..control.methods import find_method
 from ..engine.simulation import Stopped
+from ..files.tables import Record
 from ..metrics.metric_table import ERRORS, METRICS, RUN, describe_errors
 from ..scene.schema import Scene
 from ..session.accuracy import describe_bends, make_reference
 from ..session.run_scene import Result, run
-from .axes import Measure, Point, Record
+from .axes import Measure, Point
 from .series import Results, describe_error
 
 #: Evaluation of bundles in any order, until all are done or a stop is requested. The record of a stopped

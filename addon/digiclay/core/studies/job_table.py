@@ -7,7 +7,7 @@ outputs of the run. With that folder and this package the job can run on any mac
 import itertools
 import os
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -16,7 +16,7 @@ from ..base.errors import ParameterError, SceneError, one_line
 from ..base.quantity import Parameters, list_quantities
 from ..control.methods import find_method
 from ..files.run_folder import find_file, find_name, list_files, make_unique_names
-from ..files.tables import format_value, read_part, refuse_unknown, show_value
+from ..files.tables import Record, Table, format_value, read_part, refuse_unknown, show_value
 from ..mesh_io.export_model import Model
 from ..model.layout import make_grid
 from ..scene.scene_source import SAMPLES, Setting, find, load, read_table
@@ -71,7 +71,7 @@ class Outputs:
         return "\n".join(lines) + "\n"
 
 
-def make_outputs(table: Mapping[str, Any]) -> Outputs:
+def make_outputs(table: Table) -> Outputs:
     """Read the outputs of each run from a table of `KEYS`."""
     refuse_unknown("", table, KEYS)
     export = table.get("export", [])
@@ -82,7 +82,7 @@ def make_outputs(table: Mapping[str, Any]) -> Outputs:
     errors = table.get("errors", True)
     if not isinstance(errors, bool):
         raise ParameterError("errors", "", "must be true or false", show_value(errors))
-    parts: dict[str, Any] = {}
+    parts: Record = {}
     for section, kind in SECTIONS.items():
         if section not in table:
             continue
@@ -165,7 +165,7 @@ def read_outputs(path: Path) -> Outputs:
         raise SceneError(f"{path}: {error}") from None
 
 
-def _read_scenes(table: Mapping[str, Any]) -> list[str]:
+def _read_scenes(table: Table) -> list[str]:
     """Return the scenes of the file."""
     words = table.get("scenes")
     if not isinstance(words, list) or not words or not all(isinstance(word, str) and word for word in words):
@@ -174,7 +174,7 @@ def _read_scenes(table: Mapping[str, Any]) -> list[str]:
     return words
 
 
-def _read_methods(table: Mapping[str, Any], more: Sequence[str]) -> list[str]:
+def _read_methods(table: Table, more: Sequence[str]) -> list[str]:
     """Return the methods for every scene; an empty one is that of the scene."""
     if "methods" not in table:
         return list(more) or [""]
@@ -186,7 +186,7 @@ def _read_methods(table: Mapping[str, Any], more: Sequence[str]) -> list[str]:
     return [*methods, *(name for name in more if name not in methods)]
 
 
-def _read_settings(table: Mapping[str, Any]) -> dict[str, list[Setting]]:
+def _read_settings(table: Table) -> dict[str, list[Setting]]:
     """Return the settings by their labels; by default one that changes nothing."""
     if "settings" not in table:
         return {"": []}
@@ -206,7 +206,7 @@ def _read_settings(table: Mapping[str, Any]) -> dict[str, list[Setting]]:
     return settings
 
 
-def _flatten(table: Mapping[str, Any], above: str = "") -> list[tuple[str, Any]]:
+def _flatten(table: Table, above: str = "") -> list[tuple[str, Any]]:
     """Return the dotted keys of nested tables, and their values."""
     pairs = []
     for key, value in table.items():

@@ -5,7 +5,7 @@ is stored at once.
 """
 
 import os
-from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,6 +14,7 @@ from typing import Any, TypeVar
 from ..base.errors import DigiclayError, OutputError, explain_os_error, one_line
 from ..files import run_folder
 from ..files.file_lock import hold_lock
+from ..files.tables import Table
 
 #: The lock of the process that works in the folder.
 LOCK = ".lock"
@@ -37,7 +38,7 @@ class Kind:
 def open_series(
     path: Path,
     kind: Kind,
-    description: Mapping[str, Any],
+    description: Table,
     refuse_another: Callable[[Any], None] | None = None,
 ) -> Iterator[None]:
     """Make the folder of a series, or continue one; no other process may use it until the block ends.

@@ -17,9 +17,10 @@ from numpy.typing import NDArray
 from ..base.errors import OutputError
 from ..control.methods import find_method
 from ..files.run_folder import format_json, read_json, write_whole
+from ..files.tables import Record, Table
 from ..metrics.metric_table import ERRORS, describe_losses
 from ..scene.toml_table import format_scene, write_part
-from .axes import Axis, Point, Record
+from .axes import Axis, Point
 from .evaluation import FIGURES, TIMES, evaluate
 from .series import Kind, open_series
 
@@ -83,9 +84,9 @@ def hash_points(points: Sequence[Point]) -> str:
 def open_points(
     path: Path,
     name: str,
-    description: Mapping[str, Any],
-    describe: Callable[[Mapping[str, Any]], str],
-    accept: Callable[[Mapping[str, Any], Folder], bool] = lambda there, folder: False,
+    description: Table,
+    describe: Callable[[Table], str],
+    accept: Callable[[Table, Folder], bool] = lambda there, folder: False,
 ) -> Iterator[Folder]:
     """Make the folder of a series of points, or continue one of the same description, and lock it."""
     folder, mark = Folder(path), f"{name}.json"
@@ -113,11 +114,11 @@ def open_sweep(
         "points": len(points),
     }
 
-    def describe(there: Mapping[str, Any]) -> str:
+    def describe(there: Table) -> str:
         varied = " and ".join(axis["key"] for axis in there["axes"])
         return f"{there['points']} points over {varied}, digiclay {there['digiclay']}"
 
-    def accept(there: Mapping[str, Any], folder: Folder) -> bool:
+    def accept(there: Table, folder: Folder) -> bool:
         older = there == {**plan, "identity": there.get("identity")}
         return older and _agrees(folder.read_records(), points)
 
