@@ -121,7 +121,7 @@ def _make_batch(grid: Grid, surface: Floats, light: Floats, height: Floats) -> A
     place = np.column_stack([grid.positions, surface]) * bridge.SCALE
     points.attr_fill("pos", np.ascontiguousarray(place, np.float32))
     points.attr_fill("color", find_colors(light, way))
-    return gpu.types.Any(type="TRIS", buf=points, elem=gpu.types.GPUIndexBuf(type="TRIS", seq=chosen))
+    return gpu.types.GPUBatch(type="TRIS", buf=points, elem=gpu.types.GPUIndexBuf(type="TRIS", seq=chosen))
 
 
 def _draw() -> None:
