@@ -27,7 +27,7 @@ from digiclay.core.scene.scene_source import Setting, find, load
 from digiclay.core.scene.schema import FINGER_SECTIONS, OPTIONAL, SECTIONS, STEPPERS
 from digiclay.core.scene.toml_table import ABSENT, FINGERS, PRESETS, format_scene, resolve
 from digiclay.core.session import snapshot
-from digiclay.core.session.finished_run import SHAPES, read_run
+from digiclay.core.session.finished_run import HISTORY_ARRAYS, read_run
 from digiclay.core.session.run_scene import Result, run
 from digiclay.core.session.snapshot import FIRST, START
 from digiclay.core.session.take import Take, from_bytes, replay, to_bytes
@@ -254,7 +254,7 @@ def evaluate_run(draw: Draw) -> None:
     with tempfile.TemporaryDirectory() as folder:
         (Path(folder) / "scene.toml").write_text(format_scene(result.scene), encoding="utf-8")
         (Path(folder) / "history.npz").write_bytes(pack(draw, result.history))
-        finished = read_run(Path(folder), *SHAPES)
+        finished = read_run(Path(folder), *HISTORY_ARRAYS)
     json.dumps(compute_metrics(finished.history, finished.scene.set_point), allow_nan=False)
     features.find(fit_skin(make_formed(finished.history, -1), "bilinear", 1, 0.0))
 

@@ -15,13 +15,14 @@ from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.recorder import Recorder, RunRecording, write
 from digiclay.core.scene.toml_table import resolve
 from digiclay.core.session.accuracy import Errors
+from digiclay.core.session.finished_run import HISTORY_ARRAYS, read_run
 from digiclay.core.session.memory_limit import (
     count_busy_cells,
     count_bytes_needed,
     measure_available_memory,
     refuse_what_cannot_fit,
 )
-from digiclay.core.session.run_scene import Result, run
+from digiclay.core.session.run_scene import Result, run, save
 
 from tests.assemble import over_middle, table
 
@@ -43,16 +44,24 @@ def result():
     return run(scene())
 
 
-def test_a_history_has_the_arrays_and_shapes_it_is_known_by(result):
-    cells = dict.fromkeys(("height", "force", "command", "mode"), (41, 12))
-    assert {name: array.shape for name, array in result.history.items()} == {
-        "time": (41,),
-        **cells,
-        "fingertip": (41, 7),
-        "total_force": (41,),
-        "position": (12, 2),
-        "beyond_a_finger": (41,),  # only in a run that leaves the range of the contact law
+@pytest.mark.parametrize("fingers", [1, 2])
+def test_the_arrays_of_a_history_are_the_declared_ones_and_are_read_again(fingers, tmp_path):
+    beyond = over_middle((0, 0.041), (0.1, 0.034), (0.2, 0.041))
+    finger = {"trajectory": {"waypoints": beyond}}
+    motion = finger if fingers == 1 else {"finger": [finger, finger]}
+    done = run(resolve({"layout": TABLE["layout"], "blister": SMALL, **motion}))
+    save(done, tmp_path)
+    sizes = {"t": 41, "n": 12, "f": fingers, 7: 7, 2: 2}
+    assert {name: array.shape for name, array in done.history.items()} == {
+        name: tuple(sizes[axis] for axis in declared.axes if axis != "f" or fingers > 1)
+        for name, declared in HISTORY_ARRAYS.items()
+        if fingers > 1 or name != "finger_force"
     }
+    again = read_run(tmp_path, *HISTORY_ARRAYS).history
+    assert all(np.array_equal(again[name], array) for name, array in done.history.items())
+
+
+def test_a_history_follows_the_path_and_gives_the_metrics(result):
     assert result.history["mode"].dtype == np.int8
     wanted = scene().section("trajectory").trajectory().poses(result.history["time"])
     assert np.array_equal(result.history["fingertip"], wanted)

@@ -15,7 +15,7 @@ from ..core.files.run_folder import claim_files
 from ..core.files.tables import Record
 from ..core.metrics.summary import compute_metrics, find_worst_finger
 from ..core.scene.schema import Scene
-from ..core.session.finished_run import SHAPES, find_last_touch, find_row, read_run
+from ..core.session.finished_run import HISTORY_ARRAYS, find_last_touch, find_row, read_run
 from ..core.session.render_settings import COLORS, ENGINES, Film, Still, Turntable
 from ..core.session.run_scene import History
 from .arguments import RUN, Options, command, one_of, say, seconds, size, told_as_options
@@ -203,7 +203,7 @@ def plot(arguments: argparse.Namespace) -> int:
     """Plot."""
     folder: Path = arguments.out or arguments.run
     refuse_without("digiclay plot", "plots", "matplotlib")
-    run = read_run(arguments.run, *(name for name in SHAPES if name != "time"))
+    run = read_run(arguments.run, *(name for name in HISTORY_ARRAYS if name != "time"))
     require_surface(run.scene, "plot")
     refuse_unwritable(folder)
     with claim_files([folder / name for name in PLOTS]):

@@ -4,6 +4,7 @@ import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,18 +22,42 @@ from .memory_limit import measure_available_memory
 HISTORY = "history.npz"
 #: Largest number of a run, so that sums of squares are finite.
 LARGEST = 1e100
-#: Shape of each array of a history, t rows of n cells under f fingers; of one finger without that axis.
-SHAPES: dict[str, tuple[str | int, ...]] = {
-    **dict.fromkeys(("time", "total_force", "beyond_a_finger"), ("t",)),
-    **dict.fromkeys(("height", "force", "command", "mode"), ("t", "n")),
-    "fingertip": ("t", "f", 7),
-    "finger_force": ("t", "f"),
-    "position": ("n", 2),
+#: Types of an array by their kinds in numpy, as messages and pages call them.
+KINDS = {"if": "numbers", "i": "whole numbers", "b": "truth values"}
+
+
+class HistoryArray(NamedTuple):
+    """Array of a history."""
+
+    axes: tuple[str | int, ...]
+    """Sizes: t rows, n pins, f fingers; of one finger without the axis f."""
+    unit: str
+    meaning: str
+    kinds: str = "if"
+    """Key of `KINDS`."""
+    optional: bool = False
+    """Whether only some runs have it."""
+
+
+#: Arrays of a history, by name: those that a run records, ``history.npz`` holds and `read_run` accepts.
+HISTORY_ARRAYS: dict[str, HistoryArray] = {
+    "time": HistoryArray(("t",), "s", "time of the row; row 0 is the bed before the first control period"),
+    "height": HistoryArray(("t", "n"), "m", "height of each pin's top over the floor of the bed"),
+    "force": HistoryArray(("t", "n"), "N", "force of all fingers on each pin, positive downwards"),
+    "command": HistoryArray(
+        ("t", "n"), "1", "valve command of each pin in the control period that begins with the row, -1 to 1"
+    ),
+    "mode": HistoryArray(("t", "n"), "1", "code of each pin's mode in that control period", "i"),
+    "fingertip": HistoryArray(
+        ("t", "f", 7), "m, 1", "pose of each fingertip: its lowest point x, y, z, its quaternion w, x, y, z"
+    ),
+    "total_force": HistoryArray(("t",), "N", "force of all fingers on all pins"),
+    "finger_force": HistoryArray(("t", "f"), "N", "force of each of several fingers", optional=True),
+    "beyond_a_finger": HistoryArray(
+        ("t",), "1", "whether a finger presses beyond the range of the contact law", "b", optional=True
+    ),
+    "position": HistoryArray(("n", 2), "m", "x and y of each pin's axis from the middle of the bed"),
 }
-#: Arrays that not every run has.
-LATER = ("finger_force", "beyond_a_finger")
-#: Types of the arrays that are not plain numbers, and their names in messages.
-KINDS = {"mode": ("i", "whole numbers"), "beyond_a_finger": ("b", "truth values")}
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +69,7 @@ class Run:
 
 
 def read_run(folder: Path, *names: str) -> Run:
-    """Read a run and the named arrays of its history, keys of `SHAPES`; OutputError if unsound."""
+    """Read a run and the named arrays of its history, keys of `HISTORY_ARRAYS`; OutputError if unsound."""
     path = folder / HISTORY
     if not (folder / "scene.toml").is_file():
         raise OutputError(f"{folder} is no run's folder: it has no scene.toml.")
@@ -54,7 +79,9 @@ def read_run(folder: Path, *names: str) -> Run:
     try:
         with zipfile.ZipFile(path) as archive:
             stored = {Path(name).stem for name in archive.namelist()}
-            wanted = [name for name in ("time", *names) if name in stored or name not in LATER]
+            wanted = [
+                name for name in ("time", *names) if name in stored or not HISTORY_ARRAYS[name].optional
+            ]
             heads = read_heads(archive, wanted)
             _refuse(path, scene, heads)
             history = {name: read_array(archive, name) for name in heads}
@@ -78,13 +105,15 @@ def _refuse(path: Path, scene: Scene, heads: Mapping[str, Head]) -> None:
         raise OutputError(f"{path} {rule} (got {rows:,}).")
     sizes = {"n": scene.cells, "t": rows, "f": len(scene.fingers)}
     for name, head in heads.items():
-        axes = (size for size in SHAPES[name] if size != "f" or len(scene.fingers) > 1)
+        axes = (size for size in HISTORY_ARRAYS[name].axes if size != "f" or len(scene.fingers) > 1)
         shape = tuple(sizes[size] if isinstance(size, str) else size for size in axes)
         if head.shape != shape:
             raise OutputError(f"{path}: {name} must have the shape {shape} of its scene (got {head.shape}).")
-        kinds, called = KINDS.get(name, ("if", "numbers"))
+        kinds = HISTORY_ARRAYS[name].kinds
         if head.kind.kind not in kinds or head.kind.itemsize > 8:
-            raise OutputError(f"{path}: {name} must hold {called} of at most 8 bytes (got {head.kind}).")
+            raise OutputError(
+                f"{path}: {name} must hold {KINDS[kinds]} of at most 8 bytes (got {head.kind})."
+            )
     size, free = sum(head.size for head in heads.values()), measure_available_memory()
     if size > free:
         rule = f"must fit into the {free / 1e9:.3g} GB of free memory"
