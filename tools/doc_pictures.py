@@ -16,6 +16,7 @@ from math import radians
 from pathlib import Path
 
 from digiclay.cli import main as digiclay
+from digiclay.core.scene.scene_source import list_samples
 from PIL import Image
 
 PICTURES = Path(__file__).resolve().parents[1] / "docs" / "pictures"
@@ -33,6 +34,17 @@ scenes = ["ridge_mound_valley"]
 FRAME = 300
 #: Scenes of several fingers, and an instant of each at which all of them work, s.
 HANDS = {"two_hands_bowl": 9.0, "pinch_crease": 7.0, "five_fingers_mound": 7.0}
+#: Instants of the sample scenes that show more than their last touch, s.
+INSTANTS = {
+    **HANDS,
+    "elastic_press": 1.4,
+    "force_display": 3.0,
+    "slow_press": 2.4,
+    "tap": 0.2,
+    "viscous_press": 2.7,
+}
+#: Area of a picture of 640 x 400 pixels beside its legend, and the size of a sample's picture, pixels.
+BESIDE, SMALL = (120, 10, 640, 400), (260, 195)
 #: Film of one of them: a series, and how long a frame is shown, ms.
 HAND_FILM, SHOWN_FOR = (
     """\
@@ -117,6 +129,17 @@ def draw_hands(folder: Path, name: str) -> None:
     drawn, size = folder / "drawn.png", ("--size", "900x563")
     carry_out("render", folder / "run", "--time", str(HANDS[name]), *size, "--out", drawn, "--quiet")
     save_jpeg(drawn, f"{name}.jpg", 85)
+
+
+def draw_sample(folder: Path, name: str) -> None:
+    """Draw a sample scene for the table of all."""
+    carry_out("run", name, "--out", folder / "run", "--no-errors", "--quiet")
+    drawn, instant = folder / "drawn.png", INSTANTS.get(name)
+    options = ["--time", str(instant)] if instant else []
+    carry_out("render", folder / "run", *options, "--size", "640x400", "--out", drawn, "--quiet")
+    with Image.open(drawn) as opened:
+        small = opened.convert("RGB").crop(BESIDE).resize(SMALL, Image.Resampling.LANCZOS)
+    small.save(PICTURES / "samples" / f"{name}.jpg", quality=85, optimize=True)
 
 
 def draw_hand_film(folder: Path) -> None:
@@ -235,6 +258,7 @@ DRAWN: dict[str, Callable[[Path], None]] = {
     "export.jpg": draw_export,
     "shapes.jpg": draw_shapes,
     **{f"{name}.jpg": partial(draw_hands, name=name) for name in HANDS},
+    **{f"samples/{name}.jpg": partial(draw_sample, name=name) for name in list_samples()},
     "two_hands.webp": draw_hand_film,
     "hand_forces.png": draw_hand_forces,
 }
