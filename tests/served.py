@@ -66,8 +66,6 @@ class Server:
 def load_example(name):
     """Return a program of docs/examples as a module."""
     spec = importlib.util.spec_from_file_location(name, ROOT / "docs" / "examples" / f"{name}.py")
-    assert spec
-    assert spec.loader
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
@@ -97,7 +95,6 @@ def serve(folder, *options, rate=200):
         preexec_fn=partial(signal.signal, signal.SIGHUP, signal.SIG_DFL),
     )
     try:
-        assert process.stdout is not None
         said = "".join(process.stdout.readline() for _ in range(3))
         ports = re.findall(r"127\.0\.0\.1:(\d+)", said)
         assert len(ports) == 2, said + process.communicate(timeout=TIMEOUT)[1]

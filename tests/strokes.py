@@ -11,7 +11,6 @@ from digiclay.strokes.stroke import draw, start
 from tests import hand
 from tests.hand import heights, let_go
 
-Places = list[tuple[float, float]]
 #: Control periods that are simulated at a time: a stroke leaves the same bits in any number of them, and each
 #: time its state is packed.
 CHUNK = 64

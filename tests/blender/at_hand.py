@@ -1,9 +1,7 @@
 """What a user does to beds with Blender's own operators, and what the scene has after it."""
 
 import tempfile
-from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
 
 import bpy
 import numpy as np
@@ -15,7 +13,7 @@ from digiclay.roles import BALL, FINGER, HOUSING, OWNED, ROLE, fingertip_of, is_
 FILES = tempfile.TemporaryDirectory(prefix="digiclay-beds-")
 
 
-def open_bed(name: str, add: Callable[[], object]) -> Any:
+def open_bed(name, add):
     """Open the factory file with a bed that `add` adds the first time: a tenth of the time that takes."""
     path = Path(FILES.name, f"{name}.blend")
     if not path.exists():
@@ -26,13 +24,13 @@ def open_bed(name: str, add: Callable[[], object]) -> Any:
     return beds()[0]
 
 
-def new_bed(**options: Any) -> Any:
+def new_bed(**options):
     """Open the factory file with a bed of the Add menu in it, active."""
     name = "-".join(f"{value}" for value in ("bed", *options.values()))
     return open_bed(name, lambda: bpy.ops.mesh.digital_clay_add(**options))
 
 
-def read_picture(path: Path) -> np.ndarray:
+def read_picture(path):
     """Read a picture with Blender itself, (height, width, 3) sRGB in [0, 1], the lower row first."""
     image = bpy.data.images.load(str(path.resolve()))
     pixels = np.array(image.pixels[:]).reshape(image.size[1], image.size[0], image.channels)
@@ -40,13 +38,13 @@ def read_picture(path: Path) -> np.ndarray:
     return pixels[:, :, :3]
 
 
-def film_strip(scene: Any, path: Path) -> tuple[Any, int]:
+def film_strip(scene, path):
     """Put a film into the sequencer of a scene; return its strip and how many frames it has."""
     strip = strips(scene).new_movie("film", str(path), channel=1, frame_start=1)
     return strip, int(strip.duration if hasattr(strip, "duration") else strip.frame_final_duration)  # 5.2 on
 
 
-def in_the_view() -> Any:
+def in_the_view():
     """Return the override of the context with the main region of the 3D view."""
     (window,) = bpy.context.window_manager.windows
     area = next(area for area in window.screen.areas if area.type == "VIEW_3D")
@@ -54,30 +52,30 @@ def in_the_view() -> Any:
     return bpy.context.temp_override(window=window, area=area, region=region)
 
 
-def done(step: str) -> None:
+def done(step):
     """End a user's action as Blender does: an undo step, an evaluation, and what waits for those."""
     bpy.ops.ed.undo_push(message=step)
     looked()
 
 
-def looked() -> None:
+def looked():
     bpy.context.view_layer.update()
     repair.settle()
     bpy.context.view_layer.update()
 
 
-def undone() -> None:
+def undone():
     """Undo one step, as the user counts them."""
     bpy.ops.ed.undo()
     looked()
 
 
-def redone() -> None:
+def redone():
     bpy.ops.ed.redo()
     looked()
 
 
-def added(x: float = 0.0) -> Any:
+def added(x=0.0):
     """Add a small bed, its fingertip somewhere."""
     bpy.ops.mesh.digital_clay_add(rows=5, columns=5)
     bed = bpy.context.object
@@ -87,7 +85,7 @@ def added(x: float = 0.0) -> Any:
     return bed
 
 
-def select(*things: Any) -> None:
+def select(*things):
     """Select objects alone, the last one active."""
     bpy.ops.object.select_all(action="DESELECT")
     for thing in things:
@@ -95,7 +93,7 @@ def select(*things: Any) -> None:
         bpy.context.view_layer.objects.active = thing
 
 
-def duplicate(*things: Any, linked: bool = False) -> Any:
+def duplicate(*things, linked=False):
     """Duplicate objects as a user does; return the active copy."""
     select(*things)
     bpy.ops.object.duplicate(linked=linked)
@@ -103,22 +101,22 @@ def duplicate(*things: Any, linked: bool = False) -> Any:
     return bpy.context.object
 
 
-def delete(*things: Any) -> None:
+def delete(*things):
     select(*things)
     bpy.ops.object.delete()
     done("Delete")
 
 
-def save_and_open(file: Path) -> None:
+def save_and_open(file):
     bpy.ops.wm.save_as_mainfile(filepath=str(file))
     bpy.ops.wm.open_mainfile(filepath=str(file))
 
 
-def beds() -> list[Any]:
+def beds():
     return [thing for thing in bpy.context.scene.objects if is_bed(thing)]
 
 
-def whole(*found: Any) -> bool:
+def whole(*found):
     """Tell whether the scene has these beds, each with a fingertip of its own, and nothing else."""
     tips = [fingertip_of(bed) for bed in found]
     balls = [tip[BALL] for tip in tips if tip is not None]
@@ -127,14 +125,14 @@ def whole(*found: Any) -> bool:
     return len(parts) == 3 * len(found) and of_balls and set(bpy.context.scene.objects) == parts
 
 
-def instances(bed: Any) -> Iterator[Any]:
+def instances(bed):
     """Give what Blender draws for a bed: pins, arrows, the skin; each until the next is asked for."""
     for item in bpy.context.evaluated_depsgraph_get().object_instances:
         if item.is_instance and item.parent.original == bed:
             yield item
 
 
-def inventory() -> dict[str, list[str]]:
+def inventory():
     """Name everything in the open file, but the slots Blender shows its results in."""
     slots = {"Render Result", "Viewer Node"}
     kinds = {name: getattr(bpy.data, name) for name in dir(bpy.data)}
@@ -142,14 +140,14 @@ def inventory() -> dict[str, list[str]]:
     return {name: sorted({item.name for item in kind} - slots) for name, kind in found.items()}
 
 
-def housings() -> int:
+def housings():
     graph = bpy.context.evaluated_depsgraph_get()
     drawn = (item.object for item in graph.object_instances if not item.is_instance)
     meshes = (thing.data for thing in drawn if thing.type == "MESH")
     return sum(one is not None and one.get(ROLE) == "housing" for mesh in meshes for one in mesh.materials)
 
 
-def older(bed: Any) -> None:
+def older(bed):
     """Make a bed what it was in older files: its housing an object, nothing held by properties."""
     tree = bed.modifiers[0].node_group
     case = tree.nodes["Housing"].inputs["Object"].default_value.copy()

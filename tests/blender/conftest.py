@@ -15,7 +15,7 @@ from digiclay.sessions import running
 from tests.blender.at_hand import done
 
 
-def enable(on: bool) -> None:
+def enable(on):
     """Enable the extension, or take it back, unless it is so already."""
     if on != hasattr(bpy.types.Object, "digiclay"):
         (digiclay.register if on else digiclay.unregister)()

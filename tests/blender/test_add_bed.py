@@ -2,7 +2,6 @@
 
 import dataclasses
 import os
-from pathlib import Path
 from typing import Any
 
 import bpy
@@ -36,13 +35,13 @@ def preset():
     own_presets.remove("Stiff clay")
 
 
-def add(**chosen: Any) -> Any:
+def add(**chosen):
     assert bpy.ops.mesh.digital_clay_add(**chosen) == {"FINISHED"}
     return bpy.context.object
 
 
 #: What can be chosen, and the scene file of it.
-CHOICES: list[tuple[dict[str, str], dict[str, Any]]] = [
+CHOICES = [
     ({}, {}),
     *(({"preset": name}, {"preset": name}) for name in PRESETS),
     *(({"method": name}, {"control": {"method": name}}) for name in METHODS),
@@ -214,7 +213,7 @@ def test_a_preset_that_was_spoilt_or_is_gone_is_told_of_in_one_line(content, bed
 
 
 def test_a_folder_that_cannot_be_made_is_told_of(bed):
-    folder: Path = own_presets.folder()
+    folder = own_presets.folder()
     if folder.exists():
         folder.rmdir()
     folder.parent.mkdir(parents=True, exist_ok=True)

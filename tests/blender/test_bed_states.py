@@ -1,9 +1,7 @@
 """Every operator on a bed in every state: it does its work, or says in one line why it does not."""
 
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import bpy
 import numpy as np
@@ -26,7 +24,7 @@ from tests.blender.at_hand import beds, done, in_the_view, new_bed, select
 #: forms and displays something with its pins.
 ADDS, DATA, PINS, CHANGES, FORMS = "adds", "data", "pins", "changes", "forms"
 #: Every operator that works without a hand and without a session, how it is called, and what it does.
-CALLS: dict[str, tuple[Any, ...]] = {
+CALLS = {
     "mesh.digital_clay_add": ({"rows": 4, "columns": 4}, ADDS),
     "digiclay.add_sample": ({"sample": "session:tap", "take": False}, ADDS),
     "digiclay.open_scene": ({"filepath": "tap.toml", "take": False}, ADDS),
@@ -94,7 +92,7 @@ ELSEWHERE = {
 }
 
 
-def link(bed: Any) -> Any:
+def link(bed):
     """Link the bed of the open file into an empty one, with all that belongs to it."""
     path = bpy.data.filepath
     bpy.ops.wm.read_homefile(use_empty=False, use_factory_startup=True)
@@ -106,18 +104,18 @@ def link(bed: Any) -> Any:
     return next(thing for thing in here.objects if is_bed(thing))
 
 
-def override(bed: Any) -> Any:
+def override(bed):
     select(link(bed))
     bpy.ops.object.make_override_library()
     bpy.context.object.data.override_create(remap_local_usages=True)
     return bpy.context.object
 
 
-def half_local(bed: Any) -> Any:
+def half_local(bed):
     return link(bed).make_local()
 
 
-def damage(bed: Any) -> Any:
+def damage(bed):
     """Delete the last row of pins: the others are a bed of fewer rows."""
     select(bed)
     for vertex in bed.data.vertices:
@@ -128,21 +126,21 @@ def damage(bed: Any) -> Any:
     return bed
 
 
-def edit(bed: Any) -> Any:
+def edit(bed):
     select(bed)
     bpy.ops.object.mode_set(mode="EDIT")
     return bed
 
 
-def stretch(*scale: float) -> Callable[[Any], Any]:
-    def stretched(bed: Any) -> Any:
+def stretch(*scale):
+    def stretched(bed):
         bed.scale = scale
         return bed
 
     return stretched
 
 
-def put(bed: Any, name: str) -> Any:
+def put(bed, name):
     """Put the bed with its parts into a new collection alone; return that, in the view layer."""
     collection = bpy.data.collections.new(name)
     bpy.context.scene.collection.children.link(collection)
@@ -153,12 +151,12 @@ def put(bed: Any, name: str) -> Any:
     return bpy.context.view_layer.layer_collection.children[name]
 
 
-def exclude(bed: Any) -> Any:
+def exclude(bed):
     put(bed, "Excluded").exclude = True
     return bed
 
 
-def exclude_one(bed: Any) -> Any:
+def exclude_one(bed):
     """Have the bed stand in a collection that is excluded as well, the first of its two."""
     layer = put(bed, "A")
     for thing in (bed, fingertip_of(bed)):
@@ -167,7 +165,7 @@ def exclude_one(bed: Any) -> Any:
     return bed
 
 
-def hide_collection(bed: Any) -> Any:
+def hide_collection(bed):
     """Hide the collection that what is added goes into, with its eye."""
     layer = put(bed, "Hidden")
     bpy.context.view_layer.active_layer_collection = layer
@@ -176,17 +174,17 @@ def hide_collection(bed: Any) -> Any:
     return bed
 
 
-def leave_scene(bed: Any) -> Any:
+def leave_scene(bed):
     bpy.context.window.scene = bpy.data.scenes.new("Another")
     return bed
 
 
-def keep(bed: Any) -> Any:
+def keep(bed):
     return bed
 
 
 #: States of a bed: what brings it there, and what can be done with it then; all else is refused.
-STATES: dict[str, tuple[Callable[[Any], Any], set[str]]] = {
+STATES = {
     "plain": (keep, {ADDS, DATA, PINS, CHANGES, FORMS}),
     "linked": (link, {ADDS, DATA, PINS}),
     "overridden, with its mesh": (override, {ADDS, DATA, PINS}),
@@ -218,7 +216,7 @@ def folder(extension, files, monkeypatch):
     return files
 
 
-def make_files(folder: Path) -> None:
+def make_files(folder):
     bed = new_bed(rows=5, columns=5)
     (folder / "strokes.toml").write_text("[[stroke]]\ndepth = 0.001\nmoves = [[0, 0, 0], [0.1, 0.002, 0]]\n")
     np.save(folder / "ramp.npy", np.linspace(0.0, 1.0, 25).reshape(5, 5))
@@ -235,12 +233,12 @@ def make_files(folder: Path) -> None:
     bpy.ops.wm.save_as_mainfile(filepath=str(folder / "baked.blend"))
 
 
-def file_of(name: str) -> str:
+def file_of(name):
     """Return the file that an operator is called in."""
     return "baked.blend" if name in BAKED else "bed.blend"
 
 
-def prepare(name: str, state: str) -> Any:
+def prepare(name, state):
     """Open the file that an operator is called in, and bring its bed into a state; return the bed."""
     bpy.ops.wm.open_mainfile(filepath=str(Path(file_of(name)).resolve()))
     for file in WRITTEN:
@@ -255,7 +253,7 @@ def prepare(name: str, state: str) -> Any:
     return bed
 
 
-def call(bed: Any, name: str) -> tuple[str, Any]:
+def call(bed, name):
     """Call an operator on a bed as the view would; return what it says against it, and the result."""
     area, _, own = name.partition(".")
     # A bed that the view layer does not have cannot be active: a script can still pass it.
@@ -266,7 +264,7 @@ def call(bed: Any, name: str) -> tuple[str, Any]:
             return str(error).partition(".poll() ")[2] or str(error), None
 
 
-def start(bed: Any) -> tuple[str, Any]:
+def start(bed):
     """Start a session of a bed, as the operator does in a window, and stop it."""
     try:
         tick.start(bpy.context, bed)
@@ -276,7 +274,7 @@ def start(bed: Any) -> tuple[str, Any]:
     return "", {"FINISHED"}
 
 
-def read_attributes(mesh: Any) -> dict[str, bytes]:
+def read_attributes(mesh):
     """Return the values of the numbers that a mesh has for its pins."""
     found = {}
     for name in {"position", FORMER, *bridge.ATTRIBUTES} & set(mesh.attributes.keys()):
@@ -287,9 +285,9 @@ def read_attributes(mesh: Any) -> dict[str, bytes]:
     return found
 
 
-def observe() -> dict[str, Any]:
+def observe():
     """Return all that an operator can change: objects, their properties and settings, pins, bakes, files."""
-    found: dict[str, Any] = {}
+    found = {}
     for thing in bpy.data.objects:
         values = [one.to_dict() if hasattr(one, "to_dict") else one for one in thing.values()]
         groups = [repr(read_stored(thing, name)) for name in ("digiclay", "digiclay_display")]
@@ -330,21 +328,21 @@ def test_the_table_has_every_operator():
     assert not CALLS.keys() & ELSEWHERE
 
 
-def apply_scale(*scale: float) -> Callable[[Any], object]:
-    def applied(bed: Any) -> None:
+def apply_scale(*scale):
+    def applied(bed):
         bed.scale = scale
         bpy.ops.object.transform_apply(location=False, rotation=False)
 
     return applied
 
 
-def apply_turn(bed: Any) -> None:
+def apply_turn(bed):
     bed.rotation_euler.z = 0.5
     bpy.ops.object.transform_apply()
 
 
-def join(active: Callable[[Any], Any]) -> Callable[[Any], object]:
-    def joined(bed: Any) -> None:
+def join(active):
+    def joined(bed):
         select(bpy.data.objects["Cube"], bed)
         bpy.context.view_layer.objects.active = active(bed)
         bpy.ops.object.join()
@@ -352,8 +350,8 @@ def join(active: Callable[[Any], Any]) -> Callable[[Any], object]:
     return joined
 
 
-def in_edit_mode(work: Callable[[], object]) -> Callable[[Any], object]:
-    def worked(bed: Any) -> None:
+def in_edit_mode(work):
+    def worked(bed):
         for vertex in bed.data.vertices:
             vertex.select = vertex.index < 10
         bpy.ops.object.mode_set(mode="EDIT")
@@ -363,22 +361,22 @@ def in_edit_mode(work: Callable[[], object]) -> Callable[[Any], object]:
     return worked
 
 
-def make_single(bed: Any) -> None:
+def make_single(bed):
     bpy.ops.object.duplicate(linked=True)
     select(bed)
     bpy.ops.object.make_single_user(object=True, obdata=True)
 
 
-def convert(target: str) -> Callable[[Any], object]:
+def convert(target):
     return lambda _: bpy.ops.object.convert(target=target)
 
 
-def shuffle() -> None:
+def shuffle():
     bpy.ops.mesh.select_all(action="SELECT")
     bpy.ops.mesh.sort_elements(type="RANDOMIZE", elements={"VERT"}, seed=3)
 
 
-def reverse_some() -> None:
+def reverse_some():
     """Exchange the pins between the first and the last of a row."""
     bed = bpy.context.object
     bpy.ops.object.mode_set(mode="OBJECT")
@@ -387,7 +385,7 @@ def reverse_some() -> None:
     bpy.ops.object.mode_set(mode="EDIT")
 
 
-def move_one() -> None:
+def move_one():
     bpy.ops.object.mode_set(mode="OBJECT")
     for vertex in bpy.context.object.data.vertices:
         vertex.select = vertex.index == 12
@@ -399,7 +397,7 @@ LAYOUT, ROWS = "The pins differ from the parameters of Layout: press Rebuild", "
 NOT_PINS, SOME = "mesh is no longer that of its pins: undo that", "pins now instead of 25: undo that"
 #: What Blender's own verbs make of a bed, which are selected then, and what is said against a session and a
 #: bake of each bed, and against its export as it is drawn; nothing: they are right.
-VERBS: dict[str, tuple[Callable[[Any], object], str, str]] = {
+VERBS = {
     "joined with a cube": (join(lambda bed: bed), SOME, SOME),
     "scale applied": (apply_scale(2.0, 2.0, 2.0), LAYOUT, ""),
     "stretch applied": (apply_scale(2.0, 1.0, 1.0), LAYOUT, ""),
@@ -453,7 +451,7 @@ def test_what_blenders_own_verbs_make_of_a_bed_is_formed_right_or_refused_with_i
             assert read_attributes(each.data) == formed
 
 
-def call_on(bed: Any, name: str) -> str:
+def call_on(bed, name):
     """Return what is said against a session or an operator of a bed that is selected alone."""
     select(bed)
     return (start(bed) if name == SESSION else call(bed, name))[0]

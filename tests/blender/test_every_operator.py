@@ -1,8 +1,5 @@
 """Every operator with odd things active, in every mode: it is refused or does its work, and never fails."""
 
-from collections.abc import Callable, Iterator
-from typing import Any
-
 import bpy
 import pytest
 from digiclay import operators
@@ -19,18 +16,18 @@ from tests.blender.session.live import Clock
 
 OPERATORS = [kind for kind in operators.CLASSES if issubclass(kind, bpy.types.Operator)]
 #: Settings with which long work takes less time.
-QUICK: dict[str, dict[str, Any]] = {"digiclay.bake": {"last": 3}, "digiclay.add_sample": {"take": False}}
+QUICK = {"digiclay.bake": {"last": 3}, "digiclay.add_sample": {"take": False}}
 BPY = bpy.ops
 
 
-def enter(mode: str) -> None:
+def enter(mode):
     BPY.object.mode_set(mode=mode)
 
 
 #: Blender 4.2 makes no points of a mesh.
 NO_MESH = "POINTCLOUD" if bpy.app.version >= (4, 5) else "CURVE"
 #: What can be active, and what can become of a bed that was active.
-ODD: dict[str, Callable[[Any], object]] = {
+ODD = {
     "a bed": lambda bed: None,
     "its fingertip": lambda bed: select(fingertip_of(bed)),
     "nothing": lambda bed: setattr(bpy.context.view_layer.objects, "active", None),
@@ -86,7 +83,7 @@ def file(extension, folder, tmp_path, monkeypatch):
     return str(path)
 
 
-def prepare(file: str, odd: str, live: bool) -> Any:
+def prepare(file, odd, live):
     """Load the file, in mid-stroke of a session if wanted, do what is odd, and return the state."""
     BPY.wm.open_mainfile(filepath=file)
     bed, clock = bpy.context.object, Clock()
@@ -100,7 +97,7 @@ def prepare(file: str, odd: str, live: bool) -> Any:
     return state()
 
 
-def state() -> Any:
+def state():
     """Return what is active, in which mode, and among how many objects."""
     return getattr(bpy.context.object, "name", ""), bpy.context.mode, len(bpy.data.objects)
 
@@ -110,7 +107,7 @@ ADDS = {"mesh.digital_clay_add", "digiclay.add_sample"}
 FOR_ADDS = {"a bed", "nothing", "edited", "another mesh edited", "joined into a cube"}
 
 
-def calls(adds: bool) -> Iterator[tuple[Any, str, dict[str, Any]]]:
+def calls(adds):
     """Give every operator, how to call it, and its settings; once more with either value of what has two."""
     for kind in OPERATORS:
         if kind.bl_idname in ADDS and not adds:
@@ -125,7 +122,7 @@ def calls(adds: bool) -> Iterator[tuple[Any, str, dict[str, Any]]]:
                 yield operator, how, {**quick, known.identifier: item.identifier}
 
 
-def call(operator: Any, how: str, settings: dict[str, Any]) -> str:
+def call(operator, how, settings):
     """Call an operator as the 3D view would; return why it declines, or what it says of an error."""
     with in_the_view():
         try:

@@ -1,7 +1,5 @@
 """Export, Make Mesh with its shading, and the list of features, as a user of Blender has them."""
 
-from typing import Any
-
 import bpy
 import numpy as np
 import pytest
@@ -26,7 +24,7 @@ FLOAT32 = 0.5 / bridge.SCALE * 2.0**-23
 LAYOUT = Layout(rows=12, columns=14)
 
 
-def shaped(boss: float = -9.0, added: Any = 0.0) -> Instant:
+def shaped(boss=-9.0, added=0.0):
     """A boss of 5 mm at x, mm, a crease of 4 mm, ground between them and what is added; forces, all modes."""
     place, number = make_grid(LAYOUT).positions, np.arange(168)
     x, y = place.T * 1e3
@@ -44,13 +42,13 @@ def bed(extension):
     return made
 
 
-def corners(thing: bpy.types.Object) -> np.ndarray:
+def corners(thing):
     found = np.empty(3 * len(thing.data.vertices), np.float32)
     thing.data.vertices.foreach_get("co", found)
     return found.reshape(-1, 3).astype(float)
 
 
-def open_edges(thing: bpy.types.Object) -> int:
+def open_edges(thing):
     """Count the edges that have not exactly two faces."""
     keys = [key for polygon in thing.data.polygons for key in polygon.edge_keys]
     _, counts = np.unique(np.array(keys), axis=0, return_counts=True)
@@ -257,7 +255,7 @@ def test_the_rim_of_a_solid_is_sharp_and_nothing_within_its_skin(cliffs):
     bpy.context.view_layer.objects.active = cliffs
     bpy.ops.mesh.digital_clay_make(kind="solid")
     mesh = bpy.context.object.data
-    beside: dict[tuple[int, int], set[bool]] = {key: set() for key in mesh.edge_keys}
+    beside = {key: set() for key in mesh.edge_keys}
     for face in mesh.polygons:
         for key in face.edge_keys:
             beside[key].add(face.use_smooth)

@@ -7,9 +7,7 @@ import shutil
 import subprocess
 import sys
 import zipfile
-from collections.abc import Iterable
 from pathlib import Path
-from typing import Any
 
 import bpy
 import digiclay
@@ -30,11 +28,11 @@ from tests.timeouts import TIMEOUT
 FLOAT32 = 0.1 * 2.0**-23
 
 
-def ours(functions: Iterable[Any]) -> int:
+def ours(functions):
     return sum(getattr(function, "__module__", "").startswith("digiclay") for function in functions)
 
 
-def footprint() -> set[str]:
+def footprint():
     """Return what of the extension is to be found in Blender: types, properties, entries, handlers."""
     types = {name: getattr(bpy.types, name) for name in dir(bpy.types)}
     found = {name for name in types if "digi" in name.lower()}
@@ -126,12 +124,12 @@ XYZ = np.array(
 ) / np.array([[0.95047], [1.0], [1.08883]])
 
 
-def lab(light: np.ndarray) -> np.ndarray:
+def lab(light):
     x, y, z = (np.cbrt(v) if v > 216 / 24389 else (24389 / 27 * v + 16) / 116 for v in XYZ @ light)
     return np.array([116 * y - 16, 500 * (x - y), 200 * (y - z)])
 
 
-def mode_color(mode: Mode) -> tuple[float, ...]:
+def mode_color(mode):
     """Return the linear color the pins of a mode have in the viewport."""
     (material,) = (item for item in bpy.data.materials if item.get(ROLE) == mode.name.lower())
     return tuple(material.diffuse_color)
@@ -181,7 +179,7 @@ def test_where_the_package_is_not_enabled_the_preferences_are_the_defaults_of_th
 def test_what_fails_to_register_leaves_nothing_registered(monkeypatch):
     from digiclay import panels
 
-    def refuse() -> None:
+    def refuse():
         raise RuntimeError("refused")
 
     monkeypatch.setattr(panels, "register", refuse)
@@ -220,7 +218,7 @@ def seen(archive, tmp_path_factory):
     )
     assert done.returncode == 0, f"{done.stdout[-2000:]}\n{done.stderr[-2000:]}"
     assert "Traceback" not in done.stderr
-    result: dict[str, Any] = json.loads((folder / "seen.json").read_text())
+    result = json.loads((folder / "seen.json").read_text())
     return result | {"files": sorted(file.name for file in folder.iterdir())}
 
 

@@ -4,7 +4,6 @@ import json
 import os
 import subprocess
 from pathlib import Path
-from typing import Any
 
 import bpy
 import numpy as np
@@ -57,7 +56,7 @@ def history():
     }
 
 
-def frames_of(path: Path, folder: Path) -> tuple[float, list[np.ndarray]]:
+def frames_of(path, folder):
     """Read a film with Blender itself: its rate, and each frame (height, width, 3), the lower row first."""
     folder.mkdir()
     with scratch():
@@ -73,7 +72,7 @@ def frames_of(path: Path, folder: Path) -> tuple[float, list[np.ndarray]]:
     return rate, pictures
 
 
-def render(shown: Any, out: Path, looks: Any, set_point: float | None = None, **known: Any) -> Path | None:
+def render(shown, out, looks, set_point=None, **known):
     """Draw a film of a history, or a turntable of an instant."""
     if isinstance(looks, Film):
         stage = film.stage_film(shown, looks, ("total force", shown["total_force"]), set_point=set_point)
@@ -82,12 +81,12 @@ def render(shown: Any, out: Path, looks: Any, set_point: float | None = None, **
     return film.render_film(stage, out, looks, **known)
 
 
-def filmed(shown: Any, path: Path, looks: Any) -> list[np.ndarray]:
+def filmed(shown, path, looks):
     assert render(shown, path, looks) == path
     return frames_of(path, path.with_suffix(""))[1]
 
 
-def looks_like(pixels: np.ndarray, mode: Mode) -> int:
+def looks_like(pixels, mode):
     """Count pixels of the bed, right of the legend and above the strip, in the direction of a color."""
     bed = pixels[HEIGHT // 3 :, WIDTH // 4 :].reshape(-1, 3)
     wanted = np.array(COLORS[mode])
@@ -195,7 +194,7 @@ def test_on_a_full_disk_nothing_half_written_stays(tmp_path, history):
 
 
 def test_a_film_of_two_fingers_shows_both_and_plots_the_force_of_each():
-    def press(x: float, low: float) -> dict[str, Any]:
+    def press(x, low):
         ways = [{"time": t, "position": [x, 0.0, z]} for t, z in ((0.0, 0.041), (0.2, low))]
         return {"trajectory": {"waypoints": ways}}
 

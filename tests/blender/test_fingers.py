@@ -1,9 +1,5 @@
 """Further fingertips of a bed, and hands: added, moved, copied, deleted, undone, appended as the first is."""
 
-from collections.abc import Callable
-from pathlib import Path
-from typing import Any
-
 import bpy
 import numpy as np
 import pytest
@@ -21,7 +17,7 @@ from tests.blender.at_hand import added, beds, done, looked, redone, select, und
 pytestmark = pytest.mark.usefixtures("watched")
 
 
-def with_finger() -> Any:
+def with_finger():
     """Add a bed with two fingertips."""
     bed = added()
     assert bpy.ops.digiclay.add_fingertip() == {"FINISHED"}
@@ -29,7 +25,7 @@ def with_finger() -> Any:
     return bed
 
 
-def with_hand(side: str = "RIGHT") -> Any:
+def with_hand(side="RIGHT"):
     """Add a bed with a hand beside its fingertip; the palm is active."""
     bed = added()
     assert bpy.ops.digiclay.add_hand(side=side) == {"FINISHED"}
@@ -37,12 +33,12 @@ def with_hand(side: str = "RIGHT") -> Any:
     return bed
 
 
-def palms() -> list[Any]:
+def palms():
     """Return the palms that stand in a collection."""
     return [thing for thing in bpy.data.objects if thing.get(ROLE) == PALM and is_linked(thing)]
 
 
-def sound(bed: Any, *numbers: int) -> bool:
+def sound(bed, *numbers):
     """Tell whether a bed has fingertips of these numbers, each with an ellipsoid of its own that stands."""
     tips = fingertips_of(bed)
     balls = {ellipsoid(tip) for tip in tips.values()}
@@ -51,7 +47,7 @@ def sound(bed: Any, *numbers: int) -> bool:
     return whole and tuple(tips) == numbers and len(properties.read_scene(bed).fingers) == len(numbers)
 
 
-def test_fingertips_are_apart_above_the_pins_and_sized_each_for_itself() -> None:
+def test_fingertips_are_apart_above_the_pins_and_sized_each_for_itself():
     bed = with_finger()
     bpy.ops.digiclay.add_hand()
     done("Add Hand")
@@ -74,7 +70,7 @@ def test_fingertips_are_apart_above_the_pins_and_sized_each_for_itself() -> None
     assert last.blister != after.blister
 
 
-def test_a_left_hand_is_the_image_of_a_right_one_and_stands_so_on_a_bed_that_is_turned_and_scaled() -> None:
+def test_a_left_hand_is_the_image_of_a_right_one_and_stands_so_on_a_bed_that_is_turned_and_scaled():
     hands = {}
     for side in ("RIGHT", "LEFT"):
         bed = with_hand(side)
@@ -103,7 +99,7 @@ def test_a_left_hand_is_the_image_of_a_right_one_and_stands_so_on_a_bed_that_is_
     np.testing.assert_allclose(bridge.poses(bed), wanted, rtol=0, atol=2e-6)
 
 
-def test_two_hands_have_no_fingertip_between_those_of_the_other_one() -> None:
+def test_two_hands_have_no_fingertip_between_those_of_the_other_one():
     bed = with_hand()
     select(bed)
     bpy.ops.digiclay.add_hand(side="LEFT")
@@ -113,7 +109,7 @@ def test_two_hands_have_no_fingertip_between_those_of_the_other_one() -> None:
     assert apart.max() > 18e-3 - 1e-6  # Blender's 32 bits
 
 
-def test_a_fingertip_whose_own_size_is_set_stays_where_its_lowest_point_is() -> None:
+def test_a_fingertip_whose_own_size_is_set_stays_where_its_lowest_point_is():
     bed = with_hand()
     palms()[0].rotation_euler = (0.2, 0.1, 0.7)
     looked()
@@ -124,7 +120,7 @@ def test_a_fingertip_whose_own_size_is_set_stays_where_its_lowest_point_is() -> 
 
 
 @pytest.mark.parametrize("hand", [False, True], ids=["of the bed", "of a hand"])
-def test_a_copy_of_a_fingertip_is_a_further_one_with_the_size_of_the_one_copied(hand: bool) -> None:
+def test_a_copy_of_a_fingertip_is_a_further_one_with_the_size_of_the_one_copied(hand):
     bed = with_hand() if hand else added()
     last = len(fingertips_of(bed))
     if hand:
@@ -146,7 +142,7 @@ def test_a_copy_of_a_fingertip_is_a_further_one_with_the_size_of_the_one_copied(
     assert sound(beds()[0], *range(1, last + 2))
 
 
-def test_the_size_of_the_press_tool_is_that_of_the_first_fingertip_left_and_the_blister_follows_it() -> None:
+def test_the_size_of_the_press_tool_is_that_of_the_first_fingertip_left_and_the_blister_follows_it():
     bpy.ops.mesh.digital_clay_add(rows=21, columns=21)
     bed = bpy.context.object
     done("Add")
@@ -164,7 +160,7 @@ def test_the_size_of_the_press_tool_is_that_of_the_first_fingertip_left_and_the_
     assert bed.digiclay.fingertip.width == pytest.approx(8.0)
 
 
-def test_a_deleted_fingertip_leaves_its_number_to_the_next_one_and_comes_back_with_undo() -> None:
+def test_a_deleted_fingertip_leaves_its_number_to_the_next_one_and_comes_back_with_undo():
     bed = with_finger()
     bpy.ops.digiclay.add_fingertip()
     done("Add Fingertip")
@@ -188,7 +184,7 @@ def test_a_deleted_fingertip_leaves_its_number_to_the_next_one_and_comes_back_wi
 
 
 @pytest.mark.parametrize("where", ["bed", "palm"])
-def test_a_hand_moves_is_hidden_and_is_deleted_with_its_palm(where: str) -> None:
+def test_a_hand_moves_is_hidden_and_is_deleted_with_its_palm(where):
     bed = with_hand()
     palm, before = palms()[0], bridge.poses(bed)
     palm.location.x += 0.1
@@ -220,7 +216,7 @@ def test_a_hand_moves_is_hidden_and_is_deleted_with_its_palm(where: str) -> None
     assert palms() == []
 
 
-COPIES: dict[str, Callable[[Any], object]] = {
+COPIES = {
     "the bed": lambda bed: select(bed),
     "the bed and its palm": lambda bed: select(palms()[0], bed),
     "the bed and one fingertip": lambda bed: select(fingertips_of(bed)[3], bed),
@@ -232,7 +228,7 @@ COPIES: dict[str, Callable[[Any], object]] = {
 
 
 @pytest.mark.parametrize("what", COPIES)
-def test_a_copy_of_a_bed_has_a_hand_of_its_own(what: str) -> None:
+def test_a_copy_of_a_bed_has_a_hand_of_its_own(what):
     bed = with_hand()
     fingertips_of(bed)[5].digiclay.fingertip.length = 7.0
     before, scene = bridge.poses(bed), properties.read_scene(bed)
@@ -252,7 +248,7 @@ def test_a_copy_of_a_bed_has_a_hand_of_its_own(what: str) -> None:
     assert sound(beds()[0], *range(1, 7))
 
 
-def test_a_copy_of_a_palm_alone_is_another_hand() -> None:
+def test_a_copy_of_a_palm_alone_is_another_hand():
     bed = with_hand()
     select(palms()[0])
     bpy.ops.object.duplicate()
@@ -264,7 +260,7 @@ def test_a_copy_of_a_palm_alone_is_another_hand() -> None:
     np.testing.assert_allclose(poses[6:, :3] - poses[1:6, :3], [[0.0, 0.05, 0.0]] * 5, rtol=0, atol=1e-6)
 
 
-def test_poses_are_given_to_a_hand_by_its_palm_where_it_moves_as_one_and_else_by_its_fingertips() -> None:
+def test_poses_are_given_to_a_hand_by_its_palm_where_it_moves_as_one_and_else_by_its_fingertips():
     bed = with_hand()
     palm, wanted = palms()[0], bridge.poses(bed)
     own = [tuple(tip.location) for tip in palm.children]
@@ -286,7 +282,7 @@ def test_poses_are_given_to_a_hand_by_its_palm_where_it_moves_as_one_and_else_by
     np.testing.assert_allclose(bridge.poses(bed), wanted, rtol=0, atol=1e-6)
 
 
-def test_a_bed_has_at_most_32_fingertips() -> None:
+def test_a_bed_has_at_most_32_fingertips():
     bed = added()
     for _ in range(6):
         bpy.ops.digiclay.add_hand(side="LEFT")
@@ -315,7 +311,7 @@ def test_a_bed_has_at_most_32_fingertips() -> None:
 
 
 @pytest.mark.parametrize("how", ["append", "link"])
-def test_a_bed_of_another_file_comes_with_its_hand(tmp_path: Path, how: str) -> None:
+def test_a_bed_of_another_file_comes_with_its_hand(tmp_path, how):
     bed = with_hand()
     before, name = bridge.poses(bed), bed.name
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "bed.blend"))
@@ -336,7 +332,7 @@ def test_a_bed_of_another_file_comes_with_its_hand(tmp_path: Path, how: str) -> 
     assert len(bpy.context.scene.objects) == 1 + 2 * 6 + 1
 
 
-def test_a_copy_of_a_fingertip_that_a_loaded_file_has_stays_one_to_look_at(tmp_path: Path) -> None:
+def test_a_copy_of_a_fingertip_that_a_loaded_file_has_stays_one_to_look_at(tmp_path):
     bed = added()
     (tip,) = fingertips_of(bed).values()
     stray = tip.copy()
@@ -393,7 +389,7 @@ def test_a_scene_of_several_fingers_opens_with_them_and_a_preset_of_it_has_the_f
         own_presets.remove("two")
 
 
-def test_a_run_of_several_fingers_is_imported_with_them(tmp_path: Path) -> None:
+def test_a_run_of_several_fingers_is_imported_with_them(tmp_path):
     (tmp_path / "two.toml").write_text(TWO, encoding="utf-8")
     assert main(["run", str(tmp_path / "two.toml"), "--out", str(tmp_path / "run"), "--quiet"]) == 0
     run = read_run(tmp_path / "run", "fingertip")

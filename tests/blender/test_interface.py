@@ -5,7 +5,6 @@ import sys
 import webbrowser
 from fnmatch import fnmatchcase
 from pathlib import PurePosixPath, PureWindowsPath
-from typing import Any
 
 import bpy
 import digiclay
@@ -31,7 +30,7 @@ def bed(extension):
     return new_bed(rows=6, columns=6)
 
 
-def panel(name: str) -> Any:
+def panel(name):
     return getattr(bpy.types, f"DIGICLAY_PT_{name}")
 
 
@@ -70,7 +69,7 @@ def test_the_tab_shows_what_a_sculptor_needs_and_keeps_what_a_researcher_needs_c
     assert places == {("VIEW_3D", "UI", CATEGORY)}
     orders = [(kind.bl_parent_id, kind.bl_order) for kind in drawn]
     assert len(set(orders)) == len(orders)
-    tree: dict[str, list[str]] = {}
+    tree = {}
     for kind in sorted(drawn, key=lambda kind: kind.bl_order):
         tree.setdefault(kind.bl_parent_id.removeprefix("DIGICLAY_PT_"), []).append(kind.bl_label)
     assert tree[""] == ["Digital Clay", "Session", "Show", "Export", "Laboratory"]
@@ -105,19 +104,19 @@ def test_what_is_left_out_is_grayed_with_what_belongs_to_it(switch, grayed, bed)
 WRITE = "import sys; open(sys.argv[1], 'a').write(sys.argv[2] + '\\n')"
 
 
-def look_up(name: str) -> str:
-    url: str = bpy.types.WM_OT_doc_view_manual._lookup_rna_url(name, verbose=False)
+def look_up(name):
+    url = bpy.types.WM_OT_doc_view_manual._lookup_rna_url(name, verbose=False)
     return url
 
 
-def operators() -> list[str]:
+def operators():
     """Return the extension's operators as Blender looks them up."""
     kinds = [getattr(bpy.types, name) for name in dir(bpy.types) if "_OT_" in name]
     ours = [kind for kind in kinds if kind.__module__.startswith("digiclay.")]
     return [f"bpy.ops.{kind.bl_idname}" for kind in ours]
 
 
-def settings() -> list[str]:
+def settings():
     """Return the properties of the extension's groups as Blender looks them up."""
     kinds = (*CLASSES, Display)
     pairs = [(kind.bl_rna.identifier, known.identifier) for kind in kinds for known in kind.bl_rna.properties]

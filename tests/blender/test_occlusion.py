@@ -1,8 +1,5 @@
 """An object in front of the pins takes the click, where a view shows it and shows it in front."""
 
-from collections.abc import Callable
-from typing import Any
-
 import bpy
 import numpy as np
 import pytest
@@ -39,13 +36,13 @@ def context(extension):
         yield bpy.context
 
 
-def points_at(context: Any, place: np.ndarray) -> bool:
+def points_at(context, place):
     context.view_layer.update()
     (xy,) = bridge.project(context, beds()[0], place)
     return aim.find_target(context, (float(xy[0]), float(xy[1]))) is not None
 
 
-def cover(context: Any, distance: float = 4.0) -> Any:
+def cover(context, distance=4.0):
     """Add a cube on the ray of the covered place, at a distance from it towards the eye, Blender units."""
     place = beds()[0].matrix_world @ Vector(COVERED[0] * SCALE)
     way = (_eye(context) - place).normalized()
@@ -53,20 +50,20 @@ def cover(context: Any, distance: float = 4.0) -> Any:
     return bpy.context.object
 
 
-def _eye(context: Any) -> Vector:
+def _eye(context):
     return context.region_data.view_matrix.inverted().translation
 
 
-def look(context: Any, bed: Any) -> float:
+def look(context, bed):
     """Return how far the eye is from the covered place."""
     return (_eye(context) - bed.matrix_world @ Vector(COVERED[0] * SCALE)).length
 
 
-def hang(thing: Any, bed: Any) -> None:
+def hang(thing, bed):
     thing.parent, thing.matrix_parent_inverse = bed, bed.matrix_world.inverted()
 
 
-def isolate(bed: Any, times: int) -> None:
+def isolate(bed, times):
     """Enter or leave a local view of the bed."""
     bpy.ops.object.select_all(action="DESELECT")
     for part in (bed, *bed.children_recursive):
@@ -75,12 +72,12 @@ def isolate(bed: Any, times: int) -> None:
         bpy.ops.view3d.localview(frame_selected=False)
 
 
-def shade(context: Any, kind: str, xray: str) -> None:
+def shade(context, kind, xray):
     context.space_data.shading.type = kind
     setattr(context.space_data.shading, xray, True)
 
 
-def add_flat_things(context: Any) -> Any:
+def add_flat_things(context):
     """Add what has no surface or no size where a cube would hide the pins; return a curve among it."""
     where = cover(context).location.copy()
     bpy.data.objects.remove(bpy.data.objects["Cube"])
@@ -94,11 +91,11 @@ def add_flat_things(context: Any) -> Any:
     return curve
 
 
-def fill(curve: Any) -> None:
+def fill(curve):
     curve.dimensions, curve.fill_mode = "2D", "BOTH"
 
 
-def instance(context: Any) -> Any:
+def instance(context):
     """Make a cube in front an instance of a collection that the scene does not have."""
     cube, apart = cover(context), bpy.data.collections.new("Apart")
     for held in list(cube.users_collection):
@@ -110,13 +107,13 @@ def instance(context: Any) -> Any:
     return empty
 
 
-def in_front(thing: Any) -> Any:
+def in_front(thing):
     thing.show_in_front = True
     return thing
 
 
 #: What is done, and whether the pixel of the covered place points at the bed then.
-IN_FRONT: dict[str, tuple[Callable[[Any, Any], object], bool]] = {
+IN_FRONT = {
     "nothing": (lambda view, bed: None, True),
     "a cube": (lambda view, bed: cover(view), False),
     "a cube behind the pins": (lambda view, bed: cover(view, -4.0), True),
@@ -199,7 +196,7 @@ def test_a_clipping_region_takes_away_what_is_outside_it(context):
 
 ON_TOP, BESIDE, CURSOR = "on top of it", "beside it", ""
 #: The factory file's cube, changed, or what is added in place of it; where and how high a bed stands then.
-PLACES: dict[str, tuple[dict[str, Any], str, float]] = {
+PLACES = {
     "the cube swallows it": ({}, ON_TOP, 1.0),
     "the cube is mirrored and scaled": ({"scale": (-1.0, 1.5, 1.2)}, ON_TOP, 1.2),
     "the cube is turned on its edge": ({"rotation_euler": (np.pi / 4, 0.0, 0.3)}, ON_TOP, 2.0**0.5),

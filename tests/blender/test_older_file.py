@@ -1,7 +1,6 @@
 """A file saved before the modules were moved and renamed opens, and its beds go on as they did then."""
 
 from pathlib import Path
-from typing import Any
 
 import bpy
 import numpy as np
@@ -34,13 +33,13 @@ def older_file(extension):
     bpy.ops.wm.open_mainfile(filepath=str(SAMPLES / "beds.blend"))
 
 
-def bed(name: str) -> Any:
+def bed(name):
     found = bpy.data.objects[name]
     bpy.context.view_layer.objects.active = found
     return found
 
 
-def go_on(name: str, x: float) -> None:
+def go_on(name, x):
     """Start a session of a bed, press once more at x, mm, and stop."""
     found, clock = bed(name), Clock()
     assert tick.start(bpy.context, found) == []

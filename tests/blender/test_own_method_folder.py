@@ -1,7 +1,5 @@
 """Control methods of one's own in Blender: a folder that is off at first, parameters, a file without it."""
 
-from typing import Any
-
 import bpy
 import pytest
 from digiclay import preferences
@@ -43,7 +41,7 @@ def chosen(tmp_path):
     bpy.context.preferences.addons.remove(entry)
 
 
-def choose(bed: Any, name: str) -> Any:
+def choose(bed, name):
     """Choose a method as the panel does, and return the properties of its parameters."""
     bed.digiclay.chosen_method = name
     return properties.part_group(bed.digiclay, "control")
@@ -72,7 +70,7 @@ def test_no_code_is_run_until_the_preferences_allow_it(chosen, tmp_path):
 
 
 def test_a_folder_beside_the_file_is_stored_as_a_full_path_or_refused(chosen, tmp_path):
-    def enter() -> None:
+    def enter():
         chosen.methods_folder = "//own"
 
     enter()  # beside a file that was never saved

@@ -2,7 +2,6 @@
 
 import ast
 from pathlib import Path
-from typing import Any
 
 import bpy
 import digiclay
@@ -28,7 +27,7 @@ from tests.blender.at_hand import in_the_view, new_bed
 LARGER = 8.0
 
 
-def tools() -> list[str]:
+def tools():
     """Return our tools in the toolbar of the 3D view in Object Mode, down through its groups."""
     from bl_ui.space_toolsystem_toolbar import VIEW3D_PT_tools_active
 
@@ -161,7 +160,7 @@ def paper(extension):
     return made
 
 
-def lengths(paper: Any) -> tuple[float, ...]:
+def lengths(paper):
     """Return size of the fingertip, then radius, edge and flat radius of the blister, mm."""
     scene = properties.scene_of(paper)
     blister = scene.blister
@@ -265,7 +264,7 @@ def settings(extension, tmp_path, monkeypatch):
         yield brush.tool_settings(bpy.context)
 
 
-def apply(name: str) -> None:
+def apply(name):
     """Apply a preset as its entry in the menu does."""
     (folder,) = [Path(path) for path in bpy.utils.preset_paths(brush.SUBFOLDER)][-1:]
     file = next(path for path in (SHIPPED / f"{name}.py", folder / f"{name}.py") if path.is_file())
@@ -324,7 +323,7 @@ def small(extension):
     return new_bed(rows=9, columns=11)
 
 
-def depths(small: Any) -> Any:
+def depths(small):
     """Return how far the pins drawn are below rest, mm."""
     return 40.0 - 1e3 * bridge.read_cells(small.data)["height"].reshape(9, 11)
 

@@ -1,7 +1,6 @@
 """A bed's settings hold every parameter of the core, and give back its scene; a bed is rebuilt by them."""
 
 import dataclasses
-from typing import Any
 
 import bpy
 import numpy as np
@@ -13,7 +12,7 @@ from digiclay.core.base.quantity import list_quantities
 from digiclay.core.control.methods import METHODS
 from digiclay.core.model.layout import ARRANGEMENTS, Layout, make_grid
 from digiclay.core.scene.scene_source import find, list_samples, load
-from digiclay.core.scene.schema import OPTIONAL, SECTIONS, Scene, import_parameters
+from digiclay.core.scene.schema import OPTIONAL, SECTIONS, import_parameters
 from digiclay.core.scene.toml_table import PRESETS, resolve
 from digiclay.device import parts, view
 from digiclay.live import beds
@@ -30,7 +29,7 @@ EVERY = [(section, "virtual_master") for section in SECTIONS if section != "cont
 EVERY += [("control", method) for method in METHODS]
 
 
-def thing(layout: Layout | None = None, fingers: int = 0) -> Any:
+def thing(layout=None, fingers=0):
     """Return a bed with the pins of a layout, by default the default's, and so many fingertips."""
     places = make_grid(layout or Layout())
     mesh = bridge.points("Bed", places.count)
@@ -41,7 +40,7 @@ def thing(layout: Layout | None = None, fingers: int = 0) -> Any:
     return bed
 
 
-def told(bed: Any, scene: Scene) -> Scene:
+def told(bed, scene):
     """Return a scene as a bed's settings can tell it: its name, and no words or path of its own."""
     path = resolve({"actuator": {"rest_height": scene.actuator.rest_height}}).section("trajectory")
     return scene.with_sections(name=bed.name, description="", trajectory=path)
@@ -163,7 +162,7 @@ def bed():
     return bed
 
 
-def identity(bed: Any) -> tuple[Any, ...]:
+def identity(bed):
     tip = fingertip_of(bed)
     counts = (len(bpy.data.objects), len(bpy.data.meshes), len(bpy.data.node_groups))
     places = (tuple(bed.location), tuple(tip.location))

@@ -1,7 +1,6 @@
 """A still is the picture asked for and leaves nothing behind; its legend is readable in its place."""
 
 import colorsys
-from typing import Any
 
 import bpy
 import numpy as np
@@ -29,7 +28,7 @@ from tests.blender.at_hand import inventory, read_picture
 WIDTH, HEIGHT = 240, 150
 
 
-def of_the_hue(pixels: np.ndarray, color: tuple[float, float, float]) -> int:
+def of_the_hue(pixels, color):
     """Count the pixels that look like a color in light or shadow: its hue, colored, not near black."""
     hue, low, high = colorsys.rgb_to_hsv(*color)[0], pixels.min(axis=2), pixels.max(axis=2)
     colored = pixels[(high > 0.2) & (high - low > 0.5 * high)]
@@ -37,7 +36,7 @@ def of_the_hue(pixels: np.ndarray, color: tuple[float, float, float]) -> int:
     return sum(abs(colorsys.rgb_to_hsv(*pixel)[0] - hue) < 0.03 for pixel in colored)
 
 
-def bed_in(mode: Mode) -> Instant:
+def bed_in(mode):
     rest = Instant.at_rest(Layout(rows=8, columns=8))
     far = np.array([0.0, 0.0, 0.060, 1.0, 0.0, 0.0, 0.0])
     return Instant(rest.position, rest.height, np.full(64, mode), rest.force, far)
@@ -116,7 +115,7 @@ SIZES = {
 }  # fmt: skip
 
 
-def front(width: int, height: int) -> Front:
+def front(width, height):
     """Return the plane before a camera of a picture of some pixels."""
     scene = bpy.data.scenes.new("legend")
     scene.render.resolution_x, scene.render.resolution_y = width, height
@@ -125,17 +124,17 @@ def front(width: int, height: int) -> Front:
     return Front.before(scene, camera, half_frame(scene))
 
 
-def texts(plane: Front) -> dict[str, Any]:
+def texts(plane):
     return {part.data.body: part for part in plane.scene.objects if part.type == "FONT"}
 
 
-def session(plane: Front) -> None:
+def session(plane):
     """Draw the strip of a session of 26.5 s."""
     time = np.linspace(0.0, 26.5, 50)
     draw_force_plot(plane, time, 0.4 + 0.1 * np.sin(time), 0.4).show(15.92, 0.49)
 
 
-def test_several_fingertips_have_a_line_each_in_their_colors_up_to_the_instant() -> None:
+def test_several_fingertips_have_a_line_each_in_their_colors_up_to_the_instant():
     plane, time = front(960, 600), np.linspace(0.0, 10.0, 51)
     plot = draw_force_plot(plane, time, np.column_stack([0.4 + 0.0 * time, 0.1 + 0.02 * time]), 0.4, "forces")
     plot.show(5.0, np.array([0.4, 0.2]))
@@ -148,7 +147,7 @@ def test_several_fingertips_have_a_line_each_in_their_colors_up_to_the_instant()
     assert colors[0] != colors[1]
 
 
-def extent(plane: Front, part: Any) -> tuple[float, float, float, float]:
+def extent(plane, part):
     """Return left, right, lower and upper edge of something on the plane, pixels from the middle."""
     plane.scene.view_layers[0].update()
     corners = np.array(part.bound_box)[:, :2] * np.array(part.scale)[:2] + np.array(part.location)[:2]

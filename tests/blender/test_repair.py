@@ -1,7 +1,5 @@
 """A bed, its housing and its fingertip are one: appended, deleted, duplicated and hidden together."""
 
-from typing import Any
-
 import bpy
 import numpy as np
 import pytest
@@ -36,14 +34,14 @@ from tests.blender.session.live import Clock, press, started
 pytestmark = pytest.mark.usefixtures("watched")
 
 
-def still(bed: Any) -> bake.BakedFrames:
+def still(bed):
     """Return a bake of two frames in which nothing moves."""
     cells = bridge.read_cells(bed.data)
     twice = {name: np.array([cells[name]] * 2) for name in ("height", "mode", "force")}
     return bake.BakedFrames(cells["position"], **twice, pose=np.array([bridge.pose(fingertip_of(bed))] * 2))
 
 
-def reset_to_empty() -> None:
+def reset_to_empty():
     bpy.ops.wm.read_homefile(use_empty=True)
     looked()
     done("Empty")
@@ -252,13 +250,13 @@ def test_a_bed_is_hidden_and_shown_with_its_fingertip(name):
     bed = added()
     tip = fingertip_of(bed)
 
-    def hide(thing: Any, on: bool) -> list[bool]:
+    def hide(thing, on):
         """Hide or show by the eye or a switch; return what is hidden of bed, fingertip and ball."""
         thing.hide_set(on) if name == "eye" else setattr(thing, name, on)
         done("Hide")
         return hidden()
 
-    def hidden() -> list[bool]:
+    def hidden():
         tip = fingertip_of(beds()[0])
         parts = beds()[0], tip, tip[BALL]
         return [thing.hide_get() if name == "eye" else getattr(thing, name) for thing in parts]

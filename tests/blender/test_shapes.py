@@ -1,8 +1,5 @@
 """Shapes onto beds in Blender: from objects, files and samples, and what is said when it cannot be."""
 
-from pathlib import Path
-from typing import Any
-
 import bpy
 import numpy as np
 import pytest
@@ -27,15 +24,15 @@ pytestmark = pytest.mark.usefixtures("extension")
 SHOWN = 10e-6 + 1e-8
 
 
-def bed() -> Any:
+def bed():
     return new_bed(rows=13, columns=13)
 
 
-def heights(thing: Any) -> np.ndarray:
+def heights(thing):
     return bridge.read_cells(thing.data)["height"]
 
 
-def object_beside(name: str, vertices: list[Any], faces: list[Any]) -> Any:
+def object_beside(name, vertices, faces):
     mesh = bpy.data.meshes.new(name)
     mesh.from_pydata(vertices, [], faces)
     made = bpy.data.objects.new(name, mesh)
@@ -44,7 +41,7 @@ def object_beside(name: str, vertices: list[Any], faces: list[Any]) -> Any:
     return made
 
 
-def cube(size: float, height: float, at: tuple[float, float, float] = (0, 0, 0)) -> Any:
+def cube(size, height, at=(0, 0, 0)):
     x, z = size / 2, height
     low = [(-x, -x, 0), (x, -x, 0), (x, x, 0), (-x, x, 0)]
     high = [(a, b, z) for a, b, _ in low]
@@ -150,7 +147,7 @@ def test_what_is_formed_becomes_the_shape_and_goes_again_and_its_mesh_is_the_sam
     assert np.abs(heights(other) - shown).max() <= 2 * SHOWN
 
 
-def refused(words: str, operator: Any = None, **options: Any) -> None:
+def refused(words, operator=None, **options):
     """Call an operator, and find the bed as it was."""
     with pytest.raises(RuntimeError, match=words):
         (operator or bpy.ops.digiclay.shape_from_object)(**options)
@@ -190,7 +187,7 @@ def test_a_file_that_is_none_is_refused(tmp_path, name):
     refused(name, bpy.ops.digiclay.shape_from_file, filepath=str(tmp_path / name))
 
 
-def image(path: Path, values: np.ndarray, kind: str, depth: str) -> None:
+def image(path, values, kind, depth):
     rows, columns = values.shape
     made = bpy.data.images.new("x", columns, rows, float_buffer=depth != "8")
     made.colorspace_settings.is_data = True

@@ -2,7 +2,6 @@
 
 import math
 from pathlib import Path
-from typing import Any
 
 import bpy
 import numpy as np
@@ -38,14 +37,14 @@ def bed():
     return bed
 
 
-def shape(bed: Any, seed: int) -> None:
+def shape(bed, seed):
     cells = bridge.read_cells(bed.data)
     count = len(cells["height"])
     height = 0.04 + 0.004 * np.random.default_rng(seed).standard_normal(count)
     bridge.write_cells(bed.data, cells["position"], height)
 
 
-def drawn(bed: Any) -> tuple[np.ndarray, int]:
+def drawn(bed):
     """Return the points of the skin that is drawn, m, and how many pins are drawn."""
     points, pins = np.empty((0, 3)), 0
     for item in instances(bed):
@@ -57,7 +56,7 @@ def drawn(bed: Any) -> tuple[np.ndarray, int]:
     return points, pins
 
 
-def drawn_tints(bed: Any) -> tuple[list[str], np.ndarray]:
+def drawn_tints(bed):
     """Return the role of the material of every face of the skin that is drawn, and its middle in plan, m."""
     named = (item.object.data for item in instances(bed))
     mesh = next(one for one in named if any(each and each.get(ROLE) == "skin" for each in one.materials))
@@ -65,7 +64,7 @@ def drawn_tints(bed: Any) -> tuple[list[str], np.ndarray]:
     return [mesh.materials[face.material_index][ROLE] for face in mesh.polygons], middles
 
 
-def baked_heights(bed: Any) -> np.ndarray:
+def baked_heights(bed):
     """Return the heights at which a bake's pins are drawn, m."""
     shown, bed.digiclay_display.form = bed.digiclay_display.form, "pins"
     tops = np.array([item.matrix_world.translation.z for item in instances(bed)])
@@ -73,7 +72,7 @@ def baked_heights(bed: Any) -> np.ndarray:
     return (tops - bed.matrix_world.translation.z) / bridge.SCALE
 
 
-def expected(bed: Any, kind: str, height: np.ndarray | None = None) -> np.ndarray:
+def expected(bed, kind, height=None):
     """Return the points of a bed's skin but those of its lower edge, m, as numpy works them out."""
     scene = properties.scene_of(bed)
     instant = Instant.at_rest(scene.layout, scene.actuator)
@@ -83,7 +82,7 @@ def expected(bed: Any, kind: str, height: np.ndarray | None = None) -> np.ndarra
     return points[~lattice.sunk]
 
 
-def assert_skin(bed: Any, wanted: np.ndarray) -> None:
+def assert_skin(bed, wanted):
     points, _ = drawn(bed)
     np.testing.assert_allclose(points[: len(wanted)], wanted, rtol=0, atol=FLOAT32)
 

@@ -1,7 +1,6 @@
 """Takes: what the buttons of their panel do, what a bake shows, and what undoing them leaves."""
 
 import functools
-from typing import Any
 
 import bpy
 import numpy as np
@@ -12,7 +11,6 @@ from digiclay.core.engine.simulation import begin
 from digiclay.core.model.fingertip import LEVEL, Fingertip
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.scene_source import load
-from digiclay.core.scene.schema import Scene
 from digiclay.core.scene.toml_table import resolve
 from digiclay.core.session import snapshot
 from digiclay.core.session.live_session import simulate_path
@@ -40,7 +38,7 @@ def clay(extension):
     return made
 
 
-def press(clay: Any, ticks: int = 12, *, deep: float = 8e-3) -> None:
+def press(clay, ticks=12, *, deep=0.008):
     """Let a session live while the finger goes down from 2 mm above the pins."""
     tip = fingertip_of(clay)
     top = bridge.read_cells(clay.data)["height"].max() * bridge.SCALE
@@ -51,16 +49,16 @@ def press(clay: Any, ticks: int = 12, *, deep: float = 8e-3) -> None:
         tick.tick(bpy.context, 100.0 + TICK * count)
 
 
-def find_heights(clay: Any) -> NDArray[np.float64]:
+def find_heights(clay):
     return bridge.read_cells(clay.data)["height"]
 
 
-def begin_recording(clay: Any) -> None:
+def begin_recording(clay):
     tick.start(bpy.context, clay)
     bpy.ops.digiclay.take_record()
 
 
-def record(clay: Any) -> str:
+def record(clay):
     """Record a press and keep it; return the take's number. The session is stopped."""
     begin_recording(clay)
     press(clay)
@@ -201,12 +199,12 @@ Floats = NDArray[np.float64]
 COUNT = 100  # control periods of 5 ms: half a second
 
 
-def scene() -> Scene:
+def scene():
     return resolve({"layout": {"rows": 12, "columns": 12}})
 
 
 @functools.cache
-def taken(count: int = COUNT) -> tuple[Take, Floats]:
+def taken(count=COUNT):
     """Press 5 mm deep; return the take, and all heights (t + 1, n)."""
     made = scene()
     system = assemble(made)
@@ -219,7 +217,7 @@ def taken(count: int = COUNT) -> tuple[Take, Floats]:
     return Take(made, first, poses[:, None], snapshot.dump(system, state)), np.array(heights)
 
 
-def build() -> Any:
+def build():
     made = scene()
     rest = Instant.at_rest(made.layout, made.actuator, made.section("fingertip"))
     return view.build(rest, bpy.context.collection)
@@ -232,7 +230,7 @@ def bed():
     return made
 
 
-def shown(bed: Any, frame: float) -> Floats:
+def shown(bed, frame):
     """Return the heights drawn at a frame, m."""
     bpy.context.scene.frame_set(int(frame), subframe=frame % 1.0)
     modifier = next(one for one in bed.modifiers if one.name == "Pins")
@@ -244,7 +242,7 @@ def shown(bed: Any, frame: float) -> Floats:
     return places.reshape(-1, 3)[:, 2].astype(float) / bridge.SCALE
 
 
-def baked(bed: Any, take: Take, first: int = 1) -> bake.BakedFrames:
+def baked(bed, take, first=1):
     *_, moments = bake.simulate_frames(take, 40.0)
     assert isinstance(moments, bake.BakedFrames)
     bake.apply(bed, moments, first, [Fingertip()], [1])
@@ -309,7 +307,7 @@ def test_a_bake_replaces_the_former_and_freed_leaves_nothing(bed):
     assert [curve for group in bake.curves(bed) for curve in group] == []
 
 
-def same_action(bed: Any) -> Any:
+def same_action(bed):
     """Return a second bed that was baked into the action of the first."""
     other = build()
     other.animation_data_create().action = bed.animation_data.action

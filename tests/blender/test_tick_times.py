@@ -37,7 +37,7 @@ def test_the_finger_presses_while_ticks_are_timed(monkeypatch):
     lowest, periods = [], []
     advance = sculpting.advance
 
-    def watched(*arguments: object) -> running.Running:
+    def watched(*arguments):
         session = advance(*arguments)  # type: ignore[arg-type]
         lowest.append(float(session.state.row(0).min()))
         periods.append(session.state.period)

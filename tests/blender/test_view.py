@@ -1,7 +1,6 @@
 """The bed Blender evaluates is the one handed in; what is shown of it, and the view it is added to."""
 
 from dataclasses import replace
-from typing import Any
 
 import bpy
 import numpy as np
@@ -35,7 +34,7 @@ from tests.blender.at_hand import instances, new_bed, open_bed
 FLOAT32 = 0.1 * 2.0**-23
 
 
-def drawn_pins(bed: Any) -> tuple[np.ndarray, list[str]]:
+def drawn_pins(bed):
     """Return what Blender draws for a bed: pin tops (n, 3), m, and each one's material."""
     tops, materials = [], []
     for item in instances(bed):
@@ -144,7 +143,7 @@ def test_a_bed_not_scaled_uniformly_is_refused(bed, scale, said):
         bridge.uniform(bed)
 
 
-def level_of(force: np.ndarray, top: float = heat.TOP) -> np.ndarray:
+def level_of(force, top=heat.TOP):
     """Return the level of each force: 0 without force, 1 to 12 for the colors."""
     return np.clip(np.ceil(force / top * len(heat.COLORS)), 0, len(heat.COLORS)).astype(int)
 
@@ -163,7 +162,7 @@ def test_every_pin_wears_the_color_of_its_level_of_force(bed, formed):
         view.color_by(bed, "force")
 
 
-def arrows(bed: Any) -> np.ndarray:
+def arrows(bed):
     """Return tip (3) and length of every arrow drawn, m."""
     found = [
         [*item.matrix_world.translation, item.matrix_world.to_scale().z]
@@ -242,7 +241,7 @@ def session(clay):
     views.follow()
 
 
-def forces(clay: Any) -> np.ndarray:
+def forces(clay):
     return bridge.read_cells(clay.data)["force"]
 
 
@@ -278,7 +277,7 @@ def test_heat_map_or_arrows_turned_on_show_the_forces_of_now_or_those_the_sessio
 
 
 def test_the_overlay_and_its_timer_are_there_only_while_wanted_and_go_with_the_extension(clay, session):
-    def is_there() -> bool:
+    def is_there():
         assert bpy.app.timers.is_registered(views._again) is views.shown()
         return views.shown()
 
@@ -344,7 +343,7 @@ def test_pins_that_cannot_be_picked_are_refused(clay, pins, said):
 LENS = np.array([1.4, 2.1])
 
 
-def project(points: np.ndarray, eye: np.ndarray, parallel: bool) -> np.ndarray:
+def project(points, eye, parallel):
     """Return where an eye sees points (k, 3), (k, 2), -1 to 1."""
     return LENS * (points[:, :2] - eye[:2]) / (eye[2] if parallel else eye[2] - points[:, 2:])
 

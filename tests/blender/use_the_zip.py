@@ -16,14 +16,14 @@ EXTENSION = "bl_ext.user_default.digiclay"
 ARCHIVE, FOLDER = Path(sys.argv[1]), Path(sys.argv[2])
 
 
-def part(name: str) -> object:
+def part(name):
     return importlib.import_module(f"{EXTENSION}.{name}")
 
 
-def main() -> None:
+def main():
     import addon_utils  # Blender's own, found once Blender is there
 
-    seen: dict[str, object] = {}
+    seen = {}
     install = bpy.ops.extensions.package_install_files
     seen["installed"] = sorted(
         install(repo="user_default", filepath=str(ARCHIVE), enable_on_install=True, overwrite=True)

@@ -22,7 +22,7 @@ from benchmarks.stiff import EASY
         ([0.0, 0.1], [0.0, np.inf], "not finite"),
     ],
 )
-def test_every_broken_invariant_is_seen(height: list[float], force: list[float], message: str) -> None:
+def test_every_broken_invariant_is_seen(height, force, message):
     assert stiff.allowed_range(np.array(height), np.array(force), 0.1) == message
 
 
@@ -34,7 +34,7 @@ def test_a_run_is_silent_when_it_is_wrong_and_its_estimate_does_not_show_it(erro
     assert stiff.Outcome(error * stiff.WRONG, estimate * stiff.WRONG).silent is silent
 
 
-def test_strict_makes_errors_of_warnings_and_the_reference_agrees_with_another_stepper() -> None:
+def test_strict_makes_errors_of_warnings_and_the_reference_agrees_with_another_stepper():
     with pytest.raises(UserWarning, match="careful"), stiff.strict():
         warnings.warn("careful", stacklevel=1)
     with pytest.raises(FloatingPointError), stiff.strict():
@@ -44,8 +44,8 @@ def test_strict_makes_errors_of_warnings_and_the_reference_agrees_with_another_s
     assert np.abs(other - stiff.reference(EASY)[0]).max() < 1e-8
 
 
-def test_a_divergence_is_shown_by_quantity_value_and_time(monkeypatch: pytest.MonkeyPatch) -> None:
-    def diverged(*_: object) -> None:
+def test_a_divergence_is_shown_by_quantity_value_and_time(monkeypatch):
+    def diverged(*_):
         raise DivergenceError(0.25, 3, "height", math.nan, "Use a shorter step.")
 
     monkeypatch.setattr(stiff, "replayed", diverged)

@@ -10,9 +10,7 @@ import pytest
 from digiclay.cli import main
 from digiclay.core.base.errors import ParameterError
 from digiclay.core.scene.assembly import assemble
-from digiclay.core.scene.schema import Scene
-from digiclay.core.studies.omissions import Fitted, find_omissions, propose_omissions
-from numpy.typing import NDArray
+from digiclay.core.studies.omissions import find_omissions, propose_omissions
 
 from tests.assemble import record, sample
 
@@ -34,30 +32,30 @@ CUT = 0.7
 BUDGET = 20e-6
 
 
-def cut(name: str) -> Scene:
+def cut(name):
     scene = sample(name)
     lasts = min(CUT, scene.simulation.duration)
     return replace(scene, simulation=replace(scene.simulation, duration=lasts))
 
 
-def heights(scene: Scene) -> NDArray[np.float64]:
+def heights(scene):
     return record(assemble(scene), scene.section("trajectory").trajectory(), scene.periods).height
 
 
 @cache
-def found(name: str, budget: float) -> Fitted:
+def found(name, budget):
     return find_omissions(cut(name), budget)
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_no_height_is_further_from_the_full_model_than_the_budget(name: str) -> None:
+def test_no_height_is_further_from_the_full_model_than_the_budget(name):
     one = found(name, BUDGET)
     off = np.abs(heights(one.scene) - heights(cut(name))).max()
     assert off == one.departure  # the very same runs
     assert off + one.own_error <= BUDGET
 
 
-def test_the_error_told_is_the_one_against_a_tenfold_finer_integration_within_its_estimate() -> None:
+def test_the_error_told_is_the_one_against_a_tenfold_finer_integration_within_its_estimate():
     # A press that no switch cuts short: here a finer step changes no mode, so the two can be compared.
     one = found("elastic_press", 50e-6)
     full = cut("elastic_press")
@@ -66,7 +64,7 @@ def test_the_error_told_is_the_one_against_a_tenfold_finer_integration_within_it
     assert off <= one.departure + 2.0 * one.own_error + 1e-6  # the full scene's own error at 1 ms
 
 
-def test_a_larger_budget_leaves_less_to_do_and_what_is_left_out_is_left_out_of_the_scene() -> None:
+def test_a_larger_budget_leaves_less_to_do_and_what_is_left_out_is_left_out_of_the_scene():
     assert found("tap", BUDGET).work <= found("tap", 5e-6).work < 1.0
     one = find_omissions(cut("tap"), 500e-6)
     full = {omission.text: omission.leave_out for omission in propose_omissions(cut("tap"), 500e-6)}
@@ -77,7 +75,7 @@ def test_a_larger_budget_leaves_less_to_do_and_what_is_left_out_is_left_out_of_t
     assert one.scene == rebuilt
 
 
-def test_a_trial_beyond_the_budget_is_broken_off_and_one_below_the_own_error_refused() -> None:
+def test_a_trial_beyond_the_budget_is_broken_off_and_one_below_the_own_error_refused():
     relaxation = next(tried for tried in found("tap", 5e-6).tried if "relax" in tried.text)
     assert (relaxation.departure, relaxation.kept) == (math.inf, False)
     with pytest.raises(ParameterError, match=r"own integration.*richardson"):
@@ -85,7 +83,7 @@ def test_a_trial_beyond_the_budget_is_broken_off_and_one_below_the_own_error_ref
 
 
 @pytest.mark.parametrize("budget", [0.0, -1e-6, math.nan, math.inf])
-def test_a_budget_that_is_no_length_is_refused(budget: float) -> None:
+def test_a_budget_that_is_no_length_is_refused(budget):
     with pytest.raises(ParameterError, match=r"run.budget must be above 0 m"):
         find_omissions(cut("tap"), budget)
 

@@ -1,10 +1,8 @@
 """The errors a run reports are honest, and the adaptive stepper keeps within its tolerance."""
 
-from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from functools import cache
 from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -12,7 +10,7 @@ from digiclay.core.base.errors import DivergenceError
 from digiclay.core.model.valve import Fluid, Valve
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.scene_source import SAMPLES
-from digiclay.core.scene.schema import STEPPERS, Scene, Simulation
+from digiclay.core.scene.schema import STEPPERS, Simulation
 from digiclay.core.scene.toml_table import resolve
 from digiclay.core.session.accuracy import (
     FINER,
@@ -50,7 +48,7 @@ CASES = [
 
 
 @cache
-def judged(name: str, stepper: str, step: float) -> tuple[Errors, Errors]:
+def judged(name, stepper, step):
     """Return the estimated errors of a run, and the true ones.
 
     The true ones are those against Richardson's form at a tenth of the step, a quarter of those of 1 ms. That
@@ -67,8 +65,8 @@ def judged(name: str, stepper: str, step: float) -> tuple[Errors, Errors]:
 
 @pytest.mark.parametrize(("name", "stepper", "step"), CASES)
 def test_the_true_error_is_at_most_twice_the_estimate_and_that_no_more_than_twenty_times_it(
-    name: str, stepper: str, step: float
-) -> None:
+    name, stepper, step
+):
     for kind, nothing in NOTHING.items():
         estimate, true = (getattr(errors, kind) for errors in judged(name, stepper, step))
         assert true <= 2.0 * estimate + nothing, kind
@@ -94,7 +92,7 @@ def test_a_reference_has_shorter_steps(stepper, period, step, by, finer):
     assert (judge.stepper, judge.physics_step) == (by, pytest.approx(finer))
 
 
-def test_no_estimate_is_made_of_a_thinned_run_or_once_it_is_stopped_and_a_summary_tells_it() -> None:
+def test_no_estimate_is_made_of_a_thinned_run_or_once_it_is_stopped_and_a_summary_tells_it():
     scene = beginning("tap", LASTS, "bernoulli", 1e-3)
     assert explain_absence(replace(scene, recorder=replace(scene.recorder, every=2)))
     result = run(scene)
@@ -109,7 +107,7 @@ MANY, DRAWN = 100, 0.1
 TURBULENT = {"valve": {"orifice_diameter": 0.8e-3}, "fluid": {"density": 760.0, "viscosity": 0.65e-6}}
 
 
-def draw_path(random: np.random.Generator) -> dict[str, Any]:
+def draw_path(random):
     """Return a random press, and drags after it, of a turned fingertip."""
     x, y = random.uniform(-8e-3, 8e-3, 2)
     down, time = random.uniform(0.034, 0.038), random.uniform(0.04, 0.07)
@@ -132,7 +130,7 @@ def draw_path(random: np.random.Generator) -> dict[str, Any]:
     }
 
 
-def draw_scene(random: np.random.Generator, stepper: str) -> Scene:
+def draw_scene(random, stepper):
     """Return a random scene of one to three fingers, with any method that forms."""
     fingers = [{"trajectory": draw_path(random)} for _ in range(random.choice([1, 1, 1, 1, 2, 3]))]
     step = float(random.choice([5e-3, 5e-3, 2.5e-3]))
@@ -155,7 +153,7 @@ FORMING = ("virtual_master", "cell_states", "hybrid", "elastic", "plastic", "vis
 
 
 @pytest.mark.parametrize("stepper", STEPPERS)
-def test_an_estimate_covers_the_truth_in_95_of_100_scenes(stepper: str) -> None:
+def test_an_estimate_covers_the_truth_in_95_of_100_scenes(stepper):
     random, missed, refused = np.random.default_rng(38), [], 0
     for number in range(MANY):
         scene = draw_scene(random, stepper)
@@ -176,9 +174,7 @@ def test_an_estimate_covers_the_truth_in_95_of_100_scenes(stepper: str) -> None:
     assert refused <= (0.1 * MANY if stepper in EXPLICIT else 0)
 
 
-def list_uncovered(
-    number: int, found: Errors, truth: Iterable[float], nothing: Mapping[str, float]
-) -> list[tuple[int, str, float, float]]:
+def list_uncovered(number, found, truth, nothing):
     """Return the errors of a scene, with its number, that are above their estimates."""
     return [
         (number, kind, estimate, error)
@@ -187,7 +183,7 @@ def list_uncovered(
     ]
 
 
-def draw_level_scene(random: np.random.Generator, stepper: str) -> Scene:
+def draw_level_scene(random, stepper):
     """Return a random scene of a level finger on a smooth path, which `test_independent` integrates."""
     path = draw_path(random)
     waypoints = [{name: way[name] for name in ("time", "position")} for way in path["waypoints"]]
@@ -209,7 +205,7 @@ FEW = 2
 
 
 @pytest.mark.parametrize("stepper", ["bernoulli", "richardson", *EXPLICIT])
-def test_an_estimate_covers_the_errors_that_scipy_finds(stepper: str) -> None:
+def test_an_estimate_covers_the_errors_that_scipy_finds(stepper):
     random, missed = np.random.default_rng(39), []
     for number in range(FEW):
         scene = draw_level_scene(random, stepper)
@@ -241,27 +237,26 @@ WAYS = {
 
 
 @pytest.mark.parametrize("name", WAYS)
-def test_an_estimate_that_cannot_see_a_contact_within_a_step_says_so(name: str) -> None:
+def test_an_estimate_that_cannot_see_a_contact_within_a_step_says_so(name):
     points, unseen = WAYS[name]
     path = [{"time": time, "position": [0.7e-3, 0.4e-3, 1e-3 * z]} for time, z in points]
     times = {"control_period": 20e-3, "physics_step": 20e-3, "duration": 0.4}
     bed = {"layout": {"rows": 13, "columns": 13}, "simulation": times, "recorder": {}}
     result = run(resolve({**bed, "trajectory": {"interpolation": "linear", "waypoints": path}}))
     known = result.estimate_errors()
-    assert known is not None
     assert ("shorter simulation.physics_step" in known.summary()) == unseen
 
 
 @pytest.mark.parametrize("tolerance", [1e-5, 1e-6, 1e-7])
 @pytest.mark.parametrize("name", [*SCENES, "slow_press"])
-def test_the_adaptive_stepper_keeps_the_heights_within_its_tolerance(name: str, tolerance: float) -> None:
+def test_the_adaptive_stepper_keeps_the_heights_within_its_tolerance(name, tolerance):
     scene = beginning(name, LASTS, "adaptive", 5e-3, f"simulation.tolerance={tolerance}")
     # The reference is Richardson's extrapolation at half of 1 ms. Another half changes the errors by 2e-11 m.
     exact = replace(scene, simulation=replace(scene.simulation, stepper="richardson", physics_step=1e-3))
     assert estimate_errors(exact, run(scene).history).height <= tolerance
 
 
-def test_a_free_pin_keeps_within_the_tolerance_over_many_commands() -> None:
+def test_a_free_pin_keeps_within_the_tolerance_over_many_commands():
     # The errors of a pin that nothing presses add up: 60 reversals of a valve that is turbulent in between.
     script = scripted(lambda t, x, y: (1.0, -0.6, 0.8, -1.0, 0.3, -0.2)[round(t / 20e-3) % 6])
     parts = {"valve": Valve(orifice_diameter=0.8e-3), "fluid": Fluid(760.0, 0.65e-6)}

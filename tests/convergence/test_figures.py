@@ -2,8 +2,6 @@
 
 import re
 from fnmatch import fnmatch
-from pathlib import Path
-from typing import Any
 
 import pytest
 from digiclay.core.base.errors import OutputError
@@ -19,19 +17,19 @@ STABILITY = (figures.ROOT / "docs/stability.md").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize("figure", RUNS, ids=lambda figure: f"{figure['page']} {figure['of']}")
-def test_a_figure_of_a_page_is_what_the_command_gives(figure: Any) -> None:
+def test_a_figure_of_a_page_is_what_the_command_gives(figure):
     judged = figures.judge(figure)
     assert judged["stale"] == "", judged
 
 
 @pytest.mark.parametrize(("page", "stored"), STORED)
-def test_a_figure_of_a_page_is_that_of_its_stored_result(page: str, stored: str) -> None:
+def test_a_figure_of_a_page_is_that_of_its_stored_result(page, stored):
     judged = [figures.judge(one) for one in FIGURES if (one["page"], one["stored"]) == (page, stored)]
     assert [one for one in judged if one["stale"]] == []
     assert len(judged) > 7
 
 
-def test_each_page_with_a_table_of_figures_has_rows_or_says_why_not() -> None:
+def test_each_page_with_a_table_of_figures_has_rows_or_says_why_not():
     told = {row["page"] for row in figures.read_plan()["figure"]}, set(figures.read_plan()["without"])
     assert told[0] & told[1] == set()
     pages = [figures.ROOT / "README.md", *sorted((figures.ROOT / "docs").glob("*.md"))]
@@ -44,7 +42,7 @@ def test_each_page_with_a_table_of_figures_has_rows_or_says_why_not() -> None:
     assert measured - (told[0] | told[1]) == set()
 
 
-def test_each_stored_result_has_a_row_with_its_command_date_and_commit() -> None:
+def test_each_stored_result_has_a_row_with_its_command_date_and_commit():
     page = (figures.ROOT / "benchmarks/README.md").read_text(encoding="utf-8")
     rows = re.findall(r"^\|.*\| 20\d\d-\d\d-\d\d \| [0-9a-f]{7} \|$", page, re.MULTILINE)
     patterns = re.findall(r"`([\w.*]+)`", "".join(rows))
@@ -67,8 +65,8 @@ def test_each_stored_result_has_a_row_with_its_command_date_and_commit() -> None
     ],
 )
 def test_a_stale_page_is_told_and_one_that_has_lost_its_figure_refused(
-    name: str, page: str, code: int, said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Any
-) -> None:
+    name, page, code, said, tmp_path, monkeypatch, capsys
+):
     monkeypatch.setattr(figures, "ROOT", tmp_path)
     (tmp_path / "docs").mkdir()
     (tmp_path / name).write_text(page, encoding="utf-8")
@@ -77,7 +75,7 @@ def test_a_stale_page_is_told_and_one_that_has_lost_its_figure_refused(
     assert said in told.out + told.err
 
 
-def test_a_figure_of_no_row_of_its_stored_result_or_of_several_is_refused() -> None:
+def test_a_figure_of_no_row_of_its_stored_result_or_of_several_is_refused():
     one = next(figure for figure in FIGURES if figure["stored"] == "stiff.csv")
     for where in ({"case": "none"}, {"stepper": "bernoulli"}):
         with pytest.raises(OutputError, match=r"stiff\.csv must have one row"):

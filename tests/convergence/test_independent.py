@@ -11,14 +11,11 @@ import math
 from types import SimpleNamespace as Numbers
 
 import numpy as np
-from digiclay.core.base.arrays import Floats
-from digiclay.core.engine.system import System
-from digiclay.core.model.trajectory import Trajectory
 from digiclay.core.scene.assembly import assemble
 from scipy.integrate import DOP853
 from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
 
-from tests.assemble import Record, record, sample
+from tests.assemble import record, sample
 
 #: A valve open less than this lets through 1e-14 of its full flow: 1 nm in the whole session.
 SHUT = 1e-7
@@ -26,7 +23,7 @@ SHUT = 1e-7
 MARGIN = 1e-3
 
 
-def numbers() -> Numbers:
+def numbers():
     density, viscosity, orifice, stroke = 855.0, 1.6e-6, 0.5e-3, 30e-6
     laminar = math.pi**2 * orifice**4 / (8.0 * 200.0**2 / 0.18**2 * viscosity * stroke * density)
     turbulent = 0.18 * math.pi * orifice**2 / 4.0 * math.sqrt(2.0 / density)
@@ -40,7 +37,7 @@ def numbers() -> Numbers:
     )  # fmt: skip
 
 
-def flow(p: Numbers, opening: Floats, drop: Floats) -> Floats:
+def flow(p, opening, drop):
     """Return the flow through valve and conduit: laminar, unless that has Re* above 200."""
     squared = opening * opening
     q = p.laminar * squared * drop / (1.0 + p.resistance * p.laminar * squared)
@@ -53,25 +50,25 @@ def flow(p: Numbers, opening: Floats, drop: Floats) -> Floats:
     return q
 
 
-def spline(trajectory: Trajectory) -> CubicHermiteSpline:
+def spline(trajectory):
     """Return the smooth path of the lowest point: monotone cubics that start and end at rest."""
     slopes = PchipInterpolator(trajectory.times, trajectory.positions).derivative()(trajectory.times)
     slopes[[0, -1]] = 0.0
     return CubicHermiteSpline(trajectory.times, trajectory.positions, slopes)
 
 
-def underside(p: Numbers, position: Floats, x: Floats, y: Floats) -> Floats:
+def underside(p, position, x, y):
     """Return the height of a level finger's underside, continued with its slope beyond r² = 0.96."""
     square = ((x - position[0]) / p.axes[0]) ** 2 + ((y - position[1]) / p.axes[1]) ** 2
     root = np.sqrt(1.0 - np.minimum(square, 0.96)) - np.maximum(square - 0.96, 0.0) / (2.0 * math.sqrt(0.04))
     return position[2] + p.axes[2] * (1.0 - root)
 
 
-def tension(p: Numbers, depth: Floats) -> Floats:
+def tension(p, depth):
     return p.b / p.m * (np.exp(p.m * np.maximum(depth, 0.0)) - 1.0)
 
 
-def integrate(p: Numbers, curve: CubicHermiteSpline, system: System, run: Record) -> tuple[Floats, Floats]:
+def integrate(p, curve, system, run):
     """Return heights and forces, shape (t, n), of the recorded commands."""
     x, y, n = system.grid.x, system.grid.y, system.grid.count
     full = np.zeros((5, n))
@@ -89,16 +86,7 @@ def integrate(p: Numbers, curve: CubicHermiteSpline, system: System, run: Record
     return heights, forces
 
 
-def advance(
-    p: Numbers,
-    curve: CubicHermiteSpline,
-    x: Floats,
-    y: Floats,
-    full: Floats,
-    command: Floats,
-    start: float,
-    end: float,
-) -> None:
+def advance(p, curve, x, y, full, command, start, end):
     """Integrate the cells that something happens to from `start` to `end`, in place; all others relax."""
     lowest = np.minimum(underside(p, curve(start), x, y), underside(p, curve(end), x, y))
     near = full[0] + MARGIN > lowest
@@ -112,7 +100,7 @@ def advance(
     k, own = int(near.sum()), command[cells]
     near_x, near_y = x[cells[:k]], y[cells[:k]]
 
-    def rhs(t: float, flat: Floats) -> Floats:
+    def rhs(t, flat):
         height, opening, filters = unpack(flat, cells.size, k)
         change = np.empty_like(flat)
         d_height, d_opening, d_filters = unpack(change, cells.size, k)
@@ -137,11 +125,11 @@ def advance(
     full[0, cells], full[1, cells], full[2:, cells[:k]] = height, opening, filters
 
 
-def unpack(flat: Floats, count: int, near: int) -> tuple[Floats, Floats, Floats]:
+def unpack(flat, count, near):
     return flat[:count], flat[count : 2 * count], flat[2 * count :].reshape(3, near)
 
 
-def test_heights_and_forces_agree_with_scipy_over_the_whole_session() -> None:
+def test_heights_and_forces_agree_with_scipy_over_the_whole_session():
     scene = sample("ridge_mound_valley")
     system, trajectory = assemble(scene), scene.section("trajectory").trajectory()
     run = record(system, trajectory, round(trajectory.duration / system.period))

@@ -10,9 +10,7 @@ from itertools import product
 
 import numpy as np
 import pytest
-from digiclay.core.base.arrays import Floats
 from digiclay.core.engine.simulation import begin
-from digiclay.core.engine.system import System
 from digiclay.core.model.physics import compute_rates
 from digiclay.core.model.valve import Fluid, Valve
 from scipy.integrate import solve_ivp
@@ -52,7 +50,7 @@ KINKED = {
 PROBLEMS = {**SMOOTH, **FREE, **KINKED}
 
 
-def bed(stepper: str, steps: int, commands: list[float], parts: dict[str, object]) -> System:
+def bed(stepper, steps, commands, parts):
     """Return a single cell under scripted commands, from 40 mm."""
     return one_cell(
         stepper=stepper,
@@ -64,12 +62,12 @@ def bed(stepper: str, steps: int, commands: list[float], parts: dict[str, object
     )
 
 
-def away(finger: Motion | None) -> Motion:
+def away(finger):
     return finger or Motion(lambda t: np.full(t.shape, 1.0))
 
 
 @cache
-def reference(problem: str) -> Floats:
+def reference(problem):
     finger, commands, parts = PROBLEMS[problem]
     system, motion = bed("bernoulli", 1, commands, parts), away(finger)
     y, heights = begin(system).rows[: system.rows.physics, :1].copy(), [40e-3]
@@ -77,7 +75,7 @@ def reference(problem: str) -> Floats:
 
     for i, command in enumerate(commands):
 
-        def rhs(t: float, flat: Floats, command: float = command) -> Floats:
+        def rhs(t, flat, command=command):
             under = motion.poses(np.array([t]))[0, 2:3] if touched else np.empty(0)
             return compute_rates(system.cell, flat[:, None], under, np.array([command]))[:, 0]
 
@@ -90,7 +88,7 @@ def reference(problem: str) -> Floats:
     return np.array(heights)
 
 
-def errors(stepper: str, problem: str) -> Floats:
+def errors(stepper, problem):
     """Return the largest height error for each number of steps a period, m."""
     finger, commands, parts = PROBLEMS[problem]
     exact, motion = reference(problem), away(finger)
@@ -98,7 +96,7 @@ def errors(stepper: str, problem: str) -> Floats:
     return np.array([np.abs(run.height[:, 0] - exact).max() for run in runs])
 
 
-def order(found: Floats) -> float:
+def order(found):
     return float(-np.polyfit(np.arange(found.size), np.log2(found), 1)[0])
 
 
@@ -111,19 +109,19 @@ def order(found: Floats) -> float:
         ("runge_kutta_4", "a free pin"),
     ],
 )
-def test_where_all_is_smooth_the_measured_order_is_the_declared_one(stepper: str, problem: str) -> None:
+def test_where_all_is_smooth_the_measured_order_is_the_declared_one(stepper, problem):
     # 0.3: the steps are not yet in the limit, where the order is exact.
     assert order(errors(stepper, problem)) == pytest.approx(STEPPERS[stepper].order, abs=0.3)
 
 
-def test_the_closed_form_step_moves_a_free_pin_as_exactly_as_the_reference() -> None:
+def test_the_closed_form_step_moves_a_free_pin_as_exactly_as_the_reference():
     # It takes the exact opening at four Gauss points, order 8: what is left is the reference's error.
     assert errors("bernoulli", "a free pin").max() < 1e-11
 
 
 @pytest.mark.parametrize("problem", KINKED)
 @pytest.mark.parametrize("stepper", STEPPERS)
-def test_across_a_kink_the_order_stays_near_two_or_the_declared_one_below(stepper: str, problem: str) -> None:
+def test_across_a_kink_the_order_stays_near_two_or_the_declared_one_below(stepper, problem):
     # Where in a step the kink falls differs from run to run, and scatters the errors: 0.4. Below 2 nm
     # Richardson's are mixed with the reference's own across a valve's reversal.
     found = errors(stepper, problem)

@@ -27,25 +27,23 @@ ANSWERS = {
 }
 
 
-def find_adapter(method: str) -> run.Adapter:
+def find_adapter(method):
     if method.startswith("MuJoCo") and find_spec("mujoco") is None:
         pytest.skip("mujoco-core is not installed")
     return next(adapter for adapter in run.list_adapters() if method in adapter.methods)
 
 
 @pytest.mark.parametrize("method", list(ANSWERS))
-def test_an_adapter_answers_the_small_problems_within_its_tolerance(method: str) -> None:
+def test_an_adapter_answers_the_small_problems_within_its_tolerance(method):
     setting, height, force = ANSWERS[method]
     adapter = find_adapter(method)
     damped, relaxed = (run.solve(adapter, PROBLEMS[name], method, setting) for name in run.QUICK)
-    assert damped is not None
-    assert relaxed is not None
     assert 0.0 < damped.height_error < height
     assert 0.0 < relaxed.force_error < force
     assert damped.seconds > 0.0
 
 
-def test_every_method_has_a_row_and_every_adapter_at_most_60_lines_of_code() -> None:
+def test_every_method_has_a_row_and_every_adapter_at_most_60_lines_of_code():
     adapters = run.list_adapters()
     missing = {method for method in ANSWERS if method.startswith("MuJoCo") and find_spec("mujoco") is None}
     assert {method for adapter in adapters for method in adapter.methods} == ANSWERS.keys() - missing
@@ -56,7 +54,7 @@ def test_every_method_has_a_row_and_every_adapter_at_most_60_lines_of_code() -> 
 
 
 @pytest.mark.parametrize("name", list(PROBLEMS))
-def test_a_finer_step_of_another_method_comes_to_the_reference(name: str) -> None:
+def test_a_finer_step_of_another_method_comes_to_the_reference(name):
     problem = PROBLEMS[name]
     exact = problem.file["reference"]
     assert exact["apart"]["height"] < 1e-12
@@ -69,13 +67,12 @@ def test_a_finer_step_of_another_method_comes_to_the_reference(name: str) -> Non
     for method in ("digiclay richardson", "Runge-Kutta 4, numpy"):
         step = 0.25e-3 if name == "stiff" else 1e-3
         answer = run.solve(find_adapter(method), problem, method, step)
-        assert answer is not None
         height, force = {"stiff": (0.3e-6, 0.2e-3), "turbulent_valve": (6e-6, 0.6e-3)}.get(name, (5e-8, 1e-5))
         assert answer.height_error < height, method
         assert answer.force_error < force, method
 
 
-def test_references_that_are_made_again_are_those_of_the_file() -> None:
+def test_references_that_are_made_again_are_those_of_the_file():
     # The files' are of another implementation of the law, good to 1 pm and 0.1 nN as the README says.
     problem, some = PROBLEMS["turbulent_valve"], slice(0, 1)
     again = reference.solve_pins(problem, problem.pins[some], *reference.METHODS[0])
@@ -91,11 +88,10 @@ def test_references_that_are_made_again_are_those_of_the_file() -> None:
 def test_turbulent_flow_under_a_load_is_on_its_chord_and_not_taken_for_a_free_one(method, setting, height):
     # With the conductance of mid step alone: 28 and 3.5 µm; two levels alone agree by accident, 0.6 µm off.
     answer = run.solve(find_adapter(method), PROBLEMS["turbulent_valve"], method, setting)
-    assert answer is not None
     assert answer.height_error < height
 
 
-def test_pins_that_cannot_move_carry_the_convolution_of_their_press() -> None:
+def test_pins_that_cannot_move_carry_the_convolution_of_their_press():
     # The first press of relaxation_alone, over the middle pin: depth a t - d; F = ∫ G(t - s) dT(s).
     problem = PROBLEMS["relaxation_alone"]
     law, (start, end), middle = Law(problem), problem.file["path"][:2], 24
@@ -148,7 +144,7 @@ def test_a_strangers_adapter_is_a_file_on_the_command_line(tmp_path, monkeypatch
     assert ',mine,"Runge-Kutta 4, numpy",' in (tmp_path / "results" / "peers.csv").read_text(encoding="utf-8")
 
 
-def test_the_fastest_is_compared_with_digiclay() -> None:
+def test_the_fastest_is_compared_with_digiclay():
     fast, own = (
         run.Answer("p", engine, engine, "0.001", 1e-8, 1e-6, seconds)
         for engine, seconds in (("fast", 1.0), ("own", 2.0))
@@ -160,15 +156,14 @@ def test_the_fastest_is_compared_with_digiclay() -> None:
     ]
 
 
-def test_an_engine_that_diverges_has_infinite_errors_and_is_never_the_fastest() -> None:
+def test_an_engine_that_diverges_has_infinite_errors_and_is_never_the_fastest():
     problem = PROBLEMS["stiff"]
     answer = run.solve(find_adapter("digiclay"), problem, "digiclay runge_kutta_4", 5e-3)
-    assert answer is not None
     assert (answer.height_error, answer.force_error) == (np.inf, np.inf)
     assert answer.method not in "".join(run.list_answers([answer])).partition("The fastest method")[2]
 
 
-def test_a_method_stops_at_settings_that_take_too_long(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_method_stops_at_settings_that_take_too_long(monkeypatch):
     problem = PROBLEMS["relaxation_alone"]
     adapter = find_adapter("digiclay")
     assert len(list(run.run_method(adapter, problem, "digiclay", (5e-3, 2.5e-3)))) == 2

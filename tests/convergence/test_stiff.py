@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from digiclay.core.base.arrays import Floats
 from digiclay.core.base.errors import DivergenceError
 from digiclay.core.engine import simulation
 from digiclay.core.engine.simulation import periods
@@ -31,26 +30,26 @@ WELL = [name for name, case in CASES.items() if not case.why]
 SWINGS = ("one pin", "all at the lower end stop", "three fingers, bore 0.2 mm")
 
 
-def at_shared_ends(height: Floats, exact: Floats, period: float) -> float:
+def at_shared_ends(height, exact, period):
     """Return the largest height error where control periods of all lengths end: with the held commands; m."""
     own, every = round(HOLD / period), round(HOLD / stiff.PERIOD)
     return float(np.abs(height[own - 1 :: own] - exact[every - 1 :: every]).max())
 
 
-def reference(name: str) -> tuple[Floats, float]:
+def reference(name):
     """Return the heights of a case under its recorded commands, and how far they may be off, m."""
     with stiff.strict():
         return stiff.reference(name, stiff.ROUGH)
 
 
-def replayed(name: str, step: float) -> Floats:
+def replayed(name, step):
     with stiff.strict():
         return stiff.replayed(name, "bernoulli", step, stiff.period_of(step))
 
 
 @pytest.mark.parametrize("step", stiff.STEPS)
 @pytest.mark.parametrize("name", CASES)
-def test_the_default_stepper_does_not_blow_up(name: str, step: float) -> None:
+def test_the_default_stepper_does_not_blow_up(name, step):
     # No warning, all finite, heights within the stroke, no negative force: `stiff.replayed` asserts it.
     assert np.isfinite(replayed(name, step)).all()
     with stiff.strict():
@@ -59,7 +58,7 @@ def test_the_default_stepper_does_not_blow_up(name: str, step: float) -> None:
 
 
 @pytest.mark.parametrize("name", WELL)
-def test_the_error_falls_with_the_step_where_the_case_is_well_conditioned(name: str) -> None:
+def test_the_error_falls_with_the_step_where_the_case_is_well_conditioned(name):
     exact, off = reference(name)
     errors = [at_shared_ends(replayed(name, step), exact, stiff.period_of(step)) for step in stiff.STEPS]
     floor = max(off, 1e-12)
@@ -68,7 +67,7 @@ def test_the_error_falls_with_the_step_where_the_case_is_well_conditioned(name: 
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_no_explicit_stepper_is_wrong_without_telling_and_no_case_costs_eight_easy_ones(name: str) -> None:
+def test_no_explicit_stepper_is_wrong_without_telling_and_no_case_costs_eight_easy_ones(name):
     # It stops, or its estimate is at least half its error; up to 0.1 mm is no failure.
     exact, _ = reference(name)
     outcomes = {
@@ -81,7 +80,7 @@ def test_no_explicit_stepper_is_wrong_without_telling_and_no_case_costs_eight_ea
 
 
 @cache
-def calls(name: str) -> float:
+def calls(name):
     """Return the numpy calls a control period of a case takes, with one physics step as in a session."""
     return stiff.calls_of(name, step=stiff.PERIOD)
 
@@ -95,7 +94,7 @@ def test_an_explicit_stepper_that_blows_up_names_time_cell_value_and_remedy(step
         stiff.replayed(EASY, stepper, 20e-3, 20e-3)
 
 
-def test_the_cases_reach_what_they_are_for_and_a_pin_on_an_end_stop_is_as_exact_as_any() -> None:
+def test_the_cases_reach_what_they_are_for_and_a_pin_on_an_end_stop_is_as_exact_as_any():
     assert [name for name in CASES if not np.abs(stiff.commands_of(name)).max() > 0.0] == []
     # e^(m x) = 1e12 is a force of f_d b/m 1e12 = 4e10 N on a pin.
     deep = "press to e^(m x) = 1e12"
@@ -109,13 +108,13 @@ def test_the_cases_reach_what_they_are_for_and_a_pin_on_an_end_stop_is_as_exact_
 
 
 @pytest.mark.parametrize("state", ["no_control", "sensors", "shape_display"])
-def test_the_force_on_a_pin_behind_a_shut_valve_is_that_of_a_finer_step(state: str) -> None:
+def test_the_force_on_a_pin_behind_a_shut_valve_is_that_of_a_finer_step(state):
     # 1.2 to 1.7 mN of up to 30 N; 30 to 61 mN where such pins are taken for pins that a turbulent flow moves.
     coarse, fine = (forces_after(state, parts) for parts in (1, 16))
     assert np.abs(coarse - fine).max() < 3e-3
 
 
-def forces_after(state: str, parts: int) -> Floats:
+def forces_after(state, parts):
     """Return the forces (50, n) of the control periods behind a kept state, N."""
     path = SAMPLES / f"{state}.state"
     scene = load(path.with_suffix(".toml"))

@@ -2,7 +2,6 @@
 
 import shutil
 import subprocess
-from pathlib import Path
 
 import pytest
 from digiclay.cli import main
@@ -12,7 +11,7 @@ from tests.timeouts import TIMEOUT
 PROGRAMS = ("admesh", "assimp", "prusa-slicer")
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+def pytest_collection_modifyitems(items):
     """Skip what needs a missing program; `make test-proof` sees to it that none is."""
     lacking = [name for name in PROGRAMS if shutil.which(name) is None]
     if not lacking:
@@ -24,14 +23,14 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 
 @pytest.fixture(scope="session")
-def paper(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def paper(tmp_path_factory):
     folder = tmp_path_factory.mktemp("proof") / "paper"
     assert main(["run", "ridge_mound_valley", "--out", str(folder), "--quiet", "--no-errors"]) == 0
     return folder
 
 
 @pytest.fixture(scope="session")
-def meshes(paper: Path) -> Path:
+def meshes(paper):
     out = paper.parent
     every = ["--format", "stl,stl_ascii,obj,ply,glb,3mf", "--quiet"]
     for kind in ("solid", "surface", "pins", "features"):
@@ -43,7 +42,7 @@ def meshes(paper: Path) -> Path:
     return out
 
 
-def told(*command: str | Path) -> str:
+def told(*command):
     done = subprocess.run(
         [str(part) for part in command],
         stdout=subprocess.PIPE,

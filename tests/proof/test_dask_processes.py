@@ -5,9 +5,7 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
 from digiclay.cli import main
@@ -29,20 +27,19 @@ LIBRARIES = Path(pytest.__file__).parents[1]
 AXES = ["control.force_gain=1,2", "control.dead_band=1e-5,2e-5", "layout.rows=20:31:12"]
 SWEEP = ["sweep", "my.toml", *(word for axis in AXES for word in ("--vary", axis)), "--quiet"]
 SWEEP += ["--set", "simulation.duration=2"]
-Start = Callable[..., Any]
 
 
 @pytest.fixture(autouse=True)
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def here(tmp_path, monkeypatch):
     """Work in an empty folder with one scene, my.toml."""
     return folder_with(scene_text(3, 4, *TOUCH, parts=SMALL_BLISTER), tmp_path, monkeypatch)
 
 
 @pytest.fixture
-def start(here: Path) -> Iterator[Start]:
-    running: list[subprocess.Popen[str]] = []
+def start(here):
+    running = []
 
-    def start(*arguments: str, addon: Path = ADDON, bare: bool = False, **settings: str) -> Any:
+    def start(*arguments, addon=ADDON, bare=False, **settings):
         process = subprocess.Popen(
             [sys.executable, *["-S"] * bare, "-m", *arguments],
             stderr=subprocess.PIPE,
@@ -59,7 +56,7 @@ def start(here: Path) -> Iterator[Start]:
         process.communicate()
 
 
-def start_scheduler(start: Start, folder: Path, port: str = "0", **settings: Any) -> tuple[Any, str]:
+def start_scheduler(start, folder, port="0", **settings):
     file = folder / "scheduler.json"
     file.unlink(missing_ok=True)
     arguments = ["--host", "127.0.0.1", "--port", port, "--no-dashboard", "--scheduler-file", str(file)]
@@ -68,23 +65,23 @@ def start_scheduler(start: Start, folder: Path, port: str = "0", **settings: Any
     return process, read_json(file)["address"]
 
 
-def start_worker(start: Start, address: str, *arguments: str, **settings: Any) -> Any:
+def start_worker(start, address, *arguments, **settings):
     return start(
         "distributed.cli.dask_worker", address, "--nthreads", "1", "--no-dashboard", *arguments, **settings
     )
 
 
-def points(folder: Path) -> list[Path]:
+def points(folder):
     return list(folder.glob("points/*.json"))
 
 
-def read_figures(point: Path) -> dict[str, float]:
+def read_figures(point):
     """Return what stands in the file of a finished point."""
-    figures: dict[str, float] = json.loads(point.read_text(encoding="utf-8"))["figures"]
+    figures = json.loads(point.read_text(encoding="utf-8"))["figures"]
     return figures
 
 
-def test_a_point_that_no_process_of_this_machine_survives_fails_alone(here: Path) -> None:
+def test_a_point_that_no_process_of_this_machine_survives_fails_alone(here):
     resource = pytest.importorskip("resource", reason="Windows does not limit processor time")
     axes = ["layout.rows=3,4", "simulation.duration=0.1,1e5", "control.dead_band=1e-5"]
     varied = [word for axis in axes for word in ("--vary", axis)]
@@ -106,7 +103,7 @@ def test_a_point_that_no_process_of_this_machine_survives_fails_alone(here: Path
     assert sorted(path.stem for path in points(here / "o")) == ["000000", "000002"]
 
 
-def test_a_killed_worker_and_a_killed_scheduler_change_no_bit_of_the_table(here: Path, start: Start) -> None:
+def test_a_killed_worker_and_a_killed_scheduler_change_no_bit_of_the_table(here, start):
     assert main([*SWEEP, "--workers", "2", "--out", "own"]) == 0
     scheduler, address = start_scheduler(start, here)
     workers = [start_worker(start, address, "--no-nanny") for _ in range(2)]
@@ -140,10 +137,10 @@ def test_a_killed_worker_and_a_killed_scheduler_change_no_bit_of_the_table(here:
     assert timeless(here / "far/sweep.csv") == timeless(here / "own/sweep.csv")
 
 
-def test_a_piece_that_no_worker_survives_fails_alone(here: Path, start: Start) -> None:
+def test_a_piece_that_no_worker_survives_fails_alone(here, start):
     _, address = start_scheduler(start, here, DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES="1")
     start_worker(start, address)  # its nanny starts it again
-    done: dict[str, Any] = {}
+    done = {}
     with open_cluster(address, lambda: False, lambda note: None) as cluster:
         pieces = ["1 + 1", "__import__('os')._exit(1)", "2 + 2"]
         finish(submit(cluster, eval, pieces, stopped=lambda: False), done.__setitem__, done.__setitem__)
@@ -151,9 +148,7 @@ def test_a_piece_that_no_worker_survives_fails_alone(here: Path, start: Start) -
     assert done[pieces[1]].startswith("2 workers died of this, the last one tcp://127.0.0.1:")
 
 
-def test_a_worker_that_dies_when_it_is_asked_for_its_versions_changes_nothing(
-    here: Path, start: Start
-) -> None:
+def test_a_worker_that_dies_when_it_is_asked_for_its_versions_changes_nothing(here, start):
     other = copy_package(here / "other") / "addon"
     (other / "digiclay/__init__.py").write_text("import os\nos._exit(1)\n", encoding="utf-8")
     _, address = start_scheduler(start, here)
@@ -168,7 +163,7 @@ def test_a_worker_that_dies_when_it_is_asked_for_its_versions_changes_nothing(
     assert len(points(here / "far")) == 2
 
 
-def test_a_worker_of_another_version_is_named_at_once_and_when_it_joins(here: Path, start: Start) -> None:
+def test_a_worker_of_another_version_is_named_at_once_and_when_it_joins(here, start):
     other = copy_package(here / "other") / "addon"
     front = other / "digiclay" / "core" / "version.py"
     text = front.read_text(encoding="utf-8")
@@ -220,7 +215,7 @@ def test_a_place_without_digiclay_is_named_in_one_line(place, line, here, start)
     assert " lacks digiclay" in told
 
 
-def test_a_worker_elsewhere_gets_the_code_of_a_method_with_its_points(here: Path, start: Start) -> None:
+def test_a_worker_elsewhere_gets_the_code_of_a_method_with_its_points(here, start):
     own = write_method(here)
     axes = ["--vary", "control.step=1e-5,3e-5", "--vary", "control.yield_force=0.01,0.02,0.03"]
     sweep = ["sweep", "tap", "--method", f"{own}:SoftPad", *axes, "--metric", "lowest", "--quiet"]

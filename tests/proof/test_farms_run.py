@@ -26,7 +26,7 @@ QUICK = 'scenes = ["tap"]\nerrors = false\nsettings.a.simulation.duration = 0.05
 COMMAND = str(Path(sys.executable).with_name("digiclay"))
 
 
-def openjd(*arguments: str | Path) -> str:
+def openjd(*arguments):
     return told(sys.executable, "-m", "openjd", *arguments)
 
 
@@ -53,7 +53,7 @@ def test_openjd_checks_a_template_and_runs_its_steps_in_order(tmp_path, monkeypa
     assert {path: path.stat().st_mtime_ns for path in run.iterdir()} == before
 
 
-def test_a_step_whose_task_fails_stops_those_that_need_it(tmp_path: Path) -> None:
+def test_a_step_whose_task_fails_stops_those_that_need_it(tmp_path):
     jobs = tmp_path / "two.toml"
     jobs.write_text(JOBS.replace("0.3", "0.05"), encoding="utf-8")
     assert main(["batch", str(jobs), "--out", str(tmp_path / "out"), "--submit", "openjd", "--quiet"]) == 0
@@ -81,7 +81,7 @@ def test_a_step_whose_task_fails_stops_those_that_need_it(tmp_path: Path) -> Non
         (COMMAND, f"Digiclay={COMMAND}"),
     ],
 )
-def test_the_program_of_a_template_is_named_by_its_kind(program: str, name: str, tmp_path: Path) -> None:
+def test_the_program_of_a_template_is_named_by_its_kind(program, name, tmp_path):
     jobs, out = tmp_path / "two.toml", tmp_path / "out"
     jobs.write_text(QUICK, encoding="utf-8")
     words = ["--program", program] if program else []
@@ -90,7 +90,7 @@ def test_the_program_of_a_template_is_named_by_its_kind(program: str, name: str,
     assert "1 of 1 jobs done." in (out / "index.html").read_text(encoding="utf-8")
 
 
-def test_a_shell_executes_each_line_of_the_lists_of_cuecmd(tmp_path: Path) -> None:
+def test_a_shell_executes_each_line_of_the_lists_of_cuecmd(tmp_path):
     jobs, out = tmp_path / "two.toml", tmp_path / "schöne 'Tasten' $HOME; #"
     jobs.write_text(QUICK, encoding="utf-8")
     assert main(["batch", str(jobs), "--out", str(out), "--submit", "cuecmd", "--quiet"]) == 0

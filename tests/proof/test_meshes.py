@@ -1,7 +1,6 @@
 """The paper's final surface in other programs: admesh and PrusaSlicer repair nothing, assimp reads all."""
 
 import re
-from pathlib import Path
 
 import pytest
 import trimesh
@@ -54,30 +53,30 @@ COMPLAINTS = re.compile(
 )
 
 
-def faults(path: Path) -> dict[str, int]:
+def faults(path):
     said = told("admesh", path)
     found = {name: int(re.search(rf"{name}\s*:\s*(\d+)", said)[1]) for name in FAULTS}
     return {name: count for name, count in found.items() if count}
 
 
-def read(path: Path) -> dict[str, str]:
+def read(path):
     said = told("assimp", "info", path, "--raw")
     lines = re.findall(r"^(\w[\w ]*?):?\s{2,}(\S.*)$", said, re.MULTILINE)
     return dict(reversed(lines))  # a word that comes again further down heads a list there
 
 
 @pytest.mark.parametrize("name", SOLIDS)
-def test_admesh_has_nothing_to_repair(meshes: Path, name: str) -> None:
+def test_admesh_has_nothing_to_repair(meshes, name):
     assert faults(meshes / name) == {}
 
 
 @pytest.mark.parametrize(("stem", "parts"), [("surface", 1), ("pins", 1), ("features", 3)])
-def test_a_file_has_as_many_parts_as_bodies(meshes: Path, stem: str, parts: int) -> None:
+def test_a_file_has_as_many_parts_as_bodies(meshes, stem, parts):
     said = told("admesh", meshes / "bilinear" / f"{stem}.stl")
     assert int(re.search(r"Number of parts\s*:\s*(\d+)", said)[1]) == parts
 
 
-def test_admesh_and_the_slicer_do_find_faults(meshes: Path, tmp_path: Path) -> None:
+def test_admesh_and_the_slicer_do_find_faults(meshes, tmp_path):
     whole, first = bytearray((meshes / "bilinear/surface.stl").read_bytes()), 96 + 50 * 9
     # Two corners of a triangle change places.
     whole[first : first + 24] = whole[first + 12 : first + 24] + whole[first : first + 12]
@@ -104,14 +103,14 @@ def test_assimp_reads_every_triangle_and_each_feature_as_a_mesh_of_its_own(meshe
 
 
 @pytest.mark.parametrize("name", SLICED)
-def test_the_slicer_repairs_nothing(meshes: Path, name: str) -> None:
+def test_the_slicer_repairs_nothing(meshes, name):
     said = told("prusa-slicer", "--info", meshes / name)
     assert "manifold = yes" in said
     assert COMPLAINTS.findall(said) == []
 
 
 @pytest.mark.parametrize("name", ["bilinear/surface.stl", "smooth/surface.3mf", "bilinear/pins.stl"])
-def test_the_slicer_makes_g_code_without_a_warning(meshes: Path, tmp_path: Path, name: str) -> None:
+def test_the_slicer_makes_g_code_without_a_warning(meshes, tmp_path, name):
     code = tmp_path / "surface.gcode"
     said = told("prusa-slicer", "--export-gcode", "--output", code, meshes / name)
     assert COMPLAINTS.findall(said) == []

@@ -3,8 +3,6 @@
 import csv
 import json
 import re
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -16,35 +14,35 @@ from digiclay_paper.scenes import COMPARED
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def folder(tmp_path_factory):
     out = tmp_path_factory.mktemp("paper") / "quick"
     assert main(["paper", "--quick", "--quiet", "--out", str(out)]) == 0
     return out
 
 
 @pytest.fixture(scope="module")
-def text(folder: Path) -> str:
+def text(folder):
     return (folder / "paper.md").read_text(encoding="utf-8")
 
 
 @pytest.fixture(scope="module")
-def numbers(folder: Path) -> dict[str, Any]:
+def numbers(folder):
     return json.loads((folder / "metrics.json").read_text(encoding="utf-8"))
 
 
-def claims(text: str) -> list[list[str]]:
+def claims(text):
     table = text.split("## Claims")[1].split("## Figures")[0]
     rows = [line for line in table.splitlines() if line.startswith("| ")][2:]
     return [[cell.strip() for cell in row.strip("|").split("|")] for row in rows]
 
 
-def test_every_file_the_page_names_is_there_and_nothing_else(folder: Path, text: str) -> None:
+def test_every_file_the_page_names_is_there_and_nothing_else(folder, text):
     named = re.findall(r"\]\(([^)]+)\)", text)
     assert len(named) >= 16
     assert sorted(path.name for path in folder.iterdir()) == sorted([*named, "paper.md", "metrics.json"])
 
 
-def test_every_figure_is_a_vector_file_with_lettered_panels_and_its_data_beside_it(folder: Path) -> None:
+def test_every_figure_is_a_vector_file_with_lettered_panels_and_its_data_beside_it(folder):
     for path in folder.glob("*.svg"):
         content = path.read_text(encoding="utf-8")
         assert content.startswith("<?xml")
@@ -60,7 +58,7 @@ def test_every_figure_is_a_vector_file_with_lettered_panels_and_its_data_beside_
         assert [row for row in rows if "panel" in row and not row["x_axis"]] == []
 
 
-def test_the_data_of_the_surfaces_are_the_final_heights(folder: Path, numbers: dict[str, Any]) -> None:
+def test_the_data_of_the_surfaces_are_the_final_heights(folder, numbers):
     with (folder / "fig10_surfaces.csv").open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
     known = numbers["session"]
@@ -106,7 +104,7 @@ def test_an_older_folder_is_kept_unless_it_may_be_replaced(folder, capfd):
     assert (folder / "paper.md").stat().st_mtime_ns == before
 
 
-def test_the_page_sets_method_three_beside_the_others(text: str, numbers: dict[str, Any]) -> None:
+def test_the_page_sets_method_three_beside_the_others(text, numbers):
     known = numbers["session"]
     table = text.split("## Method III")[1].split("## Fig. 3")[0]
     row = next(line for line in table.splitlines() if line.startswith("| RFD in the session (N)"))

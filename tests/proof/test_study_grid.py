@@ -1,8 +1,5 @@
 """Indices and fronts of a real scene, against its runs on a grid of two parameters."""
 
-from pathlib import Path
-from typing import Any
-
 import numpy as np
 import pytest
 from digiclay.cli import main
@@ -40,35 +37,35 @@ COUNT = 12
 
 
 @pytest.fixture(scope="module")
-def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def scene(tmp_path_factory):
     path = tmp_path_factory.mktemp("grid") / "my.toml"
     path.write_text(SCENE, encoding="utf-8")
     return path
 
 
 @pytest.fixture(scope="module")
-def grid(scene: Path) -> Floats:
+def grid(scene):
     """Both metrics on the grid, shape (COUNT, COUNT, 2), by the batches that sweeps take."""
     ranges = tuple(fit_ranges([read_range(said) for said in VARIED], scene, ()))
     middles = (np.arange(COUNT) + 0.5) / COUNT
     shares = np.stack(np.meshgrid(middles, middles, indexing="ij"), axis=-1).reshape(-1, 2)
     points = Subject(scene, (), load(scene), ranges, NAMES).make_points(shares, 0)
-    found: list[Any] = evaluate_bundle(points)
+    found = evaluate_bundle(points)
     values = np.array([[record["figures"][name] for name in NAMES] for record in found])
     return values.reshape(COUNT, COUNT, 2)
 
 
-def run_command(command: str, scene: Path, out: Path, *options: str) -> None:
+def run_command(command, scene, out, *options):
     varied = [word for said in VARIED for word in ("--vary", said)]
     words = [command, str(scene), *varied, "--metric", ",".join(NAMES), "--workers", "1", "--quiet"]
     assert main([*words, "--out", str(out), *options]) == 0
 
 
-def read_values(path: Path) -> Floats:
+def read_values(path):
     return np.array([[float(row["rfd (N)"]), float(row["lag_mean (m)"])] for row in rows(path)])
 
 
-def test_the_indices_are_those_of_the_double_loop(scene: Path, grid: Floats, tmp_path: Path) -> None:
+def test_the_indices_are_those_of_the_double_loop(scene, grid, tmp_path):
     run_command("study", scene, tmp_path / "out", "--samples", "64")
     found = rows(tmp_path / "out" / "indices.csv")
     assert len(found) == 8
@@ -82,13 +79,13 @@ def test_the_indices_are_those_of_the_double_loop(scene: Path, grid: Floats, tmp
         assert float(row["index"]) == pytest.approx(known, abs=float(row["interval (95%, +-)"]) + 0.01), row
 
 
-def measure_hypervolume(front: Floats, worst: Floats) -> float:
+def measure_hypervolume(front, worst):
     """Return the area that a front, ordered by its first output, dominates below the worst outputs."""
     steps = np.concatenate([[worst[1]], front[:, 1]])
     return float(np.sum((worst[0] - front[:, 0]) * (steps[:-1] - steps[1:])))
 
 
-def test_no_run_of_the_grid_is_beyond_the_front(scene: Path, grid: Floats, tmp_path: Path) -> None:
+def test_no_run_of_the_grid_is_beyond_the_front(scene, grid, tmp_path):
     run_command("tune", scene, tmp_path / "out", "--population", "24", "--generations", "5")
     front = read_values(tmp_path / "out" / "front.csv")
     every = grid.reshape(-1, 2)

@@ -4,7 +4,6 @@ import math
 
 import numpy as np
 import pytest
-from digiclay.core.base.arrays import Floats
 from digiclay.core.model.fingertip import JOIN, Fingertip, compute_reach, compute_reaches
 from digiclay.core.model.layout import Layout, encloses, join_discs, make_grid, widen_disc
 from digiclay.core.model.touch import trace_finger
@@ -19,13 +18,13 @@ RANDOM = np.random.default_rng(2)
 AROUND = np.linspace(0, 2 * np.pi, 12, endpoint=False)
 
 
-def random_poses(count: int) -> Floats:
+def random_poses(count):
     turns = RANDOM.normal(size=(count, 4))
     turns /= np.linalg.norm(turns, axis=1, keepdims=True)
     return np.column_stack([RANDOM.uniform(-20e-3, 20e-3, (count, 2)), RANDOM.uniform(0, 0.1, count), turns])
 
 
-def cut(pose: Floats, axes: Floats, x: float, y: float) -> float:
+def cut(pose, axes, x, y):
     """Return the lower height at which the vertical cuts (p - c)ᵀ A (p - c) = 1, which SciPy turns."""
     turn = Rotation.from_quat(pose[[4, 5, 6, 3]]).as_matrix()
     squared = turn @ np.diag(axes**2) @ turn.T
@@ -39,7 +38,7 @@ def cut(pose: Floats, axes: Floats, x: float, y: float) -> float:
     return center[2] + roots.real.min()
 
 
-def within(outline: Floats, square: float, angle: Floats) -> tuple[Floats, Floats]:
+def within(outline, square, angle):
     """Return points (x, y) at a squared reduced radius, in directions `angle`."""
     s_xx, s_xy, s_yy = outline[3:6]
     cos, sin = np.cos(angle), np.sin(angle)
@@ -48,7 +47,7 @@ def within(outline: Floats, square: float, angle: Floats) -> tuple[Floats, Float
 
 
 @pytest.mark.parametrize("axes", [AXES, np.array([12e-3, 5e-3, 3e-3])], ids=["default", "flat"])
-def test_the_underside_is_where_a_vertical_ray_meets_the_ellipsoid(axes: Floats) -> None:
+def test_the_underside_is_where_a_vertical_ray_meets_the_ellipsoid(axes):
     finger, poses = Fingertip(*axes), random_poses(40)
     for pose, outline in zip(poses, finger.outline(poses), strict=True):
         for square in (0.0, 0.3, 0.8, 0.95):
@@ -60,7 +59,7 @@ def test_the_underside_is_where_a_vertical_ray_meets_the_ellipsoid(axes: Floats)
     assert np.isfinite(under(finger.outline(poses), np.array([1.0, -100.0]), np.array([0.0, 100.0]))).all()
 
 
-def test_height_and_slope_are_continuous_at_the_join_and_beyond_it_the_underside_rises_on() -> None:
+def test_height_and_slope_are_continuous_at_the_join_and_beyond_it_the_underside_rises_on():
     for outline in Fingertip().outline(random_poses(20)):
         x, y = within(outline, JOIN, AROUND)
         # Over 2 nm/1000 a slope of 1/sqrt(1 - r²), 5 to 10, moves the underside 2e-11 m.
@@ -85,7 +84,7 @@ spots = st.tuples(st.floats(-30e-3, 30e-3), st.floats(-30e-3, 30e-3), st.floats(
 peaks = st.floats(0.0, 0.1)
 
 
-def pose(spot: tuple[float, ...], turn: tuple[float, ...]) -> Floats:
+def pose(spot, turn):
     return np.array([*spot, *(np.array(turn) / np.linalg.norm(turn))])
 
 
@@ -125,7 +124,7 @@ ARRANGEMENTS = {"aligned": (1.0, 0.0), "staggered": (1.0, 0.5), "hexagonal": (ma
 
 
 @pytest.mark.parametrize("arrangement", ARRANGEMENTS)
-def test_the_cells_stand_row_by_row_a_pitch_apart(arrangement: str) -> None:
+def test_the_cells_stand_row_by_row_a_pitch_apart(arrangement):
     spacing, shift = 3e-3 * np.array(ARRANGEMENTS[arrangement])
     table = make_grid(Layout(5, 4, 3e-3, arrangement)).positions.reshape(5, 4, 2)
     assert np.diff(table[:, :, 0], axis=1) == pytest.approx(3e-3, abs=1e-17)
@@ -136,7 +135,7 @@ def test_the_cells_stand_row_by_row_a_pitch_apart(arrangement: str) -> None:
 
 @pytest.mark.parametrize("arrangement", ARRANGEMENTS)
 @pytest.mark.parametrize("shape", [(1, 1), (1, 6), (6, 1), (5, 4), (6, 7)])
-def test_the_bed_is_centered_on_the_origin(arrangement: str, shape: tuple[int, int]) -> None:
+def test_the_bed_is_centered_on_the_origin(arrangement, shape):
     positions = make_grid(Layout(*shape, 3e-3, arrangement)).positions
     assert positions.min(axis=0) + positions.max(axis=0) == pytest.approx([0.0, 0.0], abs=1e-16)
 
@@ -169,7 +168,7 @@ SMALL, LARGE, ASIDE = (1e-3, 0.0, 2e-3), (0.0, 0.0, 3e-3), (2e-3, 0.0, 2e-3)
         (None, None, True),
     ],
 )
-def test_a_disc_holds_another_alone_and_in_a_batch(outer: object, inner: object, holds: bool) -> None:
+def test_a_disc_holds_another_alone_and_in_a_batch(outer, inner, holds):
     assert encloses(outer, inner) == holds
     assert encloses(join_discs([LARGE, outer]), join_discs([SMALL, inner])) == holds
     assert encloses(None, join_discs([inner])) is False

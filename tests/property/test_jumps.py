@@ -1,28 +1,24 @@
 """A finger that jumps: no warning, nothing moves that is shut, and no pin goes where none can come to."""
 
-from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 import pytest
-from digiclay.core.base.arrays import Floats
 from digiclay.core.batch.run_together import run_together
 from digiclay.core.engine.simulation import begin
-from digiclay.core.engine.system import System
 from digiclay.core.model.actuator import Actuator
 from digiclay.core.model.contact import Contact
 from digiclay.core.model.layout import Layout
 from digiclay.core.model.physics import find_speeds
-from digiclay.core.model.trajectory import Path, Trajectory, Waypoint
+from digiclay.core.model.trajectory import Path, Waypoint
 from digiclay.core.model.valve import Fluid
 from digiclay.core.scene.assembly import assemble
-from digiclay.core.scene.schema import Scene
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from benchmarks.stiff import strict
-from tests.assemble import Motion, Record, make_system, one_cell, path, record, sample, scripted, under
+from tests.assemble import Motion, make_system, one_cell, path, record, sample, scripted, under
 
 PERIODS = (1e-3, 5e-3, 20e-3, 50e-3)
 STEPPERS = st.sampled_from(["bernoulli", "richardson"])
@@ -51,7 +47,6 @@ parts = st.sampled_from(
         {"contact": Contact(stiffness=2.5e6)},
     ]
 )
-Spot = tuple[int, float, float, float]
 #: From the issue: 100 mm sideways within 5 ms, at a depth of 4 mm.
 SIDEWAYS = [(20, 100.0, 0.0, -4.0), (5, 0.0, 0.0, -4.0), (50, 0.0, 0.0, -4.0)]
 DOWN = [(5, 0.0, 0.0, 100.0), (5, 0.0, 0.0, -4.0), (20, 0.0, 0.0, -4.0)]
@@ -60,7 +55,7 @@ UP = [(50, 0.0, 0.0, -26.0), (50, 0.0, 0.0, -26.0), (5, 0.0, 0.0, 1000.0), (20, 
 LEVEL = (0.0, 0.0, 0.0)
 
 
-def waypoints(spots: list[Spot], turn: tuple[float, ...] = LEVEL) -> tuple[Waypoint, ...]:
+def waypoints(spots, turn=LEVEL):
     """Return the places of a finger over pins 40 mm high; at every other one it has turned."""
     times = np.cumsum([0, *(after for after, *_ in spots[1:])]) * 1e-3
     return tuple(
@@ -69,32 +64,32 @@ def waypoints(spots: list[Spot], turn: tuple[float, ...] = LEVEL) -> tuple[Waypo
     )
 
 
-def way(spots: list[Spot], turn: tuple[float, ...] = LEVEL) -> Trajectory:
+def way(spots, turn=LEVEL):
     return Path("linear", waypoints(spots, turn)).trajectory()
 
 
-def taken(scene: Scene, points: tuple[Waypoint, ...]) -> Scene:
+def taken(scene, points):
     lasting = replace(scene.simulation, duration=points[-1].time)
     return scene.with_sections(trajectory=Path("linear", points), simulation=lasting)
 
 
-def half_shut(t: float, x: Floats, y: Floats) -> Floats:
+def half_shut(t, x, y):
     return np.where(x < 0.0, 0.0, np.sin(300.0 * t + 1e3 * y))
 
 
-def jumped(system: System, *fingers: Trajectory) -> Record:
+def jumped(system, *fingers):
     lasting = max(finger.times[-1] for finger in fingers)
     with strict():
         return record(system, fingers, min(150, round(lasting / system.period) + 2))
 
 
-def stacked(scenes: Sequence[Scene], row: str) -> list[Floats]:
+def stacked(scenes, row):
     with strict():
         found = {number: result.history[row].copy() for number, result in run_together(scenes)}
     return [found[number] for number in range(len(scenes))]
 
 
-def assert_within_reach(system: System, height: Floats, *fingers: Trajectory) -> None:
+def assert_within_reach(system, height, *fingers):
     """Check heights, (t, n), a control period apart: within the stroke, and within `Speeds.reach`."""
     touches = getattr(system.cell.touch, "each", (system.cell.touch,))
     assert height.min() >= 0.0
@@ -109,14 +104,7 @@ def assert_within_reach(system: System, height: Floats, *fingers: Trajectory) ->
         assert (after <= highest + 1e-15).all()
 
 
-def assert_withstands(
-    bed: Layout,
-    hand: list[list[Spot]],
-    turn: tuple[float, ...],
-    period: float,
-    stepper: str,
-    **changes: object,
-) -> None:
+def assert_withstands(bed, hand, turn, period, stepper, **changes):
     system = make_system(
         bed, stepper=stepper, period=period, step=period, control=scripted(half_shut), **changes
     )
@@ -134,13 +122,8 @@ def assert_withstands(
 @example(DOWN, LEVEL, Layout(5, 5), {}, 5e-3, "bernoulli")
 @example(UP, LEVEL, Layout(5, 5), {}, 5e-3, "bernoulli")
 def test_no_jump_moves_what_is_shut_or_takes_a_pin_where_none_can_be(
-    spots: list[Spot],
-    turn: tuple[float, ...],
-    bed: Layout,
-    changes: dict[str, object],
-    period: float,
-    stepper: str,
-) -> None:
+    spots, turn, bed, changes, period, stepper
+):
     assert_withstands(bed, [spots], turn, period, stepper, **changes)
 
 
@@ -160,14 +143,8 @@ BESIDE = [(1, -46.0, 1.0, -3.5), (75, -46.0, 1.0, -3.5), (2, 1.0, 1.0, -3.5), (5
     [PRESSED, BESIDE, DOWN], LEVEL, Layout(5, 5), {}, {"contact": Contact(exponent=2e4)}, 5e-3, "bernoulli"
 )
 def test_no_jump_of_several_fingers_takes_a_pin_where_none_can_be(
-    hand: list[list[Spot]],
-    turn: tuple[float, ...],
-    bed: Layout,
-    changes: dict[str, object],
-    own: dict[str, object],
-    period: float,
-    stepper: str,
-) -> None:
+    hand, turn, bed, changes, own, period, stepper
+):
     others = [own, {}][: len(hand) - 1]
     assert_withstands(bed, hand, turn, period, stepper, others=others, **changes)
 
@@ -181,7 +158,7 @@ def test_the_adaptive_stepper_withstands_jumps(spots, turn, period):
 @settings(max_examples=5)
 @given(st.lists(jumps, min_size=2, max_size=3), STEPPERS)
 @example([SIDEWAYS, DOWN], "bernoulli")
-def test_a_stack_withstands_jumps(several: list[list[Spot]], stepper: str) -> None:
+def test_a_stack_withstands_jumps(several, stepper):
     # Each run with a pulp of its own; all valves of the last one shut.
     stiff = (
         sample("tap", f"simulation.stepper={stepper}", f"contact.stiffness={250 + 50 * i}") for i in range(3)
@@ -199,8 +176,8 @@ def test_a_stack_withstands_jumps(several: list[list[Spot]], stepper: str) -> No
     st.floats(-1.0, 1.0), st.integers(0, 8), st.sampled_from([1.6e-6, 1.6e-9]),
 )  # fmt: skip
 def test_no_pin_goes_farther_than_its_own_valve_lets_it_under_the_largest_load(
-    spots: list[Spot], opening: float, smaller: int, viscosity: float
-) -> None:
+    spots, opening, smaller, viscosity
+):
     # A valve that does not lag, and one opening all along: what flows under the largest load is known.
     opening *= 10.0**-smaller
     system = one_cell(
@@ -240,7 +217,7 @@ def test_a_finger_that_passes_above_all_pins_leaves_nothing_behind(spots, period
 
 
 @pytest.mark.parametrize("x", [-8.0, -30.0, 1000.0])
-def test_a_finger_that_passed_above_all_pins_presses_as_one_that_begins_there(x: float) -> None:
+def test_a_finger_that_passed_above_all_pins_presses_as_one_that_begins_there(x):
     # In stacks; all valves are shut. The places are passed at the ends of control periods, of 5 ms.
     spots = [(5, 0.0, 0.0, 6.0), (5, x, 0.0, 4.0)]
     press = [(50, 0.0, 0.0, 20.0), (50, 0.0, 0.0, 0.5), (50, 0.0, 0.0, -3.0), (50, 0.0, 0.0, -3.0)]
@@ -254,7 +231,7 @@ def test_a_finger_that_passed_above_all_pins_presses_as_one_that_begins_there(x:
 
 
 @pytest.mark.parametrize(("opening", "swing"), [(-0.5, 0.2), (0.5, 0.2), (1.0, 0.2), (1.0, 1.0)])
-def test_a_pin_moves_beside_one_near_overflow_as_beside_one_that_is_not(opening: float, swing: float) -> None:
+def test_a_pin_moves_beside_one_near_overflow_as_beside_one_that_is_not(opening, swing):
     # A step is a quarter of the finger's swing: its way bends. It meets and leaves the pin in each swing.
     contact, control = Contact(exponent=2e4), scripted(lambda t, x, y: opening)
     system = make_system(Layout(1, 2), step=5e-3, contact=contact, control=control)

@@ -8,10 +8,8 @@ import itertools
 import json
 import tempfile
 import zipfile
-from collections.abc import Callable
 from functools import cache
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -28,7 +26,7 @@ from digiclay.core.scene.schema import FINGER_SECTIONS, OPTIONAL, SECTIONS, STEP
 from digiclay.core.scene.toml_table import ABSENT, FINGERS, PRESETS, format_scene, resolve
 from digiclay.core.session import snapshot
 from digiclay.core.session.finished_run import HISTORY_ARRAYS, read_run
-from digiclay.core.session.run_scene import Result, run
+from digiclay.core.session.run_scene import run
 from digiclay.core.session.snapshot import FIRST, START
 from digiclay.core.session.take import Take, from_bytes, replay, to_bytes
 from digiclay.core.surface import features
@@ -36,11 +34,8 @@ from digiclay.core.surface.formed import make_formed
 from digiclay.core.surface.skins import fit_skin
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
 from tests.assemble import path
-
-Draw = Callable[[st.SearchStrategy[Any]], Any]
 
 #: Numbers, those at the ends of what there is and beyond among them; and what is no number.
 NUMBERS = st.one_of(
@@ -64,7 +59,7 @@ OFTEN, SELDOM, RARELY = (st.integers(0, last).map(lambda number: number == 0) fo
 POSE = [0.0, 0.0, 37e-3, 1.0, 0.0, 0.0, 0.0]
 
 
-def make_odd(draw: Draw, usual: Any) -> Any:
+def make_odd(draw, usual):
     """Return something in place of a usual value: a number, one near the usual one, or none at all."""
     if isinstance(usual, float) and draw(OFTEN):
         return usual * 10.0 ** draw(st.integers(-12, 12))
@@ -73,7 +68,7 @@ def make_odd(draw: Draw, usual: Any) -> Any:
     return draw(st.one_of(NUMBERS, NUMBERS, NUMBERS, OTHERS))
 
 
-def spoil(draw: Draw, tree: Any) -> None:
+def spoil(draw, tree):
     """Put something odd in place of a value, or seldom of a whole part, of nested tables and lists."""
     while keys := list(tree) if isinstance(tree, dict) else list(range(len(tree))):
         key = draw(st.sampled_from(keys))
@@ -84,16 +79,16 @@ def spoil(draw: Draw, tree: Any) -> None:
 
 
 @cache
-def write_scene(method: str) -> str:
+def write_scene(method):
     """Return the text of a small scene under a method, with all of its sections."""
-    sections: dict[str, Any] = {"layout": {"rows": 3, "columns": 3}, "sensors": {}, "shape": {}}
+    sections = {"layout": {"rows": 3, "columns": 3}, "sensors": {}, "shape": {}}
     sections["control"] = method if method == ABSENT else {"method": method}
     if METHODS.get(method) and METHODS[method].blister is not None:
         sections["blister"] = {"radius": 1e-3, "edge_radius": 1.5e-3, "flat_radius": 5e-4}
     return format_scene(resolve(sections))
 
 
-def make_tables(draw: Draw) -> dict[str, Any]:
+def make_tables(draw):
     """Return the tables of a scene, some of them left out, in which some values are odd."""
     method = draw(st.sampled_from([*METHODS, ABSENT]))
     tables = parse_tables(write_scene(method)) | {"preset": draw(st.sampled_from(list(PRESETS)))}
@@ -114,7 +109,7 @@ def make_tables(draw: Draw) -> dict[str, Any]:
     return tables
 
 
-def spoil_text(draw: Draw) -> str:
+def spoil_text(draw):
     """Return the text of a scene with some letters, or a value, turned into others."""
     lines = write_scene("virtual_master").split("\n")
     for _ in range(draw(st.integers(1, 2))):
@@ -129,7 +124,7 @@ def spoil_text(draw: Draw) -> str:
     return "\n".join(lines)
 
 
-def begin_scene(draw: Draw) -> None:
+def begin_scene(draw):
     """Take in a scene and begin its session."""
     if draw(SELDOM):
         try:
@@ -147,14 +142,14 @@ def begin_scene(draw: Draw) -> None:
 
 
 @cache
-def press_half(method: str) -> tuple[Any, bytes]:
+def press_half(method):
     """Return a small bed under a method, and its state in the middle of a press."""
     system = assemble(resolve({"layout": {"rows": 6, "columns": 10}, "control": {"method": method}}))
     *_, last = periods(system, [path((0, 0, 0, 42), (0.2, 0, 0, 37))], begin(system), 50)
     return system, snapshot.dump(system, last)
 
 
-def spoil_state(draw: Draw, data: bytes) -> bytes:
+def spoil_state(draw, data):
     """Return a state with odd values in its header, in its arrays, or with other bytes."""
     first = len(START) + 4
     length = int.from_bytes(data[len(START) : first], "little")
@@ -176,13 +171,13 @@ def spoil_state(draw: Draw, data: bytes) -> bytes:
     return start + len(head).to_bytes(4, "little") + head + bytes(arrays)
 
 
-def round_to(number: Any, kind: np.dtype[Any]) -> Any:
+def round_to(number, kind):
     """Return a number as one of numpy's; one beyond all of them is infinite."""
     with np.errstate(all="ignore"):
         return np.float64(float(number) if abs(number) < 10**309 else np.inf).astype(kind)
 
 
-def go_on(draw: Draw) -> None:
+def go_on(draw):
     """Take up an odd state and go on from it."""
     system, data = press_half(draw(st.sampled_from(list(METHODS))))
     finger = np.tile(POSE, (2, 1, 1))
@@ -194,7 +189,7 @@ def go_on(draw: Draw) -> None:
         snapshot.dump(system, state)
 
 
-def spoil_array(draw: Draw, usual: NDArray[Any]) -> NDArray[Any]:
+def spoil_array(draw, usual):
     """Return an array of another type or shape, or with an odd number in it."""
     kind = draw(st.sampled_from(["type", "shape", "number", "near", "near", "near"]))
     if kind == "type":
@@ -212,7 +207,7 @@ def spoil_array(draw: Draw, usual: NDArray[Any]) -> NDArray[Any]:
     return changed
 
 
-def pack(draw: Draw, arrays: dict[str, NDArray[Any]]) -> bytes:
+def pack(draw, arrays):
     """Return arrays as a file .npz, some of them odd, or their heads."""
     for name in draw(st.lists(st.sampled_from(sorted(arrays)), min_size=1, max_size=2, unique=True)):
         arrays = arrays | {name: spoil_array(draw, arrays[name])}
@@ -229,7 +224,7 @@ def pack(draw: Draw, arrays: dict[str, NDArray[Any]]) -> bytes:
 
 
 @cache
-def record() -> tuple[Result, Take]:
+def record():
     """Return a short run of a small bed, and a take of the same."""
     small = {"layout": {"rows": 6, "columns": 11}, "simulation": {"duration": 0.05}, "recorder": {}}
     scene = resolve(small)
@@ -240,7 +235,7 @@ def record() -> tuple[Result, Take]:
     return run(scene), Take(scene, start, np.tile(POSE, (4, 1, 1)), start, orders)
 
 
-def replay_take(draw: Draw) -> None:
+def replay_take(draw):
     """Read a take with odd arrays and replay it."""
     with np.load(io.BytesIO(to_bytes(record()[1]))) as file:
         arrays = dict(file)
@@ -248,7 +243,7 @@ def replay_take(draw: Draw) -> None:
         pass
 
 
-def evaluate_run(draw: Draw) -> None:
+def evaluate_run(draw):
     """Read a run with odd arrays and evaluate it."""
     result = record()[0]
     with tempfile.TemporaryDirectory() as folder:
@@ -263,12 +258,12 @@ def evaluate_run(draw: Draw) -> None:
     ("use", "count"),
     [(begin_scene, 200), (go_on, 120), (replay_take, 80), (evaluate_run, 80)],
 )
-def test_what_is_odd_is_taken_or_refused_in_one_line(use: Callable[[Draw], None], count: int) -> None:
-    refusals: list[str] = []
+def test_what_is_odd_is_taken_or_refused_in_one_line(use, count):
+    refusals = []
 
     @settings(max_examples=count * settings.default.max_examples // 50)
     @given(st.data())
-    def check(data: st.DataObject) -> None:
+    def check(data):
         refusal = ""
         try:
             use(data.draw)
@@ -295,7 +290,7 @@ def test_what_is_odd_is_taken_or_refused_in_one_line(use: Callable[[Draw], None]
         ("recorder.every", "1" + 30 * "0", "at most 1e+09 (got a whole number of 31 digits)"),
     ],
 )  # fmt: skip
-def test_a_number_beyond_all_devices_is_refused_with_its_bound(key: str, value: str, said: str) -> None:
+def test_a_number_beyond_all_devices_is_refused_with_its_bound(key, value, said):
     with pytest.raises(SceneError) as caught:
         load(find("slow_press"), [Setting(key, value)])
     assert said in str(caught.value)
@@ -321,7 +316,7 @@ def test_steps_whose_plan_would_fill_the_memory_and_waypoints_at_one_time_are_re
 
 
 @pytest.mark.parametrize("waypoints", [[], [3], {"time": 0}, 5e-324])
-def test_waypoints_that_are_no_list_of_tables_are_refused_by_name(waypoints: object) -> None:
+def test_waypoints_that_are_no_list_of_tables_are_refused_by_name(waypoints):
     with pytest.raises(DigiclayError, match=r"waypoints must .* \(got"):
         resolve({"trajectory": {"waypoints": waypoints}})
 
@@ -329,7 +324,7 @@ def test_waypoints_that_are_no_list_of_tables_are_refused_by_name(waypoints: obj
 SYSTEM, KEPT = press_half("virtual_master")
 
 
-def refusals(data: bytes) -> list[str]:
+def refusals(data):
     """Take up bytes both ways; return why each is refused, all that may go wrong, "" if it is not."""
     told = []
     for take_up in (snapshot.load, snapshot.transfer_heights):
@@ -350,7 +345,7 @@ places = st.one_of(st.integers(0, len(KEPT) - 12), st.integers(0, 700), st.integ
 
 @settings(max_examples=200)
 @given(places, st.binary(max_size=12))
-def test_bytes_that_are_changed_are_noticed_or_make_another_state(at: int, some: bytes) -> None:
+def test_bytes_that_are_changed_are_noticed_or_make_another_state(at, some):
     data = KEPT[:at] + some + KEPT[at + len(some) :]
     told = refusals(data)
     assert data != KEPT or told == ["", ""]
@@ -359,7 +354,7 @@ def test_bytes_that_are_changed_are_noticed_or_make_another_state(at: int, some:
 @given(st.integers(0, len(KEPT)), st.binary(max_size=40))
 @example(len(KEPT), b"\0")
 @example(len(KEPT) - 8, b"")
-def test_bytes_that_are_cut_or_added_are_noticed(at: int, some: bytes) -> None:
+def test_bytes_that_are_cut_or_added_are_noticed(at, some):
     assert all(refusals(KEPT[:at] + some + KEPT[at:])) == bool(some)
     assert all(refusals(KEPT[:at])) == (at < len(KEPT))
     assert all(refusals(some))

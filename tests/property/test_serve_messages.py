@@ -2,9 +2,7 @@
 
 import json
 import math
-from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -24,12 +22,12 @@ whole = st.integers(0, 2**32 - 1)
 heights = st.lists(st.floats(0.0, 0.09375, width=32), min_size=1, max_size=30)
 
 
-def frame_of(pose: list[float], values: list[float], flags: int, who: list[int]) -> protocol.Frame:
+def frame_of(pose, values, flags, who):
     pins, fingers = np.array(values, np.float32), tuple((one, 0.25, tuple(pose)) for one in who)
     return protocol.Frame(2**40, 2**32 - 1, 12.5, 0.75, np.array(pose), pins, 2 * pins, flags, fingers)
 
 
-def refusal(read: Callable[[Any], Any], data: Any) -> str:
+def refusal(read, data):
     try:
         read(data)
     except DigiclayError as error:
@@ -38,7 +36,7 @@ def refusal(read: Callable[[Any], Any], data: Any) -> str:
 
 
 @given(poses, whole)
-def test_a_pose_is_read_as_it_was_written_in_both_formats(values: list[float], number: int) -> None:
+def test_a_pose_is_read_as_it_was_written_in_both_formats(values, number):
     wanted = protocol.Pose(protocol.check_pose(values), number)
     said = {"type": "pose", "position": values[:3], "orientation": values[3:], "number": number}
     assert protocol.read_json(json.dumps(said)) == wanted
@@ -53,9 +51,7 @@ who = st.lists(whole | st.just(-1), max_size=32)
     st.builds(frame_of, poses, heights, st.integers(0, 2**31 - 1), who),
     st.none() | st.tuples(st.floats(0.0, 1.0), st.floats(0.0, 1e300)),
 )
-def test_a_frame_is_read_as_it_was_written_in_all_formats(
-    frame: protocol.Frame, errors: tuple[float, float] | None
-) -> None:
+def test_a_frame_is_read_as_it_was_written_in_all_formats(frame, errors):
     packed = protocol.pack_frame(frame)
     older = protocol.unpack_frame(packed[: -protocol.ERRORS.size])  # of a server that knew no errors
     assert (older.errors, older.fingers, older.time) == (None, frame.fingers, frame.time)
@@ -90,7 +86,7 @@ def test_a_frame_is_read_as_it_was_written_in_all_formats(
 
 
 leaves = st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=5)
-anything: Any = leaves | st.lists(leaves | st.lists(leaves, max_size=2), max_size=8)
+anything = leaves | st.lists(leaves | st.lists(leaves, max_size=2), max_size=8)
 keys = st.sampled_from(["type", "version", "position", "orientation", "number", "x"])
 
 
@@ -99,7 +95,7 @@ keys = st.sampled_from(["type", "version", "position", "orientation", "number", 
     st.one_of(st.binary(max_size=100), st.binary(max_size=80).map(lambda end: b"DC\1\2" + end)),
     st.one_of(st.text(max_size=30), st.dictionaries(keys, anything | st.just("pose")).map(json.dumps)),
 )
-def test_any_bytes_text_or_address_is_a_request_or_refused_in_one_line(data: bytes, text: str) -> None:
+def test_any_bytes_text_or_address_is_a_request_or_refused_in_one_line(data, text):
     readers = (protocol.read_binary, protocol.unpack_frame, lambda data: read_request(*read_osc(data)[1:]))
     said = [refusal(read, data) for read in readers]
     said += [refusal(protocol.read_json, text)]
@@ -107,15 +103,15 @@ def test_any_bytes_text_or_address_is_a_request_or_refused_in_one_line(data: byt
     assert not any("\n" in one for one in said)
 
 
-def check_rate(address: str) -> None:
+def check_rate(address):
     assert 0.0 <= read_wishes(address).rate <= 1000.0
 
 
 @pytest.mark.skipif("sys.platform == 'win32'", reason="the example is for Linux and macOS")
 @given(st.integers(0, 65535), heights, st.binary(max_size=20), st.data())
 def test_heights_survive_the_line_of_a_display_to_within_half_a_count_or_are_refused(
-    sequence: int, values: list[float], noise: bytes, data: st.DataObject
-) -> None:
+    sequence, values, noise, data
+):
     display = load_example("pin_display")
     sent = display.pack_heights(sequence, 9, 0.1, np.array(values))
     assert sent.count(b"\xc0") == 1

@@ -1,18 +1,14 @@
 """What holds in any session: small beds, random fingers, a second or less; cells left out; symmetry."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 import pytest
-from digiclay.core.base.arrays import Floats
 from digiclay.core.control.blister import Blister
 from digiclay.core.control.virtual_master import VirtualMaster
 from digiclay.core.engine.simulation import begin, step
-from digiclay.core.engine.system import System
 from digiclay.core.model.actuator import Actuator
-from digiclay.core.model.control_interface import Commands, Controller, Measurement
+from digiclay.core.model.control_interface import Controller
 from digiclay.core.model.layout import Layout
 from digiclay.core.model.trajectory import Trajectory, make_level
 from digiclay.core.model.valve import Fluid, Valve
@@ -34,16 +30,16 @@ turns = st.tuples(*[st.floats(-0.4, 0.4)] * 3)
 steppers = st.sampled_from(["bernoulli", "bernoulli", "bernoulli", "runge_kutta_4"])
 
 
-def finger(spots: list[tuple[float, float, float]]) -> Trajectory:
+def finger(spots):
     """Return a level finger that visits spots, in mm, within the session."""
     return make_level(np.linspace(0.0, COUNT * 5e-3, len(spots)), np.array(spots) * 1e-3)
 
 
-def tilted(path: Trajectory, turn: tuple[float, ...]) -> Trajectory:
+def tilted(path, turn):
     return Trajectory(path.times, path.positions, np.tile([1.0, *turn], (path.times.size, 1)))
 
 
-def bed(stepper: str = "bernoulli", **parts: object) -> System:
+def bed(stepper="bernoulli", **parts):
     """Return a small bed under Method I; Runge and Kutta's steps are short enough for a deep press."""
     return make_system(CELLS, stepper=stepper, step=0.25e-3 if stepper != "bernoulli" else 1e-3, **parts)
 
@@ -52,8 +48,8 @@ def bed(stepper: str = "bernoulli", **parts: object) -> System:
 @given(points, turns, st.floats(0.0, 100.0), steppers)
 @example([(0.0, 0.0, 45.0), (0.0, 0.0, 36.0), (9.0, 3.0, 38.0)], (0.0, 0.0, 0.0), 40.0, "runge_kutta_4")
 def test_a_session_is_finite_within_the_stroke_without_pull_and_its_commands_are_openings(
-    spots: list[tuple[float, float, float]], turn: tuple[float, ...], rest: float, stepper: str
-) -> None:
+    spots, turn, rest, stepper
+):
     system = bed(stepper, control=VirtualMaster(), actuator=Actuator(rest_height=rest * 1e-3))
     path = tilted(finger([(x, y, z + rest - 40.0) for x, y, z in spots]), turn)
     run = record(system, path, COUNT)
@@ -104,7 +100,7 @@ valves = st.sampled_from([{}, {"valve": Valve(orifice_diameter=0.8e-3), "fluid":
 
 @settings(max_examples=10)
 @given(commands, valves)
-def test_the_fluid_pumped_is_what_the_pin_rose_by(script: list[float], parts: dict[str, object]) -> None:
+def test_the_fluid_pumped_is_what_the_pin_rose_by(script, parts):
     # Flow of the exact opening by a fine sum, through the law itself; no load, no end stop, no dead time.
     system = one_cell(dead_time=0.0, control=scripted(lambda t, x, y: script[round(t / 5e-3)]), **parts)
     run = record(system, make_level(np.zeros(1), np.array([[0, 0, 1.0]])), len(script))
@@ -139,13 +135,13 @@ class Everywhere:
 
     rows = 0
 
-    def begin(self) -> Any:
+    def begin(self):
         return self.inner.begin()
 
-    def locate(self, memory: Any, touched: Measurement) -> tuple[Any, tuple[float, float, float]]:
+    def locate(self, memory, touched):
         return self.inner.locate(memory, touched)[0], (0.0, 0.0, 1.0)
 
-    def command(self, memory: Any, seen: Measurement) -> tuple[Any, Commands]:
+    def command(self, memory, seen):
         return self.inner.command(memory, seen)
 
 
@@ -181,7 +177,7 @@ def test_only_cells_around_a_touch_are_integrated_until_the_surface_is_at_rest(s
     assert least <= run.last.active.cells.size <= most
 
 
-def test_pins_that_rise_into_a_still_finger_meet_it_at_once() -> None:
+def test_pins_that_rise_into_a_still_finger_meet_it_at_once():
     # The finger waits 1 mm above; which cells it may touch was settled before they rose.
     system = make_system(Layout(9, 9), control=scripted(lambda t, x, y: 1.0))
     run = record(system, path((0, 0, 0, 41)), 40)
@@ -203,7 +199,7 @@ MIDDLE = WAYPOINTS * [1, 0, 0, 1, 1, 0, 0, 0]
 MIRRORED_X, MIRRORED_Y = np.array([1, -1, 1, 1, 1, 1, -1, -1]), np.array([1, 1, -1, 1, 1, -1, 1, -1])
 
 
-def turned(points: Floats) -> Floats:
+def turned(points):
     t, x, y, z, *q = points.T
     half = np.sqrt(0.5)
     w, qx, qy, qz = q
@@ -212,7 +208,7 @@ def turned(points: Floats) -> Floats:
 
 
 #: Name: arrangement, shape of the bed, what is done to the path, and to rows and columns of cells.
-CASES: dict[str, tuple[str, tuple[int, int], Callable[[Floats], Floats], Callable[[Floats], Floats]]] = {
+CASES = {
     "mirrored": ("aligned", (9, 12), lambda p: p * MIRRORED_X, lambda h: h[:, :, ::-1]),
     "mirrored, odd": ("aligned", (11, 11), lambda p: p * MIRRORED_X, lambda h: h[:, :, ::-1]),
     "rotated by 90": ("aligned", (11, 11), turned, lambda h: h.transpose(0, 2, 1)[:, :, ::-1]),
@@ -222,7 +218,7 @@ CASES: dict[str, tuple[str, tuple[int, int], Callable[[Floats], Floats], Callabl
 }
 
 
-def formed(arrangement: str, shape: tuple[int, int], points: Floats, profile: str) -> tuple[Floats, Floats]:
+def formed(arrangement, shape, points, profile):
     system = make_system(
         Layout(*shape, 3e-3, arrangement), control=VirtualMaster(), blister=Blister(profile=profile)
     )
@@ -239,7 +235,7 @@ def formed(arrangement: str, shape: tuple[int, int], points: Floats, profile: st
         *(("mirrored, odd", MIDDLE, profile) for profile in ("cone", "gaussian")),
     ],
 )
-def test_a_moved_scene_gives_the_moved_result(case: str, points: Floats, profile: str) -> None:
+def test_a_moved_scene_gives_the_moved_result(case, points, profile):
     arrangement, shape, points_moved, cells_moved = CASES[case]
     height, force = formed(arrangement, shape, points, profile)
     moved_height, moved_force = formed(arrangement, shape, points_moved(points), profile)

@@ -28,17 +28,17 @@ def beds(draw):
     return layout, height
 
 
-def bed(rows: int, columns: int, arrangement: str):
+def bed(rows, columns, arrangement):
     height = np.random.default_rng(rows).uniform(0.0, 0.1, rows * columns)
     return Layout(rows=rows, columns=columns, arrangement=arrangement), height
 
 
-def made(layout: Layout, height: np.ndarray, mirror: float = 1.0) -> trimesh.Trimesh:
+def made(layout, height, mirror=1.0):
     place = make_grid(layout).positions * (mirror, 1.0)
     return trimesh.Trimesh(*make_solid(place, height, layout.rows, layout.columns), process=False)
 
 
-def volume(layout: Layout, height: np.ndarray) -> float:
+def volume(layout, height):
     return prism_volume(make_grid(layout).positions, height, layout.rows, layout.columns)
 
 

@@ -1,19 +1,17 @@
 """What one control period of smoothing makes of any relief, under any disc."""
 
 import numpy as np
-from digiclay.core.base.arrays import Floats
 from digiclay.core.control.exchange import make_exchange
 from digiclay.core.control.orders import STRONGEST, Orders, Verb, order_periods
 from digiclay.core.model.control_interface import Measurement
-from digiclay.core.model.layout import Grid, Layout, make_grid
+from digiclay.core.model.layout import Layout, make_grid
 from digiclay.core.model.null_parts import Uncontrolled
-from digiclay.core.model.physics import Cell
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.toml_table import resolve
 from hypothesis import given
 from hypothesis import strategies as st
 
-CELL: Cell = assemble(resolve({})).cell
+CELL = assemble(resolve({})).cell
 STROKE = CELL.actuator.stroke
 layouts = st.builds(
     Layout,
@@ -31,7 +29,7 @@ orders = st.tuples(
 )
 
 
-def measure_steps(grid: Grid, height: Floats) -> float:
+def measure_steps(grid, height):
     pairs = make_exchange(grid, 1e-6, 1e-3).find_pairs(np.arange(grid.count))
     return float(sum(share * ((height[one] - height[other]) ** 2).sum() for one, other, share in pairs))
 

@@ -9,7 +9,6 @@ exponent moved by a part in 1e15, which is what rounding does, moves these force
 """
 
 import json
-from typing import Any
 
 import pytest
 
@@ -27,24 +26,24 @@ TOLERANCES = {
 
 
 @pytest.fixture(scope="module")
-def golden() -> dict[str, Any]:
+def golden():
     """Return the present numbers."""
     return collect_golden()
 
 
 @pytest.mark.parametrize("name", TOLERANCES)
-def test_the_numbers_of_the_runs_are_what_they_were(golden: dict[str, Any], name: str) -> None:
+def test_the_numbers_of_the_runs_are_what_they_were(golden, name):
     stored = json.loads(GOLDEN.read_text(encoding="utf-8"))
     assert golden[name] == pytest.approx(stored[name], **TOLERANCES[name])
 
 
-def test_a_part_in_1e9_is_seen() -> None:
+def test_a_part_in_1e9_is_seen():
     stored = json.loads(GOLDEN.read_text(encoding="utf-8"))
     moved = run_golden(f"contact.exponent={2000.0 * (1.0 + 1e-9)!r}")
     for name, found in moved.items():
         assert found != pytest.approx(stored[name], **TOLERANCES[name])
 
 
-def test_every_parameter_is_declared_as_it_was(golden: dict[str, Any]) -> None:
+def test_every_parameter_is_declared_as_it_was(golden):
     stored = json.loads(GOLDEN.read_text(encoding="utf-8"))
     assert json.loads(json.dumps(golden["parameters"])) == stored["parameters"]

@@ -43,7 +43,7 @@ SHAKEN = 1e-15
 HEIGHT, FORCE = 1e-6, 1e-3
 
 
-def shake(values: Floats, random: np.random.Generator) -> Floats:
+def shake(values, random):
     """Return values moved by a part in 1e15 at most."""
     return values * (1.0 + SHAKEN * random.uniform(-1.0, 1.0, values.shape))
 
@@ -55,26 +55,26 @@ class Shaken:
     inner: Any
     random: np.random.Generator
 
-    def __getattr__(self, name: str) -> Any:
+    def __getattr__(self, name):
         return getattr(self.inner, name)
 
-    def _read(self, seen: Any) -> Any:
+    def _read(self, seen):
         ones, *others = seen.quadratic_basis
         basis = np.array([ones, *(shake(row, self.random) for row in others)])
         force, height = shake(seen.force, self.random), shake(seen.height, self.random)
         return seen._replace(quadratic_basis=basis, force=force, height=height)
 
-    def locate(self, memory: Any, touched: Any) -> Any:
+    def locate(self, memory, touched):
         """Locate the fingertip by shaken measurements."""
         return self.inner.locate(memory, self._read(touched))
 
-    def command(self, memory: Any, seen: Any) -> Any:
+    def command(self, memory, seen):
         """Command cells by shaken measurements."""
         return self.inner.command(memory, self._read(seen))
 
-    def poses(self, times: Floats) -> Floats:
+    def poses(self, times):
         """Return poses (k, 7), each coordinate of the place shaken by one and the same part."""
-        poses: Floats = self.inner.poses(times).copy()
+        poses = self.inner.poses(times).copy()
         poses[:, :3] *= shake(np.ones(3), np.random.default_rng(1))
         return poses
 
@@ -94,9 +94,7 @@ class Shaken:
         pytest.param("edge_of_bed", "hybrid", 2.2, 0, id="III: a pin at the rim, on a line of symmetry"),
     ],
 )  # fmt: skip
-def test_a_run_is_the_same_when_all_it_reads_is_shaken(
-    name: str, method: str, lasting: float, seed: int
-) -> None:
+def test_a_run_is_the_same_when_all_it_reads_is_shaken(name, method, lasting, seed):
     scene = sample(name, f"control.method={method}", f"simulation.duration={lasting}")
     if scene.shape:
         pytest.importorskip("PIL.Image", reason="the shape is a picture")
@@ -121,8 +119,8 @@ def test_a_run_is_the_same_when_all_it_reads_is_shaken(
     ],
 )
 def test_a_fingertip_at_the_very_height_of_pins_is_as_one_a_rounding_error_above_or_below(
-    method: str, apart: float, depth: float
-) -> None:
+    method, apart, depth
+):
     system = assemble(scene(method, PAPER_FINGER, PAPER_FINGER))
     poses = press(system, [(1.5e-3, 1.5e-3), (1.5e-3 + apart, 1.5e-3)], (0.0, 12e-3), 120)
     poses[..., 3:] = LEVEL
@@ -147,13 +145,13 @@ RELIEFS = {
 }
 
 
-def _ridge(x: Floats, y: Floats) -> Floats:
+def _ridge(x, y):
     return np.maximum(1.0 - abs(y) / 9.0, 0.0) * (abs(x) <= 24.0)
 
 
 @pytest.mark.parametrize("arrangement", ["aligned", "hexagonal"])
 @pytest.mark.parametrize("relief", RELIEFS)
-def test_features_and_triangles_are_the_same_when_heights_are_shaken(relief: str, arrangement: str) -> None:
+def test_features_and_triangles_are_the_same_when_heights_are_shaken(relief, arrangement):
     grid, random = make_grid(Layout(25, 25, 3e-3, arrangement)), np.random.default_rng(2)
     heights = 40e-3 + 1e-3 * RELIEFS[relief](grid.x * 1e3, grid.y * 1e3)
     skins = []
@@ -192,10 +190,10 @@ class Drawn:
     """Heights above 40 mm, mm, at places x, y, mm."""
     accumulate: bool = False
 
-    def form(self, random: np.random.Generator | None) -> tuple[Floats, Floats]:
+    def form(self, random):
         """Return places and turns, (t, 12 m), and nominal heights (n,), m, shaken at random, if at all."""
 
-        def read(values: Any) -> Floats:
+        def read(values):
             return np.array(values) if random is None else shake(np.array(values), random)
 
         bed = read(40e-3 + 1e-3 * self.rise(CELLS.x * 1e3, CELLS.y * 1e3))
@@ -259,7 +257,7 @@ STROKES = {
 
 
 @pytest.mark.parametrize("name", STROKES)
-def test_a_stroke_goes_the_same_way_when_all_it_reads_is_shaken(name: str) -> None:
+def test_a_stroke_goes_the_same_way_when_all_it_reads_is_shaken(name):
     poses, nominal = STROKES[name].form(None)
     assert len(poses) > 3
     for seed in range(4):
@@ -270,7 +268,7 @@ def test_a_stroke_goes_the_same_way_when_all_it_reads_is_shaken(name: str) -> No
 
 
 @pytest.mark.parametrize("arrangement", ["aligned", "hexagonal"])
-def test_a_disc_holds_the_cells_on_its_edge_in_a_batch_as_alone(arrangement: str) -> None:
+def test_a_disc_holds_the_cells_on_its_edge_in_a_batch_as_alone(arrangement):
     grid, random = make_grid(Layout(25, 25, 3e-3, arrangement)), np.random.default_rng(0)
     middles = grid.positions[grid.disc(0.0, 0.0, 9e-3)]
     for radius in (6e-3, 9e-3, 15e-3):
@@ -284,13 +282,13 @@ def test_a_disc_holds_the_cells_on_its_edge_in_a_batch_as_alone(arrangement: str
             )
 
 
-def test_a_fingertip_that_hovers_exactly_on_a_pin_changes_nothing_of_what_another_presses_there() -> None:
+def test_a_fingertip_that_hovers_exactly_on_a_pin_changes_nothing_of_what_another_presses_there():
     bed = replaying((PAPER_FINGER,) * 2, np.zeros((30, 1)), layout=Layout(1, 1))
     forces = []
     for seed in range(6):
         random = np.random.default_rng(seed)
 
-        def hover(_: float, random: np.random.Generator = random) -> Floats:
+        def hover(_, random=random):
             return np.array([0.0, 0.0, *shake(np.array([REST]), random), *LEVEL])
 
         forces.append(play(bed, at_times(bed, [rock(0), hover], 30))[1])
@@ -300,9 +298,7 @@ def test_a_fingertip_that_hovers_exactly_on_a_pin_changes_nothing_of_what_anothe
 
 @pytest.mark.parametrize("arrangement", ["aligned", "hexagonal"])
 @pytest.mark.parametrize("level", [1 / 3, 0.7])
-def test_a_level_picture_forms_a_level_bed_up_to_pins_midway_to_pixels_without_data(
-    level: float, arrangement: str
-) -> None:
+def test_a_level_picture_forms_a_level_bed_up_to_pins_midway_to_pixels_without_data(level, arrangement):
     grid, random, covered = make_grid(Layout(24, 24, 3e-3, arrangement)), np.random.default_rng(0), []
     without = np.tile(np.arange(24) > 20, (24, 1))
     at_pins = Placement(3e-3, 3e-3, float(grid.x[0]), float(grid.y[0]) - 1.5e-3)
@@ -310,6 +306,6 @@ def test_a_level_picture_forms_a_level_bed_up_to_pins_midway_to_pixels_without_d
         shaken = replace(grid, x=shake(grid.x, random), y=shake(grid.y, random))
         picture = make_height_map("level", np.full((103, 101), level))
         assert np.ptp(fit_relief(Shape(), picture, shaken, Actuator()).heights) < HEIGHT
-        masked: Any = np.ma.array(np.full(without.shape, level), mask=without)  # type: ignore[no-untyped-call]
+        masked = np.ma.array(np.full(without.shape, level), mask=without)  # type: ignore[no-untyped-call]
         covered.append(make_height_map("half", masked).tops(shaken, at_pins).covered)
     np.testing.assert_array_equal(covered[1:], covered[:1] * 3)

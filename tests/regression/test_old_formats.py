@@ -1,15 +1,13 @@
 """Files of older versions: scenes, kept states and takes are what they were; see tests/samples."""
 
 import tomllib
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
-from digiclay.core.base.quantity import Parameters, list_quantities
+from digiclay.core.base.quantity import list_quantities
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.scene_source import load
-from digiclay.core.scene.schema import SECTIONS, Scene
+from digiclay.core.scene.schema import SECTIONS
 from digiclay.core.scene.toml_table import ABSENT, format_scene
 from digiclay.core.session import snapshot
 from digiclay.core.session.take import from_bytes
@@ -32,9 +30,9 @@ STATES = sorted(SAMPLES.glob("states/*.state"))
 TAKES = sorted(SAMPLES.glob("takes/*.take"))
 
 
-def values(scene: Scene) -> dict[str, Any]:
+def values(scene):
     """Return a scene's values as the tables of a TOML file that spells out all that older versions know."""
-    table: dict[str, Any] = {name: getattr(scene, name) for name in ("name", "description", "preset")}
+    table = {name: getattr(scene, name) for name in ("name", "description", "preset")}
     for section in SECTIONS:
         part = scene.section(section)
         if part is not None:
@@ -49,29 +47,29 @@ def values(scene: Scene) -> dict[str, Any]:
     return table
 
 
-def known(part: Parameters, name: str) -> bool:
+def known(part, name):
     """Tell whether an older version knows a parameter; a later one counts where it is not the default."""
     default = type(part).__dataclass_fields__[name].default
     later = list_quantities(part)[name].later or name in part.list_idle()
     return not later or getattr(part, name) != default
 
 
-def listed(value: Any) -> Any:
+def listed(value):
     """Return a tuple as TOML has it."""
     return list(value) if isinstance(value, tuple) else value
 
 
-def without_notes(text: str) -> list[str]:
+def without_notes(text):
     """Return the lines of a written scene without the notes that say what the values are."""
     return [line.partition("  # ")[0] for line in text.splitlines()]
 
 
-def test_there_are_samples_of_each_format() -> None:
+def test_there_are_samples_of_each_format():
     assert (len(WRITTEN), len(BY_HAND), len(STATES), len(TAKES)) == (30, 3, 8, 6)
 
 
 @pytest.mark.parametrize("path", WRITTEN, ids=lambda path: f"{path.parent.name}/{path.stem}")
-def test_a_scene_of_an_older_version_is_what_it_was_and_written_as_older_versions_read_it(path: Path) -> None:
+def test_a_scene_of_an_older_version_is_what_it_was_and_written_as_older_versions_read_it(path):
     text = path.read_text(encoding="utf-8")
     scene = load(path)
     assert values(scene) == tomllib.loads(text)
@@ -79,7 +77,7 @@ def test_a_scene_of_an_older_version_is_what_it_was_and_written_as_older_version
 
 
 @pytest.mark.parametrize("path", BY_HAND, ids=lambda path: path.stem)
-def test_a_scene_written_by_hand_still_resolves_to_the_same_values(path: Path) -> None:
+def test_a_scene_written_by_hand_still_resolves_to_the_same_values(path):
     written = values(load(path.with_name(path.name.replace("by_hand", "written"))))
     found, stated = values(load(path)), tomllib.loads(path.read_text(encoding="utf-8"))
     for section, own in stated.items():  # what is left out are defaults, which may change
@@ -107,7 +105,7 @@ def test_a_kept_state_of_an_older_version_is_what_it_was_and_the_session_goes_on
 
 
 @pytest.mark.parametrize("path", TAKES, ids=lambda path: path.stem)
-def test_a_take_of_an_older_version_is_played_as_it_was(path: Path) -> None:
+def test_a_take_of_an_older_version_is_played_as_it_was(path):
     take, known = from_bytes(path.read_bytes()), np.load(path.with_suffix(".npz"))
     np.testing.assert_array_equal(take.poses, known["poses"][:, None])
     np.testing.assert_allclose(go_on(path)["height"], known["height"], rtol=0.0, atol=ROUNDING)

@@ -7,15 +7,12 @@ its reason: other processors and other versions of numpy take sums in another or
 import json
 import shutil
 import tomllib
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 from digiclay.cli import main
 from digiclay.core.metrics.summary import compute_metrics
 from digiclay.core.scene.scene_source import load
-from digiclay.core.scene.schema import Scene
 from digiclay.core.session.run_scene import save
 
 from tests.renew import SAMPLES, run_again
@@ -30,24 +27,24 @@ TOLERANCES = {"force": 1e-11, "total_force": 1e-10, "height": 1e-13, "command": 
 CIRCUMSTANCES = ("run_time", "real_time_factor", "versions")
 
 
-def scene_of(name: str) -> Scene:
+def scene_of(name):
     """Return the scene that was run."""
     return load(RUNS / name / "scene.toml")
 
 
-def history_of(name: str) -> dict[str, Any]:
+def history_of(name):
     """Return what was recorded."""
     with np.load(RUNS / name / "history.npz", allow_pickle=False) as file:
         return dict(file)
 
 
-def metrics_of(folder: Path) -> dict[str, Any]:
+def metrics_of(folder):
     """Return what was measured, without the circumstances."""
-    metrics: dict[str, Any] = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))
+    metrics = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))
     return {name: value for name, value in metrics.items() if name not in CIRCUMSTANCES}
 
 
-def check_metrics(found: dict[str, Any], stored: dict[str, Any], rounding: float) -> None:
+def check_metrics(found, stored, rounding):
     """Check that metrics are the stored ones, numbers but for rounding; a newer version may have more."""
     assert [name for name in found if name in stored] == list(stored)
     for name, value in stored.items():
@@ -61,7 +58,7 @@ def check_metrics(found: dict[str, Any], stored: dict[str, Any], rounding: float
 
 
 @pytest.mark.parametrize("name", ALL)
-def test_an_older_scene_gives_the_same_folder(name: str, tmp_path: Path) -> None:
+def test_an_older_scene_gives_the_same_folder(name, tmp_path):
     scene, stored = scene_of(name), metrics_of(RUNS / name)
     again = run_again(scene, stored)
     save(again, tmp_path)
@@ -82,7 +79,7 @@ def test_an_older_scene_gives_the_same_folder(name: str, tmp_path: Path) -> None
 
 
 @pytest.mark.parametrize("name", RECORDED)
-def test_commands_read_an_older_folder(name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_commands_read_an_older_folder(name, tmp_path, capsys):
     export = ["export", "--format", "stl,3mf", "--kind", "features"]
     for command, files in (
         (export, {"features.stl", "features.3mf"}),
@@ -96,7 +93,7 @@ def test_commands_read_an_older_folder(name: str, tmp_path: Path, capsys: pytest
 
 
 @pytest.mark.parametrize("name", ALL)
-def test_an_older_folder_is_a_scene_for_run_and_form_and_may_be_replaced(name: str, tmp_path: Path) -> None:
+def test_an_older_folder_is_a_scene_for_run_and_form_and_may_be_replaced(name, tmp_path):
     older = tmp_path / "older"
     shutil.copytree(RUNS / name, older)
     command = ["run", str(RUNS / "without_recorder"), "--no-errors", "--quiet", "--out", str(older)]

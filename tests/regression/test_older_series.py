@@ -3,7 +3,6 @@
 import csv
 import shutil
 from pathlib import Path
-from typing import Any
 
 import pytest
 from digiclay.cli import main
@@ -26,7 +25,7 @@ BATCH = ["batch", "jobs.toml", "--out", "batch", "--quiet"]
 
 
 @pytest.fixture(autouse=True)
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def here(tmp_path, monkeypatch):
     """Work beside copies of the samples, as the version that made them."""
     shutil.copytree(SAMPLES, tmp_path, dirs_exist_ok=True)
     monkeypatch.chdir(tmp_path)
@@ -35,12 +34,12 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def times(pattern: str) -> dict[Path, int]:
+def times(pattern):
     """Return when each file of a pattern was written, ns."""
     return {path: path.stat().st_mtime_ns for path in Path().glob(pattern)}
 
 
-def numbers(table: Path) -> list[list[float]]:
+def numbers(table):
     """Return the first columns of a sweep's table, those of older ones, of which no point has failed."""
     with table.open(encoding="utf-8", newline="") as file:
         rows = list(csv.reader(file))[1:]
@@ -48,7 +47,7 @@ def numbers(table: Path) -> list[list[float]]:
     return [[float(value) for value in row[:5]] for row in rows]
 
 
-def test_an_older_sweep_that_is_done_is_shown_as_it_was() -> None:
+def test_an_older_sweep_that_is_done_is_shown_as_it_was():
     before, known = times("sweep/points/*"), numbers(Path("sweep/sweep.csv"))
     Path("sweep/sweep.csv").unlink()
     assert main(SWEEP) == 0
@@ -56,13 +55,13 @@ def test_an_older_sweep_that_is_done_is_shown_as_it_was() -> None:
     assert sorted(path.stem for path in Path("sweep").glob("*.png")) == ["height_error", "lag_mean", "rfd"]
 
 
-def test_an_older_sweep_of_another_scene_is_refused(refused: Any) -> None:
+def test_an_older_sweep_of_another_scene_is_refused(refused):
     before = times("sweep/points/*")
     refused([*SWEEP, "--set", "contact.stiffness=300"], "sweep holds another sweep (10 points over")
     assert times("sweep/points/*") == before
 
 
-def test_an_older_sweep_that_was_stopped_goes_on_to_the_same_table() -> None:
+def test_an_older_sweep_that_was_stopped_goes_on_to_the_same_table():
     assert main([*SWEEP, "--workers", "1", "--out", "anew"]) == 0
     anew, stored = numbers(Path("anew/sweep.csv")), numbers(Path("sweep/sweep.csv"))
     for index in range(1, 10, 2):  # the beds of four rows, which make one stack
@@ -76,7 +75,7 @@ def test_an_older_sweep_that_was_stopped_goes_on_to_the_same_table() -> None:
         assert row == pytest.approx(values, rel=1e-9, abs=1e-12)
 
 
-def test_an_older_batch_that_is_done_is_shown_and_one_that_was_stopped_goes_on() -> None:
+def test_an_older_batch_that_is_done_is_shown_and_one_that_was_stopped_goes_on():
     before = times("batch/runs/*/*")
     Path("batch/index.html").unlink()
     assert main(BATCH) == 0

@@ -7,26 +7,24 @@ erases the ridge, loses the finger or shakes it does not pass unnoticed.
 import numpy as np
 import pytest
 from digiclay.core.base.modes import Mode
-from digiclay.core.engine.system import System
 from digiclay.core.scene.assembly import assemble
 from numpy.typing import NDArray
 
-from tests.assemble import Record, record, sample
+from tests.assemble import record, sample
 
 Floats = NDArray[np.float64]
-Run = tuple[System, Record]
 
 SCENE = sample("ridge_mound_valley")
 
 
 @pytest.fixture(scope="module")
-def session() -> Run:
+def session():
     """The whole session at the default step."""
     system = assemble(SCENE)
     return system, record(system, SCENE.section("trajectory").trajectory(), SCENE.periods)
 
 
-def between(session: Run, start: float, end: float) -> tuple[Floats, Floats]:
+def between(session, start, end):
     """Return total force, and distance of the forces' centroid from the finger, while it touches."""
     system, run = session
     rows = (run.time >= start) & (run.time < end) & (run.force.sum(axis=1) > 0.0)
@@ -38,21 +36,21 @@ def between(session: Run, start: float, end: float) -> tuple[Floats, Floats]:
 
 @pytest.mark.parametrize(("start", "end"), [(5.5, 10.0), (18.5, 25.0)], ids=["ridge", "valley"])
 def test_the_force_stays_near_its_set_point_and_the_blister_under_the_finger_while_it_drags(
-    session: Run, start: float, end: float
-) -> None:
+    session, start, end
+):
     total, lag = between(session, start, end)
     assert np.sqrt(np.mean((total - 0.4) ** 2)) < 0.03  # a prototype showed 0.02 N
     assert lag.max() < 2e-3  # two thirds of a pitch
 
 
-def test_the_finger_is_never_lost_but_where_it_is_lifted_off(session: Run) -> None:
+def test_the_finger_is_never_lost_but_where_it_is_lifted_off(session):
     losses = np.array([memory.losses for memory in session[1].memory])
     assert np.flatnonzero(np.diff(losses)) * 5e-3 == pytest.approx([13.4, 25.7], abs=0.15)
     # Twice the balance force of 0.157 N, in the fast push at the start; a locked pin would carry newtons.
     assert session[1].force.max() < 0.4
 
 
-def test_ridge_mound_and_valley_have_their_heights_and_are_level_and_symmetric(session: Run) -> None:
+def test_ridge_mound_and_valley_have_their_heights_and_are_level_and_symmetric(session):
     run = session[1]
     heights = run.height[-1].reshape(25, 25)
     # Short of the place where the finger is lifted off, which the blister follows up for a moment.

@@ -4,7 +4,6 @@ import os
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -27,7 +26,7 @@ ENVIRONMENT = {name: value for name, value in os.environ.items() if not name.sta
 }
 
 
-def git(folder: Path, *words: str) -> str:
+def git(folder, *words):
     command = ["git", "-c", "safe.directory=*", *words]
     done = subprocess.run(
         command, cwd=folder, env=ENVIRONMENT, capture_output=True, text=True, timeout=TIMEOUT, check=True
@@ -35,12 +34,12 @@ def git(folder: Path, *words: str) -> str:
     return done.stdout
 
 
-def commit(folder: Path) -> None:
+def commit(folder):
     git(folder, "add", "--all")
     git(folder, "commit", "-q", "--allow-empty", "-m", "tests: a copy")
 
 
-def clone(source: Path, folder: Path) -> Path:
+def clone(source, folder):
     git(source, "clone", "-q", "--no-tags", str(source), str(folder))
     for name, value in {"user.name": "A Tester", "user.email": "tester@example.org"}.items():
         git(folder, "config", name, value)
@@ -49,7 +48,7 @@ def clone(source: Path, folder: Path) -> Path:
     return folder
 
 
-def copy_checkout(folder: Path) -> Path:
+def copy_checkout(folder):
     clone(ROOT, folder)
     listed = git(ROOT, "ls-files", "-co", "--exclude-standard", "-z").split("\0")
     for name in filter(None, listed):
@@ -62,13 +61,11 @@ def copy_checkout(folder: Path) -> Path:
     return folder
 
 
-def release_command(folder: Path, version: str = __version__) -> list[str]:
+def release_command(folder, version=__version__):
     return [sys.executable, str(folder / "tools" / "make_release.py"), version]
 
 
-def run_release(
-    folder: Path, version: str = __version__, umask: int = 0o022, **added: str
-) -> subprocess.CompletedProcess[str]:
+def run_release(folder, version=__version__, umask=18, **added):
     return subprocess.run(
         release_command(folder, version),
         cwd=folder.parent,
@@ -80,15 +77,15 @@ def run_release(
     )
 
 
-def leftovers(folder: Path) -> list[str]:
+def leftovers(folder):
     places = ("dist/*", "build/release-*", "build/lib", "addon/*.egg-info")
     found = [str(path.relative_to(folder)) for place in places for path in folder.glob(place)]
     return [*found, *git(folder, "tag").split(), *git(folder, "status", "--porcelain").splitlines()]
 
 
-def edit(name: str, old: str, new: str) -> Callable[[Path], None]:
+def edit(name, old, new):
 
-    def change(folder: Path) -> None:
+    def change(folder):
         text = (folder / name).read_text(encoding="utf-8")
         assert old in text, f"{name} has no {old!r}"
         (folder / name).write_text(text.replace(old, new, 1), encoding="utf-8")
@@ -98,17 +95,17 @@ def edit(name: str, old: str, new: str) -> Callable[[Path], None]:
 
 
 @pytest.fixture(scope="session")
-def original(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def original(tmp_path_factory):
     return copy_checkout(tmp_path_factory.mktemp("original") / "checkout")
 
 
 @pytest.fixture
-def checkout(original: Path, tmp_path: Path) -> Path:
+def checkout(original, tmp_path):
     return clone(original, tmp_path / "checkout")
 
 
 @pytest.fixture(scope="session")
-def released(original: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def released(original, tmp_path_factory):
     folder = clone(original, tmp_path_factory.mktemp("release") / "released")
     done = run_release(folder)
     assert done.returncode == 0, done.stderr
@@ -116,10 +113,10 @@ def released(original: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="session")
-def wheel(released: Path) -> Path:
+def wheel(released):
     return released / FOLDER / f"digiclay-{__version__}-py3-none-any.whl"
 
 
 @pytest.fixture(scope="session")
-def extension_zip(released: Path) -> Path:
+def extension_zip(released):
     return released / FOLDER / f"digiclay-{__version__}.zip"

@@ -35,9 +35,7 @@ class BarePython:
     folder: Path
     pins: dict[str, str]
 
-    def run(
-        self, *words: str | Path, cwd: Path, path: str = "", limit: float = TIMEOUT
-    ) -> subprocess.CompletedProcess[str]:
+    def run(self, *words, cwd, path="", limit=TIMEOUT):
         """Run a program of the environment, which imports nothing from elsewhere but from `path`."""
         environment = {name: value for name, value in os.environ.items() if not name.startswith("PYTHON")}
         return subprocess.run(
@@ -50,24 +48,24 @@ class BarePython:
         )
 
 
-def read_pins(name: str) -> dict[str, str]:
+def read_pins(name):
     text = (ROOT / "requirements" / f"{name}.txt").read_text(encoding="utf-8")
     return dict(re.findall(r"^([\w-]+)==([\w.]+)$", text, re.MULTILINE))
 
 
-def _carry_out(*command: str | Path) -> str:
+def _carry_out(*command):
     environment = {**os.environ, "GOAL": "test-release", "PYTHONPATH": ""}
     done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True, timeout=TIMEOUT)
     assert done.returncode == 0, f"{done.stdout[-2000:]}{done.stderr[-2000:]}"
     return done.stdout
 
 
-def _install(environment: Path, *words: str | Path) -> None:
+def _install(environment, *words):
     pip = (environment / "bin" / "python", "-m", "pip", "--disable-pip-version-check", "install", "--quiet")
     _carry_out(*pip, "--retries", "5", *words)
 
 
-def make_bare(folder: Path, version: str, wheel: Path, pins: str) -> BarePython:
+def make_bare(folder, version, wheel, pins):
     """Make an environment of a Python (``3.12``); install the wheel, pinned by a file of requirements/."""
     variable = f"PYTHON{version.replace('.', '')}"
     python = _carry_out(ROOT / "tools" / "find-python", version, variable, os.environ.get(variable, ""))
@@ -77,16 +75,16 @@ def make_bare(folder: Path, version: str, wheel: Path, pins: str) -> BarePython:
     return BarePython(folder, read_pins(pins) if pins else {})
 
 
-def install_pytest(bare: BarePython, folder: Path) -> None:
+def install_pytest(bare, folder):
     pins = read_pins("test")
     _install(bare.folder, "--target", folder, *(f"{name}=={pins[name]}" for name in ("pytest", "hypothesis")))
 
 
 @functools.cache
-def _needed(path: Path) -> frozenset[str]:
-    found: set[str] = set()
+def _needed(path):
+    found = set()
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-        names: list[str] = []
+        names = []
         if isinstance(node, ast.Import):
             names = [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
@@ -100,10 +98,10 @@ def _needed(path: Path) -> frozenset[str]:
     return frozenset(found)
 
 
-def find_core_tests() -> list[str]:
+def find_core_tests():
     """Return the files of tests that need the core and nothing that the wheel does not bring along."""
 
-    def fits(path: Path) -> bool:
+    def fits(path):
         names = _needed(path)
         others = [name for name in names if name.split(".")[0] not in CORE_ONLY]
         return any(names) and bool(others) and all(name.startswith("digiclay.core") for name in others)
@@ -114,13 +112,13 @@ def find_core_tests() -> list[str]:
 
 
 @pytest.fixture(scope="module", params=KINDS)
-def bare(request: pytest.FixtureRequest, wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> BarePython:
+def bare(request, wheel, tmp_path_factory):
     folder = tmp_path_factory.mktemp("bare") / request.param
     return make_bare(folder, request.param, wheel, KINDS[request.param])
 
 
 @pytest.fixture(scope="module")
-def tap(bare: BarePython, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def tap(bare, tmp_path_factory):
     folder = tmp_path_factory.mktemp("runs")
     done = bare.run("digiclay", "run", "tap", "--out", "tap", cwd=folder)
     assert (done.returncode, done.stderr) == (0, "")
@@ -130,13 +128,13 @@ def tap(bare: BarePython, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def tap_here(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def tap_here(tmp_path_factory):
     folder = tmp_path_factory.mktemp("here") / "tap"
     assert main(["run", "tap", "--out", str(folder), "--quiet"]) == 0
     return folder
 
 
-def test_nothing_is_installed_but_the_package_and_its_libraries(bare: BarePython, tmp_path: Path) -> None:
+def test_nothing_is_installed_but_the_package_and_its_libraries(bare, tmp_path):
     done = bare.run("python", "-m", "pip", "list", "--format", "json", cwd=tmp_path)
     found = {one["name"]: one["version"] for one in json.loads(done.stdout)}
     assert set(found) - {"pip", "setuptools"} == {"digiclay", "numpy", "trimesh"}
@@ -145,7 +143,7 @@ def test_nothing_is_installed_but_the_package_and_its_libraries(bare: BarePython
     assert bare.run("python", "-m", "pip", "check", cwd=tmp_path).returncode == 0
 
 
-def test_the_run_is_the_same_as_with_our_versions(tap: Path, tap_here: Path) -> None:
+def test_the_run_is_the_same_as_with_our_versions(tap, tap_here):
     runs = [np.load(folder / "history.npz") for folder in (tap, tap_here)]
     assert set(runs[0].files) == set(runs[1].files)
     heights = [run["height"] for run in runs]
@@ -153,7 +151,7 @@ def test_the_run_is_the_same_as_with_our_versions(tap: Path, tap_here: Path) -> 
     np.testing.assert_allclose(heights[0], heights[1], rtol=0, atol=ROUNDING)
 
 
-def test_runs_are_exported_and_shapes_formed_without_another_library(bare: BarePython, tap: Path) -> None:
+def test_runs_are_exported_and_shapes_formed_without_another_library(bare, tap):
     formats = ("stl", "obj", "ply", "glb", "3mf")
     done = bare.run("digiclay", "export", "tap", "--format", ",".join(formats), cwd=tap.parent)
     assert done.returncode == 0, done.stderr
@@ -162,13 +160,13 @@ def test_runs_are_exported_and_shapes_formed_without_another_library(bare: BareP
     assert (done.returncode, "25 x 25 = 625 cells" in done.stdout) == (0, True), done.stderr
 
 
-def test_a_missing_library_is_one_line(bare: BarePython, tap: Path) -> None:
+def test_a_missing_library_is_one_line(bare, tap):
     done = bare.run("digiclay", "plot", "tap", cwd=tap.parent)
     assert (done.returncode, done.stderr.count("\n")) == (2, 1)
     assert "pip install digiclay[plots]" in done.stderr
 
 
-def test_the_tests_of_the_core_pass(bare: BarePython, tmp_path: Path) -> None:
+def test_the_tests_of_the_core_pass(bare, tmp_path):
     if not bare.pins:
         return  # between the lowest and the highest versions, which are tested
     files = find_core_tests()
@@ -178,5 +176,4 @@ def test_the_tests_of_the_core_pass(bare: BarePython, tmp_path: Path) -> None:
     done = bare.run("python", *words, cwd=ROOT, path=str(tmp_path / "pytest"), limit=5 * TIMEOUT)
     assert done.returncode == 0, done.stdout[-4000:] + done.stderr[-1000:]
     passed = re.search(r"(\d+) passed", done.stdout)
-    assert passed is not None
     assert int(passed[1]) > 1000

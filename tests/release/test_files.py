@@ -25,7 +25,7 @@ KINDS = re.compile(
 
 
 @pytest.fixture(scope="module")
-def contents(extension_zip: Path) -> dict[str, bytes]:
+def contents(extension_zip):
     with zipfile.ZipFile(extension_zip) as archive:
         return {name: archive.read(name) for name in archive.namelist() if not name.endswith("/")}
 
@@ -39,7 +39,7 @@ def test_the_zip_is_small_and_every_file_once_and_of_a_kind_that_is_needed(conte
     assert [name for name in contents if re.search(r"(^|/)\.", name)] == []
 
 
-def test_what_the_manifest_leaves_out_is_not_there(contents: dict[str, bytes]) -> None:
+def test_what_the_manifest_leaves_out_is_not_there(contents):
     manifest = tomllib.loads(contents["blender_manifest.toml"].decode())
     named = [name[1:] for name in manifest["build"]["paths_exclude_pattern"] if name.startswith("/commands")]
     assert named
@@ -59,7 +59,7 @@ def test_the_bundled_wheels_are_those_of_the_manifest_with_their_license(content
     assert "SPDX:MIT" in manifest["license"]
 
 
-def test_the_wheel_has_the_package_and_those_beside_it_and_no_benchmark(wheel: Path) -> None:
+def test_the_wheel_has_the_package_and_those_beside_it_and_no_benchmark(wheel):
     names = set(zipfile.ZipFile(wheel).namelist())
     assert {name.split("/")[0] for name in names if ".dist-info/" not in name} == {"digiclay", *BESIDE}
     beside = {f"{name}/{path.name}" for name in BESIDE for path in (ROOT / name).glob("*.*")}
@@ -68,7 +68,7 @@ def test_the_wheel_has_the_package_and_those_beside_it_and_no_benchmark(wheel: P
     assert len(beside) > 20
 
 
-def test_the_paper_is_found_in_the_wheel(wheel: Path, tmp_path: Path) -> None:
+def test_the_paper_is_found_in_the_wheel(wheel, tmp_path):
     zipfile.ZipFile(wheel).extractall(tmp_path / "installed")
     # Without the checkout's path: all there is of digiclay is what the wheel brought.
     done = subprocess.run(

@@ -3,9 +3,7 @@
 import os
 import signal
 import subprocess
-from collections.abc import Callable
 from importlib import import_module
-from pathlib import Path
 
 import pytest
 from digiclay import __version__
@@ -27,39 +25,38 @@ from tests.release.conftest import (
 from tests.timeouts import TIMEOUT
 
 ARCHIVES = [f"digiclay-{__version__}{end}" for end in ("-py3-none-any.whl", ".tar.gz", ".zip")]
-Change = Callable[[Path], None]
 
 
-def tag(name: str) -> Change:
+def tag(name):
     return lambda folder: print(git(folder, "tag", name))
 
 
-def write(name: str, text: str) -> Change:
+def write(name, text):
 
-    def change(folder: Path) -> None:
+    def change(folder):
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         (folder / name).write_text(text, encoding="utf-8")
 
     return change
 
 
-def remove(name: str) -> Change:
+def remove(name):
 
-    def change(folder: Path) -> None:
+    def change(folder):
         (folder / name).unlink()
         commit(folder)
 
     return change
 
 
-def empty_the_section(folder: Path) -> None:
+def empty_the_section(folder):
     text = (folder / CHANGELOG).read_text(encoding="utf-8")
     heading = next(line for line in text.splitlines() if line.startswith("## "))
     (folder / CHANGELOG).write_text(f"# Changelog\n\n{heading}\n\n## 0.0.1 - 2026-01-01\n\n- First.\n")
     commit(folder)
 
 
-def have_no_name(folder: Path) -> None:
+def have_no_name(folder):
     git(folder, "config", "--unset", "user.email")
     git(folder, "config", "user.useConfigOnly", "true")
 
@@ -67,7 +64,7 @@ def have_no_name(folder: Path) -> None:
 HEADING = f"## {__version__} - "
 REPORT = ".reports/window.txt"
 FAILED = "tests in a window: FAILED (status 1)\n"
-BROKEN: dict[str, tuple[Change, str]] = {
+BROKEN = {
     "a change that is not committed": (write("README.md", "Changed."), "README.md is not committed"),
     "a file that git does not know": (write("addon/digiclay/new.py", ""), "addon/digiclay/new.py is not"),
     "another version of the package": (
@@ -96,7 +93,7 @@ BROKEN: dict[str, tuple[Change, str]] = {
 
 
 @pytest.mark.parametrize("broken", BROKEN)
-def test_a_broken_condition_is_one_line_and_nothing_is_left(broken: str, checkout: Path) -> None:
+def test_a_broken_condition_is_one_line_and_nothing_is_left(broken, checkout):
     change, reason = BROKEN[broken]
     change(checkout)
     before = leftovers(checkout)
@@ -108,7 +105,7 @@ def test_a_broken_condition_is_one_line_and_nothing_is_left(broken: str, checkou
 
 
 @pytest.mark.parametrize("version", ["", "0.1", "v0.1.0", "0.1.0rc1", "01.0.0", "0.1.0 ", "nan", "٠.١.٠"])
-def test_a_version_is_three_numbers(version: str, original: Path) -> None:
+def test_a_version_is_three_numbers(version, original):
     done = run_release(original, version)
     assert (done.returncode, done.stderr.count("\n"), "such as 0.1.0" in done.stderr) == (1, 1, True), (
         done.stderr
@@ -116,7 +113,7 @@ def test_a_version_is_three_numbers(version: str, original: Path) -> None:
     assert leftovers(original) == []
 
 
-def test_several_broken_conditions_are_a_line_each(checkout: Path) -> None:
+def test_several_broken_conditions_are_a_line_each(checkout):
     write("README.md", "Changed.")(checkout)
     done = run_release(checkout, "9.9.9")
     lines = done.stderr.splitlines()
@@ -124,7 +121,7 @@ def test_several_broken_conditions_are_a_line_each(checkout: Path) -> None:
     assert all(line.startswith("Nothing is released: ") for line in lines)
 
 
-def test_reports_of_other_commits_do_not_count(checkout: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_reports_of_other_commits_do_not_count(checkout, monkeypatch):
     monkeypatch.syspath_prepend(str(checkout / "tools"))
     find_obstacles = import_module("release_rules").find_obstacles
     report = checkout / REPORT
@@ -134,17 +131,17 @@ def test_reports_of_other_commits_do_not_count(checkout: Path, monkeypatch: pyte
     assert find_obstacles(checkout, __version__, checkout / FOLDER) == []
 
 
-def put_chance_into_the_zip(folder: Path) -> None:
+def put_chance_into_the_zip(folder):
     line = '    shutil.copyfile(ROOT / "LICENSE", folder / "LICENSE")\n'
     edit("tools/extension.py", line, f'{line}    (folder / "chance.md").write_bytes(os.urandom(9))\n')(folder)
 
 
-def make_the_zip_large(folder: Path) -> None:
+def make_the_zip_large(folder):
     (folder / "addon/digiclay/sample_shapes/shapes/large.png").write_bytes(os.urandom(1_200_000))
     commit(folder)
 
 
-FAILING: dict[str, tuple[Change, str]] = {
+FAILING = {
     "a zip that Blender refuses": (edit(MANIFEST, '"Modeling"', '"Pottery"'), "extension.py --out"),
     "a wheel that is not built": (edit("pyproject.toml", "[build-system]", "[build-system"), "'-m build"),
     "builds that differ": (put_chance_into_the_zip, f"two builds of the same commit differ in {ARCHIVES[2]}"),
@@ -153,7 +150,7 @@ FAILING: dict[str, tuple[Change, str]] = {
 
 
 @pytest.mark.parametrize("failing", FAILING)
-def test_a_failure_during_the_builds_leaves_nothing(failing: str, checkout: Path) -> None:
+def test_a_failure_during_the_builds_leaves_nothing(failing, checkout):
     change, reason = FAILING[failing]
     change(checkout)
     done = run_release(checkout)
@@ -165,11 +162,10 @@ def test_a_failure_during_the_builds_leaves_nothing(failing: str, checkout: Path
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_stop_during_the_builds_leaves_nothing(number: int, checkout: Path) -> None:
+def test_a_stop_during_the_builds_leaves_nothing(number, checkout):
     process = subprocess.Popen(
         release_command(checkout), env=ENVIRONMENT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     )
-    assert process.stdout is not None
     assert process.stdout.readline().startswith(f"building {__version__}")
     process.send_signal(number)
     _, told = process.communicate(timeout=TIMEOUT)
@@ -194,7 +190,7 @@ def test_a_release_leaves_its_files_their_checksums_and_an_annotated_tag_with_th
     assert (done.returncode, done.stdout.count(": OK")) == (0, len(ARCHIVES) + 1), done.stdout
 
 
-def test_the_notes_are_the_newest_section_without_links_to_pages(released: Path) -> None:
+def test_the_notes_are_the_newest_section_without_links_to_pages(released):
     section = (released / CHANGELOG).read_text(encoding="utf-8").split("\n## ")[1]
     notes = (released / FOLDER / "release-notes.md").read_text(encoding="utf-8")
     assert notes.startswith(f"# digiclay {__version__}\n\n")
@@ -204,7 +200,7 @@ def test_the_notes_are_the_newest_section_without_links_to_pages(released: Path)
     assert "](docs/" not in notes
 
 
-def test_a_second_release_is_refused_and_leaves_the_first_as_it_is(released: Path) -> None:
+def test_a_second_release_is_refused_and_leaves_the_first_as_it_is(released):
     before = {path: path.stat().st_mtime_ns for path in (released / FOLDER).iterdir()}
     done = run_release(released)
     assert (done.returncode, done.stderr.count("\n")) == (1, 1)

@@ -2,17 +2,13 @@
 
 from dataclasses import replace
 from functools import cache
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 from digiclay.core.base.modes import Mode
 from digiclay.core.engine.simulation import begin, periods
-from digiclay.core.engine.system import System
 from digiclay.core.scene.assembly import assemble
-from digiclay.core.scene.schema import Scene
-from digiclay.core.session.run_scene import Result, run
+from digiclay.core.session.run_scene import run
 
 from tests.assemble import followed
 
@@ -22,33 +18,33 @@ GONE = 2.02
 PRESS = ((0.0, 0, 0, 41), (1.0, 0, 0, 35), (2.0, 0, 0, 35), (2.2, 0, 0, 70), (4.2, 0, 0, 70))
 
 
-def scene(method: str, way: tuple[tuple[float, ...], ...] = PRESS, side: int = 13, **known: Any) -> Scene:
+def scene(method, way=PRESS, side=13, **known):
     """Return a scene on a square bed, with parameters of the method; the way in s and mm."""
     bed = {"arrangement": known.pop("arrangement", "aligned")}
     return followed(method, way, side, layout=bed, control={"method": method, **known})
 
 
 @cache
-def pressed(method: str) -> Result:
+def pressed(method):
     return run(scene(method))
 
 
-def heights(result: Result) -> np.ndarray:
+def heights(result):
     return result.history["height"]
 
 
-def at(result: Result, time: float) -> int:
+def at(result, time):
     return int(np.argmin(np.abs(result.history["time"] - time)))
 
 
 @pytest.mark.parametrize("method", ["elastic", "force_display"])
-def test_a_bed_that_springs_back_is_at_rest_after_the_fingertip_left(method: str) -> None:
+def test_a_bed_that_springs_back_is_at_rest_after_the_fingertip_left(method):
     height = heights(pressed(method))
     assert height.min() < REST - 2e-3
     assert np.abs(height[-1] - REST).max() <= DEAD_BAND + 1e-12  # rounding on top
 
 
-def test_an_elastic_bed_is_felt_as_a_spring() -> None:
+def test_an_elastic_bed_is_felt_as_a_spring():
     result = pressed("elastic")
     row = at(result, 1.99)
     force, height = result.history["force"][row], heights(result)[row]
@@ -57,7 +53,7 @@ def test_an_elastic_bed_is_felt_as_a_spring() -> None:
     assert force == pytest.approx(20.0 * (REST - height), abs=1e-3)
 
 
-def test_a_plastic_bed_stays_at_the_deepest_press_and_as_it_is_under_a_shallower_one() -> None:
+def test_a_plastic_bed_stays_at_the_deepest_press_and_as_it_is_under_a_shallower_one():
     again = (*PRESS[:4], (3.2, 0, 0, 40), (3.6, 0, 0, 35.3), (3.8, 0, 0, 70), (4.8, 0, 0, 70))
     result = run(scene("plastic", again))
     deepest, before = heights(result)[: at(result, GONE)].min(axis=0), heights(result)[at(result, 3.0)]
@@ -78,7 +74,7 @@ def test_a_viscous_dent_s_volume_recovers_with_its_time_constant(time_constant, 
     assert taken / np.log(dent[first] / dent[last]) == pytest.approx(time_constant, rel=0.05)
 
 
-def test_what_spreads_in_a_viscous_bed_is_not_lost_and_one_that_has_recovered_costs_nothing() -> None:
+def test_what_spreads_in_a_viscous_bed_is_not_lost_and_one_that_has_recovered_costs_nothing():
     # Hardly any recovery: after the finger left, the commanded heights' sum stays as it is.
     system, way = _system(scene("viscous", recovery_time=1e6, side=17))
     sums = [
@@ -97,12 +93,12 @@ def test_what_spreads_in_a_viscous_bed_is_not_lost_and_one_that_has_recovered_co
     assert set(last.mode().tolist()) == {int(Mode.REST)}
 
 
-def _system(made: Scene) -> tuple[System, Any]:
+def _system(made):
     return assemble(made), made.section("trajectory").trajectory()
 
 
 @pytest.mark.parametrize("arrangement", ["aligned", "hexagonal"])
-def test_a_larger_disc_changes_nothing_visible_in_a_viscous_bed(arrangement: str) -> None:
+def test_a_larger_disc_changes_nothing_visible_in_a_viscous_bed(arrangement):
     made = scene("viscous", side=25, arrangement=arrangement)
     ends = []
     for factor in (1.0, 4.0):
@@ -117,7 +113,7 @@ def test_a_larger_disc_changes_nothing_visible_in_a_viscous_bed(arrangement: str
     assert np.abs(narrow - wide).max() <= 1.1 * DEAD_BAND
 
 
-def test_a_pushed_pin_gives_way_and_stays_and_one_that_is_not_stays_at_rest_while_it_listens() -> None:
+def test_a_pushed_pin_gives_way_and_stays_and_one_that_is_not_stays_at_rest_while_it_listens():
     result = pressed("push_pull")
     under, left = heights(result)[at(result, 1.99)], heights(result)[-1]
     assert under.min() < REST - 3e-3
@@ -130,7 +126,7 @@ def test_a_pushed_pin_gives_way_and_stays_and_one_that_is_not_stays_at_rest_whil
 
 
 @pytest.mark.parametrize("field", ["wave", "ramp"])
-def test_a_resting_finger_feels_the_field(field: str) -> None:
+def test_a_resting_finger_feels_the_field(field):
     result = run(scene("force_display", field=field, force=0.05, contrast=0.5))
     row = at(result, 1.99)
     force, asked = result.history["force"][row], assemble(result.scene).controller.field
@@ -145,7 +141,7 @@ AWAY = ((0.0, 0, 0, 90), (12.0, 0, 0, 90))
 
 
 @cache
-def displayed(refresh: str, shape: str = "crater", **known: Any) -> tuple[Result, np.ndarray]:
+def displayed(refresh, shape="crater", **known):
     result = run(scene("shape_display", AWAY, 9, shape=shape, refresh=refresh, surfaces=3, **known))
     return result, assemble(result.scene).controller.heights
 
@@ -153,7 +149,7 @@ def displayed(refresh: str, shape: str = "crater", **known: Any) -> tuple[Result
 @pytest.mark.parametrize(
     ("refresh", "shape"), [("one_time", "saddle"), ("gradual", "pyramid"), ("approximate_gradual", "file")]
 )
-def test_the_display_reaches_its_shape(refresh: str, shape: str, tmp_path: Path) -> None:
+def test_the_display_reaches_its_shape(refresh, shape, tmp_path):
     if shape == "file":
         shape = str(tmp_path / "mine.npy")
         np.save(shape, np.random.default_rng(6).uniform(30e-3, 50e-3, (9, 9)))
@@ -162,13 +158,13 @@ def test_the_display_reaches_its_shape(refresh: str, shape: str, tmp_path: Path)
     assert np.abs(heights(result)[-1] - wanted).max() <= DEAD_BAND + 1e-12
 
 
-def moving(result: Result) -> np.ndarray:
+def moving(result):
     """Return where rows of the bed move in a period, (t - 1, rows)."""
     steps = np.abs(np.diff(heights(result), axis=0)).reshape(-1, 9, 9)
     return np.any(steps > 1e-6, axis=2)
 
 
-def test_a_one_time_refresh_moves_row_by_row_and_a_gradual_one_shows_intermediate_surfaces() -> None:
+def test_a_one_time_refresh_moves_row_by_row_and_a_gradual_one_shows_intermediate_surfaces():
     result, wanted = displayed("one_time", "saddle")
     height = heights(result).reshape(-1, 9, 9)
     settled = np.abs(height - wanted.reshape(9, 9)).max(axis=2) <= DEAD_BAND
@@ -185,7 +181,7 @@ def test_a_one_time_refresh_moves_row_by_row_and_a_gradual_one_shows_intermediat
         assert nearest <= 2 * DEAD_BAND, share
 
 
-def test_the_approximate_refresh_is_the_quickest_and_a_small_step_as_quick_as_the_hardware() -> None:
+def test_the_approximate_refresh_is_the_quickest_and_a_small_step_as_quick_as_the_hardware():
     ways = ("approximate_gradual", "one_time", "gradual")
     rows = [moving(displayed(way, "saddle")[0]) for way in ways]
     assert rows[0].sum(axis=1).max() == 9
@@ -197,7 +193,7 @@ def test_the_approximate_refresh_is_the_quickest_and_a_small_step_as_quick_as_th
     assert 3 * 0.05 <= end <= 3 * 0.1
 
 
-def test_a_displayed_shape_holds_against_a_finger() -> None:
+def test_a_displayed_shape_holds_against_a_finger():
     way = [(0, 70), (2, 70), (2.5, 48), (3, 48), (3.5, 70), (4.5, 70)]
     result = run(scene("shape_display", tuple((t, 0, 0, z) for t, z in way), refresh="approximate_gradual"))
     wanted = assemble(result.scene).controller.heights

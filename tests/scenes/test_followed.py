@@ -8,26 +8,23 @@ from digiclay.core.base.errors import ParameterError
 from digiclay.core.base.modes import Mode
 from digiclay.core.control.methods import METHODS
 from digiclay.core.engine.simulation import begin, periods
-from digiclay.core.engine.state import State
 from digiclay.core.scene.assembly import assemble
-from digiclay.core.scene.schema import Scene
-from digiclay.core.session.run_scene import Result, run
+from digiclay.core.session.run_scene import run
 
 from tests.assemble import followed
 
 BOTH = ("virtual_master", "cell_states")
 RESTING = {int(Mode.REST), int(Mode.HOLD)}
-Way = list[tuple[float, ...]]
 
 
-def lasting(scene: Scene) -> State:
+def lasting(scene):
     system = assemble(scene)
     state = begin(system)
     *_, last = periods(system, scene.trajectories(), state, scene.periods)
     return last
 
 
-def random_way(seed: int) -> Way:
+def random_way(seed):
     """Return a short random path that presses, drags, jumps or leaves, and is gone for the last 1.05 s."""
     chance = np.random.default_rng(seed)
     times = np.sort(chance.uniform(0.05, 0.9, 5))
@@ -44,7 +41,7 @@ LIFT = [(0, 0, 0, 43), (0.8, 0, 0, 36), (1.2, 0, 0, 37), (3.2, 0, 0, 46)]
 @pytest.mark.parametrize(
     ("method", "arrangement"), [*(("cell_states", name) for name in ("aligned", "staggered", "hexagonal"))]
 )
-def test_a_slow_lift_pulls_the_clay_up_after_the_finger(method: str, arrangement: str) -> None:
+def test_a_slow_lift_pulls_the_clay_up_after_the_finger(method, arrangement):
     # The finger ends 6 mm above the surface; the pins under it press into it from below.
     assert lasting(followed(method, LIFT, layout={"arrangement": arrangement})).row(0).max() > 46e-3
 
@@ -59,13 +56,13 @@ def test_a_finger_that_leaves_at_once_leaves_the_clay_where_it_was_and_is_counte
 
 
 @pytest.mark.parametrize("method", BOTH)
-def test_a_finger_that_comes_back_elsewhere_is_found_again(method: str) -> None:
+def test_a_finger_that_comes_back_elsewhere_is_found_again(method):
     back = [(3.3, 0, 0, 90), (3.6, 12, 12, 60), (4.2, 12, 12, 36), (4.4, 12, 12, 36)]
     assert Mode.FORCE_FOLLOW in lasting(followed(method, [*LIFT, *back])).mode()
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_nothing_sticks_in_a_mode_a_second_after_the_finger_has_left(method: str) -> None:
+def test_nothing_sticks_in_a_mode_a_second_after_the_finger_has_left(method):
     # A failing session is named by its seed. The display goes to a low shape, all rows at once: its refresh
     # would take longer than the way.
     low = {"refresh": "approximate_gradual", "surfaces": 1, "amplitude": 3e-3}
@@ -91,17 +88,17 @@ PRESS = [(0.0, 0, 0, 43), (0.4, 0, 0, 38.5), (0.6, 0, 0, 38.5), (0.8, 0, 0, 46),
 
 
 @cache
-def session(method: str, noise: float, seed: int = 0) -> Result:
+def session(method, noise, seed=0):
     return run(followed(method, WAY, sensors={"force_noise": noise * 1e-3, "seed": seed}))
 
 
 @pytest.mark.parametrize("noise", [0, 5])
 @pytest.mark.parametrize("method", ["virtual_master", "cell_states"])
-def test_the_finger_is_lost_at_lift_off_alone_whatever_the_noise(method: str, noise: int) -> None:
+def test_the_finger_is_lost_at_lift_off_alone_whatever_the_noise(method, noise):
     assert session(method, noise).metrics["losses"] == 1
 
 
-def test_noise_does_not_bias_the_force_that_is_held_and_is_no_finger_over_the_bed_or_on_a_pin() -> None:
+def test_noise_does_not_bias_the_force_that_is_held_and_is_no_finger_over_the_bed_or_on_a_pin():
     quiet, noisy = (session("virtual_master", noise) for noise in (0, 5))
     # Force that only what is above the floor adds up to is 40 mN off at 5 mN of noise.
     assert noisy.metrics["rfd"] == pytest.approx(quiet.metrics["rfd"], abs=5e-3)
@@ -112,7 +109,7 @@ def test_noise_does_not_bias_the_force_that_is_held_and_is_no_finger_over_the_be
 
 
 @pytest.mark.parametrize("method", ["elastic", "plastic", "viscous", "force_display"])
-def test_noise_is_no_touch(method: str) -> None:
+def test_noise_is_no_touch(method):
     history = run(followed(method, PRESS, 11, sensors={"force_noise": 4e-3})).history
     untouched = history["force"].max(axis=0) == 0.0
     touched_modes = (Mode.SPRING, Mode.FORCE_FOLLOW)
@@ -123,7 +120,7 @@ def test_noise_is_no_touch(method: str) -> None:
     ("method", "noise"),
     [("virtual_master", 21.0), ("cell_states", 8.1), ("plastic", 6.1), ("force_display", 10.1)],
 )
-def test_noise_that_hides_what_is_asked_for_is_refused_in_one_line(method: str, noise: float) -> None:
+def test_noise_that_hides_what_is_asked_for_is_refused_in_one_line(method, noise):
     with pytest.raises(ParameterError, match=r"^sensors\.force_noise must .*control\.\w+ = [\d.]+ N") as told:
         run(followed(method, WAY, sensors={"force_noise": noise * 1e-3}))
     assert "\n" not in str(told.value)

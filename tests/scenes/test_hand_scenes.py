@@ -3,7 +3,6 @@
 import json
 from dataclasses import replace
 from functools import cache
-from typing import Any
 
 import numpy as np
 import pytest
@@ -12,9 +11,8 @@ from digiclay.core.base.errors import OutputError
 from digiclay.core.model.touch import MOST_FORCE
 from digiclay.core.scene.recorder import write
 from digiclay.core.scene.scene_source import Setting, find, load
-from digiclay.core.scene.schema import Scene
 from digiclay.core.session.finished_run import HISTORY, read_run
-from digiclay.core.session.run_scene import Result, run, save
+from digiclay.core.session.run_scene import run, save
 from digiclay.core.studies.omissions import propose_omissions
 from digiclay.plugins.method_loader import load_method
 
@@ -43,14 +41,14 @@ GAINS = ["sweep", "my.toml", "--vary", "control.force_gain=3,4,5,6", "--metric",
 
 
 @cache
-def sample(name: str) -> Result:
+def sample(name):
     return run(load(find(name)))
 
 
 @pytest.mark.parametrize(
     ("name", "fingers"), [("two_hands_bowl", 4), ("pinch_crease", 2), ("five_fingers_mound", 5)]
 )
-def test_a_sample_of_hands_loses_no_finger_and_forms_what_it_is_called(name: str, fingers: int) -> None:
+def test_a_sample_of_hands_loses_no_finger_and_forms_what_it_is_called(name, fingers):
     done = sample(name)
     formed = done.history["height"][-1] - done.scene.actuator.rest_height
     x, y = done.history["position"].T
@@ -158,7 +156,7 @@ def test_a_run_of_two_fingers_is_read_back_and_one_with_too_few_is_refused(broke
     done = run(load(scene))
     assert "at finger" in done.summary()
     save(done, tmp_path)
-    kept: dict[str, Any] = read_run(tmp_path, "fingertip", "finger_force").history
+    kept = read_run(tmp_path, "fingertip", "finger_force").history
     np.testing.assert_array_equal(kept["finger_force"], done.history["finger_force"])
     write({**done.history, broken: done.history[broken][:, :1]}, tmp_path / HISTORY)
     with pytest.raises(
@@ -177,7 +175,7 @@ def test_a_run_of_two_fingers_is_read_back_and_one_with_too_few_is_refused(broke
         (PLACED, "p.py:SoftPad", ""),
     ],
 )
-def test_a_method_of_ones_own_takes_several_fingers(code, word, like, tmp_path, monkeypatch) -> None:
+def test_a_method_of_ones_own_takes_several_fingers(code, word, like, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     write_method(tmp_path, code, word.partition(":")[0])
     longer = "simulation.duration=0.5"
@@ -191,7 +189,7 @@ def test_a_method_of_ones_own_takes_several_fingers(code, word, like, tmp_path, 
         assert own.metrics["losses"] == built_in.metrics["losses"]
 
 
-def with_two(scene: Scene) -> Scene:
+def with_two(scene):
     """Return a scene with its fingertip twice, 18 mm apart and 3 mm aside."""
     (finger,) = scene.fingers
     path = finger.trajectory

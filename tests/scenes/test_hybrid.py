@@ -8,14 +8,12 @@ import pytest
 from digiclay.core.base.modes import Mode
 from digiclay.core.control.hybrid import Hybrid
 from digiclay.core.control.virtual_master import Phase
-from digiclay.core.engine.system import System
 from digiclay.core.metrics.summary import compute_rfd
 from digiclay.core.model.control_interface import find_set_point
 from digiclay.core.model.trajectory import Path, Waypoint
 from digiclay.core.scene.assembly import assemble
-from digiclay.core.scene.schema import Scene
 from digiclay.core.scene.toml_table import resolve
-from digiclay.core.session.run_scene import Result, run
+from digiclay.core.session.run_scene import run
 from digiclay.core.studies.speed_limits import Drag, Lift, track
 
 from digiclay_study.method_trials import drag_row, with_paths
@@ -25,12 +23,12 @@ REST = 40.0
 BOTH = ("virtual_master", "hybrid")
 
 
-def device(method: str = "hybrid", **tables: object) -> Scene:
+def device(method="hybrid", **tables):
     """Return the default device with a method."""
     return resolve({"control": {"method": method}, **tables})
 
 
-def along(scene: Scene, *waypoints: tuple[float, float, float, float], turn: float = 0.0) -> Scene:
+def along(scene, *waypoints, turn=0.0):
     """Return a scene whose finger goes through waypoints (s, then mm), and turns about the vertical, rad."""
     end = waypoints[-1][0]
     half = 0.5 * turn / end
@@ -49,20 +47,20 @@ STROKE = (
 
 
 @cache
-def stroke(method: str, turn: float = 0.0) -> Result:
+def stroke(method, turn=0.0):
     """Return the run of the stroke with a method."""
     return run(along(device(method), *STROKE, turn=turn))
 
 
 @pytest.mark.parametrize("turn", [0.0, 1.2])
-def test_it_holds_the_force_better_than_method_i_turned_finger_or_not(turn: float) -> None:
+def test_it_holds_the_force_better_than_method_i_turned_finger_or_not(turn):
     one, three = (stroke(method, turn).metrics["rfd"] for method in ("virtual_master", "hybrid"))
     # Measured 0.36 and 0.4 of it.
     assert three < 0.55 * one
 
 
 @pytest.mark.parametrize(("turn", "pitch"), [(90.0, 0.0), (105.0, 30.0)], ids=["across", "across, tilted"])
-def test_a_finger_across_its_way_between_two_rows_of_pins_is_held_as_well(turn: float, pitch: float) -> None:
+def test_a_finger_across_its_way_between_two_rows_of_pins_is_held_as_well(turn, pitch):
     poses = drag_row(np.radians(turn), np.radians(pitch))
     bed = {"columns": 25, "rows": 15}
     one, three = (run(with_paths(device(method, layout=bed), "linear", poses)).metrics for method in BOTH)
@@ -86,13 +84,13 @@ def test_a_finger_across_its_way_between_two_rows_of_pins_is_held_as_well(turn: 
     ],
     ids=["ridge", "valley", "lift", "a wide orifice"],
 )
-def test_a_fingertip_is_followed_at(way: Drag | Lift, speed: float, orifice: float, deviation: float) -> None:
+def test_a_fingertip_is_followed_at(way, speed, orifice, deviation):
     found, _ = track(device(valve={"orifice_diameter": orifice}), way, speed)
     assert (found.losses, found.loss_share) == (0, 0.0)
     assert found.rfd < deviation
 
 
-def test_the_skirt_leaves_no_lump_and_without_it_a_quick_drag_from_rest_is_blocked() -> None:
+def test_the_skirt_leaves_no_lump_and_without_it_a_quick_drag_from_rest_is_blocked():
     result = run(along(device(), *STROKE, (2.5, 7, 0, 60), (3.3, 7, 0, 60)))
     end, (x, y) = result.history["height"][-1], result.history["position"].T
     # Beside and behind the ridge, beyond the blister's 15 mm and a pitch.
@@ -103,7 +101,7 @@ def test_the_skirt_leaves_no_lump_and_without_it_a_quick_drag_from_rest_is_block
     assert found.rfd > 0.1
 
 
-def test_the_force_of_a_slow_lift_does_not_swing() -> None:
+def test_the_force_of_a_slow_lift_does_not_swing():
     slow = sample("slow_press", "simulation.duration=3.0", "control.method=hybrid")
     force = run(slow).history["total_force"][500:]
     # Swings with a period of two control periods: 0.5 mN; with a dead band of 10 µm 9 mN.
@@ -127,7 +125,7 @@ MODELS = {
 }
 
 
-def mismatched(known: str) -> System:
+def mismatched(known):
     """Return the true device under a controller made for another one."""
     part, factors = MODELS[known]
     section = TRUE.section(part)
@@ -136,7 +134,7 @@ def mismatched(known: str) -> System:
 
 
 @pytest.mark.parametrize("known", MODELS)
-def test_with_a_wrong_model_the_finger_is_held_no_worse_than_by_method_i(known: str) -> None:
+def test_with_a_wrong_model_the_finger_is_held_no_worse_than_by_method_i(known):
     found = record(mismatched(known), TRUE.trajectories()[0], TRUE.periods)
     total = found.force[1:].sum(axis=1)
     assert found.last.memory.losses == 0
@@ -145,14 +143,14 @@ def test_with_a_wrong_model_the_finger_is_held_no_worse_than_by_method_i(known: 
     assert rfd <= stroke("virtual_master").metrics["rfd"]
 
 
-def test_method_i_takes_over_from_a_wrong_prediction_until_the_finger_has_left() -> None:
+def test_method_i_takes_over_from_a_wrong_prediction_until_the_finger_has_left():
     found = record(mismatched("valve × 3"), path(*STROKE, (2.5, 7, 0, 80), (2.7, 7, 0, 80)), 540)
     taken = [memory.master.phase is Phase.SHAPING for memory in found.memory]
     assert (taken[100], taken[479], taken[-1]) == (True, True, False)
     assert not any(memory.master.phase for memory in record(assemble(TRUE), path(*STROKE), 480).memory)
 
 
-def test_the_trim_stays_within_half_the_set_point() -> None:
+def test_the_trim_stays_within_half_the_set_point():
     # Pins that end 1 mm above the surface do not rise far enough: the force stays too small.
     short = device(actuator={"stroke": 41e-3}, layout={"rows": 13, "columns": 13})
     way = path((0.0, 0, 0, 41), (0.3, 0, 0, 39), (0.6, 0, 0, 39.5), (2.2, 0, 0, 39.5))
@@ -168,7 +166,7 @@ def test_the_trim_stays_within_half_the_set_point() -> None:
     [{"force_noise": 2e-3}, {"force_noise": 15e-3}, {"delay": 1}],
     ids=["noise", "most noise", "delay"],
 )
-def test_noise_and_delay_of_the_sensors_lose_no_finger(sensors: dict[str, float]) -> None:
+def test_noise_and_delay_of_the_sensors_lose_no_finger(sensors):
     found = run(along(device(sensors=sensors), *STROKE)).metrics
     one = run(along(device("virtual_master", sensors=sensors), *STROKE)).metrics
     assert (found["losses"], found["contact_loss_share"]) == (0, 0.0)
@@ -178,7 +176,7 @@ def test_noise_and_delay_of_the_sensors_lose_no_finger(sensors: dict[str, float]
 # Extremes
 
 
-def test_a_finger_that_jumps_is_found_again_where_it_is() -> None:
+def test_a_finger_that_jumps_is_found_again_where_it_is():
     places = ((0.0, -20, 41), (0.5, -20, 37), (0.8, -20, 37), (0.805, 20, 37), (1.6, 20, 37))
     way = path(*((t, x, 0, z) for t, x, z in places), interpolation="linear")
     found = record(assemble(device()), way, 320)
@@ -187,7 +185,7 @@ def test_a_finger_that_jumps_is_found_again_where_it_is() -> None:
     assert found.force[300:].sum(axis=1) == pytest.approx(0.4, abs=0.03)
 
 
-def test_a_touched_cell_is_never_frozen() -> None:
+def test_a_touched_cell_is_never_frozen():
     found = record(assemble(device()), path(*STROKE, (3.4, -8, 0, 46), (3.6, -8, 0, 44)), 720)
     assert np.any(found.mode == Mode.FROZEN)
     assert not np.any((found.mode == Mode.FROZEN)[:-1] & (found.force > Hybrid().release_force)[:-1])
@@ -207,7 +205,7 @@ def test_a_touched_cell_is_never_frozen() -> None:
     ids=["no relaxation", "instant valve", "dead time of 12 ms", "10 ms period", "small bed", "staggered",
          "a fingertip larger than the bed"],
 )  # fmt: skip
-def test_it_holds_a_press_on_other_devices(tables: dict[str, object]) -> None:
+def test_it_holds_a_press_on_other_devices(tables):
     known = along(device(**tables), (0.0, 1.3, 0.4, 41), (0.4, 1.3, 0.4, 38.5), (1.2, 1.3, 0.4, 38.5))
     found = run(known)
     late = found.history["total_force"][int(0.8 / known.simulation.control_period) :]

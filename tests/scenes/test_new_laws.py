@@ -141,11 +141,11 @@ print(json.dumps(["law =" in format_scene(plain), run(plain.with_sections(contac
 
 
 @pytest.fixture
-def copy(tmp_path: Path) -> Path:
+def copy(tmp_path):
     return copy_package(tmp_path)
 
 
-def add_part(copy: Path, table: str, line: str, row: str, name: str, text: str) -> None:
+def add_part(copy, table, line, row, name, text):
     core = copy / "addon" / "digiclay" / "core"
     (core / table).with_name(name).write_text(text.lstrip(), encoding="utf-8")
     head, found, tail = (core / table).read_text(encoding="utf-8").partition(line)
@@ -165,7 +165,7 @@ PARTS = (
 )
 
 
-def test_new_laws_and_a_new_behavior_are_a_file_and_a_line_each(copy: Path) -> None:
+def test_new_laws_and_a_new_behavior_are_a_file_and_a_line_each(copy):
     for part in PARTS:
         add_part(copy, *part)
     tables = {Path(table).name for table, *_ in PARTS}
@@ -199,7 +199,7 @@ def test_new_laws_and_a_new_behavior_are_a_file_and_a_line_each(copy: Path) -> N
         (Parameters, "gap", "gap must have one of the units m, s, Pa, N"),
     ],
 )
-def test_a_class_that_the_steps_cannot_see_is_refused_in_a_line(base: type, name: str, said: str) -> None:
+def test_a_class_that_the_steps_cannot_see_is_refused_in_a_line(base, name, said):
     with pytest.raises(ParameterError, match=f"^Wrong.{said}"):
         type("Wrong", (base,), {name: quantity(1.0, "gap", unit="1")})
 
@@ -264,7 +264,7 @@ NEW = {
 }
 
 
-def test_a_new_arrangement_is_one_row_and_what_needs_neighbors_refuses_one_without(copy: Path) -> None:
+def test_a_new_arrangement_is_one_row_and_what_needs_neighbors_refuses_one_without(copy):
     layout = copy / "addon" / "digiclay" / "core" / "model" / "layout.py"
     rows = "".join(f'    "{name}": {row},\n' for name, (row, _) in NEW.items())
     head, tail = layout.read_text(encoding="utf-8").split("ARRANGEMENTS = {\n")

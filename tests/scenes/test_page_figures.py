@@ -3,10 +3,8 @@
 import statistics
 import sys
 from collections import deque
-from collections.abc import Callable, Iterator
 from functools import partial
 from itertools import islice
-from typing import Any
 
 import pytest
 from digiclay.core.batch.play import begin_play, play_all
@@ -26,17 +24,17 @@ ABSENT = ("conduit=absent", "valve_lag=absent", "relaxation=absent", "delay=abse
 COUNT = 300
 
 
-def count_numpy_calls(*settings: str) -> float:
+def count_numpy_calls(*settings):
     """Return the numpy calls of a control period of the paper's session, the median."""
     scene = sample(PAPER, *settings)
     return statistics.median(period_calls(assemble(scene), scene.trajectories(), COUNT)[0])
 
 
-def count_calls(states: Iterator[Any], count: int = COUNT) -> float:
+def count_calls(states, count=COUNT):
     """Return the function calls of one of some control periods, the mean of the latter half."""
     calls, first = 0, count // 2
 
-    def note(frame: object, event: str, called: object) -> None:
+    def note(frame, event, called):
         nonlocal calls
         calls += event in ("call", "c_call")
 
@@ -49,7 +47,7 @@ def count_calls(states: Iterator[Any], count: int = COUNT) -> float:
     return calls / (count - first)
 
 
-def compare_ten_fingers(method: str) -> float:
+def compare_ten_fingers(method):
     """Return the function calls of a control period of ten fingertips that press, to those of one."""
     depth, calls = several_fingers.PRESSED if method else 39.0, []
     for fingers in (1, 10):
@@ -61,7 +59,7 @@ def compare_ten_fingers(method: str) -> float:
     return calls[1] / calls[0]
 
 
-def compare_batch(varied: str) -> float:
+def compare_batch(varied):
     """Return the function calls of a control period of a batch of 64 runs, to those of one run alone."""
     scene = sample(PAPER, "recorder=absent")
     system = assemble(scene)
@@ -71,7 +69,7 @@ def compare_batch(varied: str) -> float:
     return count_calls(play_all(play, dict.fromkeys(scenes, COUNT), None)) / alone
 
 
-def count_active_cells() -> float:
+def count_active_cells():
     """Return the active cells of a control period on a bed of 625 pins, the mean of a press and a drag."""
     bed = bed_size.scene(25)
     system = assemble(bed)
@@ -79,21 +77,21 @@ def count_active_cells() -> float:
     return statistics.mean(state.active.cells.size for state in states)
 
 
-def count_bytes_of_history() -> float:
+def count_bytes_of_history():
     """Return the bytes of a pin in a row of a history."""
     history = run(sample("tap", "simulation.duration=0.1")).history
     rows, pins = history["height"].shape
     return sum(table.nbytes for table in history.values() if table.shape == (rows, pins)) / (rows * pins)
 
 
-def count_bytes_of_pin(*settings: str) -> float:
+def count_bytes_of_pin(*settings):
     """Return the bytes of a pin in the state of the paper's session."""
     return 8.0 * assemble(sample(PAPER, *settings)).rows.count
 
 
 #: What is counted, the figure of the page or one on which it depends, and the share that it may be off: exact
 #: without one; else a call more or less is no other figure.
-FIGURES: dict[str, tuple[Callable[[], float], float, float]] = {
+FIGURES = {
     "README: control periods": (lambda: sample(PAPER).periods, 5300, 0.0),
     "performance: cells": (lambda: sample(PAPER).cells, 625, 0.0),
     "performance: numpy calls without control": (partial(count_numpy_calls, "control=absent"), 74, 0.05),
@@ -116,6 +114,6 @@ FIGURES: dict[str, tuple[Callable[[], float], float, float]] = {
 
 
 @pytest.mark.parametrize("name", FIGURES)
-def test_a_count_on_which_a_figure_of_a_page_depends_is_what_it_was(name: str) -> None:
+def test_a_count_on_which_a_figure_of_a_page_depends_is_what_it_was(name):
     count, figure, off = FIGURES[name]
     assert count() == pytest.approx(figure, rel=off, abs=0)

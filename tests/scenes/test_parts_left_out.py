@@ -24,7 +24,7 @@ print(" ".join(name.removeprefix(core) for name in sys.modules if name.startswit
 
 
 @cache
-def imported(*settings: str) -> set[str]:
+def imported(*settings):
     """Run a short session with some settings; return the core's modules it imported."""
     done = subprocess.run(
         [sys.executable, "-W", "error", "-c", RUN, *settings],

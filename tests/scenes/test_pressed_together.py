@@ -1,36 +1,29 @@
 """Pins that several fingertips press: by the law of each, as SciPy has them; bounded where they are stiff."""
 
-from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
-from digiclay.core.base.arrays import Floats
 from digiclay.core.engine.simulation import advance, begin, trace_fingers
-from digiclay.core.engine.system import System
-from digiclay.core.model.fingers import HandTouch
 from digiclay.core.model.fingertip import compute_forms, compute_underside
 from digiclay.core.model.layout import Layout
 from digiclay.core.model.touch import compute_force
 from digiclay.core.scene.assembly import assemble
-from digiclay.core.scene.schema import Finger
 from digiclay.core.session.accuracy import Replay
 
 from tests.scenes.test_hands import FINGER, LONG, PAPER, PERIOD, REST, SOFT, integrate, press, scene
 
 
-def replaying(fingers: tuple[Finger, ...], commands: Floats, **parts: Any) -> System:
+def replaying(fingers, commands, **parts):
     """Return a bed under fingers that plays commands, (t, n)."""
     system = assemble(scene(None, *fingers, **parts))
     return replace(system, controller=Replay(system.grid, commands))
 
 
-def test_a_finger_presses_as_its_law_says_in_the_period_in_which_another_one_lands() -> None:
+def test_a_finger_presses_as_its_law_says_in_the_period_in_which_another_one_lands():
     system = replaying((FINGER, SOFT), np.full((60, 2500), 0.4))
     poses, touch = press(system, [(-3e-3, 1e-3), (3e-3, -1e-3)], (0.0, 0.0), 60), system.cell.touch
     poses[:30, :, 1, 2] += 30e-3  # it lands within a period, 3 mm deep
-    assert isinstance(touch, HandTouch)
     state, rows, together = begin(system), system.rows.pressing, 0
     for finger, at_end in zip(trace_fingers(system, poses), poses[:, -1], strict=True):
         state = advance(system, state, finger)
@@ -52,10 +45,10 @@ NARROW = replace(PAPER.actuator, bore=0.2e-3)
 WIDE = replace(PAPER.valve, orifice_diameter=2e-3)
 
 
-def rock(finger: int) -> Callable[[float], Floats]:
+def rock(finger):
     """Return the pose at a time, s, of a fingertip that presses while the other one yields, and so on."""
 
-    def pose(time: float) -> Floats:
+    def pose(time):
         down = min(1.0, time / 0.06) ** 2 * (3.0 - 2.0 * min(1.0, time / 0.06))
         depth = down * (1.6e-3 + 0.5e-3 * np.sin(2.0 * np.pi * time / 0.06 + np.pi * finger))
         place = (-2.2e-3, 0.5e-3), (2.4e-3, -1.1e-3), (0.4e-3, 3.1e-3)
@@ -64,7 +57,7 @@ def rock(finger: int) -> Callable[[float], Floats]:
     return pose
 
 
-def play(system: System, poses: Floats) -> tuple[Floats, Floats, Floats]:
+def play(system, poses):
     """Return heights and forces, (t, n), and how often the first two fingers press each cell, (n,)."""
     state, rows, pressed = begin(system), [], np.zeros(system.grid.count)
     for finger in trace_fingers(system, poses):
@@ -75,7 +68,7 @@ def play(system: System, poses: Floats) -> tuple[Floats, Floats, Floats]:
     return *np.array(rows).swapaxes(0, 1), pressed
 
 
-def at_times(system: System, ways: list[Callable[[float], Floats]], periods: int) -> Floats:
+def at_times(system, ways, periods):
     times = np.arange(periods)[:, None] * PERIOD + system.instants
     return np.array([[[way(time) for way in ways] for time in row] for row in times])
 
@@ -85,7 +78,7 @@ STEEP = replace(FINGER, contact=replace(FINGER.contact, exponent=2e4))
 
 
 @pytest.mark.parametrize(("other", "most"), [(FINGER, 0.3e-3), (SOFT, 0.3e-3), (SLACK, 0.4e-3)])
-def test_on_a_locked_pin_the_forces_of_fingers_that_rock_agree_with_scipy(other: Finger, most: float) -> None:
+def test_on_a_locked_pin_the_forces_of_fingers_that_rock_agree_with_scipy(other, most):
     system = replaying((FINGER, other), np.zeros((30, 1)), layout=Layout(rows=1, columns=1))
     ways = [rock(0), rock(1)]
     height, force, pressed = play(system, at_times(system, ways, 30))
@@ -103,7 +96,7 @@ def test_on_a_locked_pin_the_forces_of_fingers_that_rock_agree_with_scipy(other:
     [({"actuator": NARROW}, 0.1e-3, 5e-3), ({"valve": WIDE}, 0.1e-3, 50e-3)],
     ids=["bore 0.2 mm", "orifice 2 mm"],
 )
-def test_stiff_pins_under_several_fingers_agree_with_scipy(fingers, parts, height_error, force_error) -> None:
+def test_stiff_pins_under_several_fingers_agree_with_scipy(fingers, parts, height_error, force_error):
     commands = np.random.default_rng(3).uniform(-0.5, 0.5, (6, 25)).repeat(5, axis=0)
     system = replaying(fingers, commands, layout=Layout(rows=5, columns=5), **parts)
     ways = [rock(finger) for finger in range(len(fingers))]
@@ -118,9 +111,7 @@ def test_stiff_pins_under_several_fingers_agree_with_scipy(fingers, parts, heigh
 @pytest.mark.parametrize("seed", [0, 3])
 @pytest.mark.parametrize("parts", [{"actuator": NARROW}, {"valve": WIDE}], ids=["bore", "orifice"])
 @pytest.mark.parametrize("fingers", [(FINGER,) * 2, (FINGER,) * 3, (FINGER, STEEP, SOFT)])
-def test_a_pin_that_rises_into_several_fingertips_is_pressed_at_most_as_by_each_alone(
-    fingers: tuple[Finger, ...], parts: dict[str, Any], seed: int
-) -> None:
+def test_a_pin_that_rises_into_several_fingertips_is_pressed_at_most_as_by_each_alone(fingers, parts, seed):
     random, layout = np.random.default_rng(seed), Layout(rows=5, columns=5)
     commands = random.uniform(-1.0, 1.0, (6, 25)).repeat(10, axis=0)
     turn, shift = random.uniform(0.0, 2.0 * np.pi), random.uniform(-1.5e-3, 1.5e-3, 2)
@@ -139,7 +130,7 @@ def test_a_pin_that_rises_into_several_fingertips_is_pressed_at_most_as_by_each_
 
 
 @pytest.mark.parametrize("count", [2, 3])
-def test_a_finger_that_comes_or_goes_within_a_step_takes_no_pin_lower_than_one_that_stays(count: int) -> None:
+def test_a_finger_that_comes_or_goes_within_a_step_takes_no_pin_lower_than_one_that_stays(count):
     system, random = (
         replaying((FINGER,) * count, np.zeros((1, 1)), layout=Layout(1, 1)),
         np.random.default_rng(0),

@@ -4,27 +4,26 @@ import numpy as np
 import pytest
 from digiclay.core.scene.scene_source import find as sample
 from digiclay.core.scene.scene_source import load
-from digiclay.core.session.run_scene import Result, run
-from digiclay.core.surface.features import Feature, find
+from digiclay.core.session.run_scene import run
+from digiclay.core.surface.features import find
 from digiclay.core.surface.formed import make_formed
 from digiclay.core.surface.skins import fit_skin
-from numpy.typing import NDArray
 
 MM = 1e-3
 
 
 @pytest.fixture(scope="module")
-def session() -> Result:
+def session():
     return run(load(sample("ridge_mound_valley")))
 
 
-def profile(session: Result, y: float) -> NDArray[np.float64]:
+def profile(session, y):
     """Return the final heights of the row of cells at y, from left to right, over the rest height, m."""
     row = np.abs(session.history["position"][:, 1] - y) < 0.1 * MM
     return session.history["height"][-1, row] - session.scene.actuator.rest_height
 
 
-def features(session: Result, time: float, former: float = 0.0) -> dict[str, Feature]:
+def features(session, time, former=0.0):
     """Return what was formed between two times, s, by its form."""
     row, before = (int(np.argmin(np.abs(session.history["time"] - moment))) for moment in (time, former))
     found = find(fit_skin(make_formed(dict(session.history), row, before), "bilinear", 1, 1e-3))

@@ -8,7 +8,6 @@ import pytest
 from digiclay.core.engine.simulation import begin, periods
 from digiclay.core.model.layout import Layout
 from digiclay.core.scene.assembly import assemble
-from digiclay.core.scene.schema import Scene
 from digiclay.core.scene.toml_table import resolve
 from digiclay.settings.devices import BEDS, make_scene
 
@@ -36,17 +35,17 @@ IMAGES = {
 
 
 @cache
-def add(name: str, method: str) -> Scene:
+def add(name, method):
     bed = BEDS[name]
     return make_scene("paper", Layout(bed.rows, bed.columns, bed.pitch), method, bed.share)
 
 
-def half(scene: Scene) -> float:
+def half(scene):
     """Return how far the outer cells are from the middle of a bed, mm."""
     return 0.5e3 * (scene.layout.columns - 1) * scene.layout.pitch
 
 
-def rise(scene: Scene, start: tuple[float, float], end: tuple[float, float], lifted: float = -DEPTH) -> float:
+def rise(scene, start, end, lifted=-DEPTH):
     """Return how far any pin gets above rest, mm, after a press at a place, mm; then the finger goes on.
 
     It is lifted to a height, mm, and goes to another place at 10 mm/s.
@@ -65,7 +64,7 @@ def rise(scene: Scene, start: tuple[float, float], end: tuple[float, float], lif
 
 
 @cache
-def rise_within(method: str, way: str) -> float:
+def rise_within(method, way):
     """Return how far any pin gets above rest, mm, on a way of a finger that stays far from the rim."""
     return rise(add("paper", method), *WAYS[way](0.0))
 
@@ -81,7 +80,7 @@ TURNED = [
 
 @pytest.mark.parametrize(("way", "image"), TURNED)
 @pytest.mark.parametrize("method", METHODS)
-def test_a_finger_that_slides_off_raises_no_pin(method: str, way: str, image: str) -> None:
+def test_a_finger_that_slides_off_raises_no_pin(method, way, image):
     # 8 to 36 mm with Method I, up to 3 with Method III without a rim. Method II raises flanks on a whole bed.
     scene = add("paper", method)
     off = np.dot(WAYS[way](half(scene)), np.transpose(IMAGES[image])).tolist()
@@ -91,7 +90,7 @@ def test_a_finger_that_slides_off_raises_no_pin(method: str, way: str, image: st
 @pytest.mark.parametrize("way", ["straight", "slanting"])
 @pytest.mark.parametrize("bed", ["design", "fine"])
 @pytest.mark.parametrize("method", METHODS)
-def test_neither_does_one_on_a_fine_bed(method: str, bed: str, way: str) -> None:
+def test_neither_does_one_on_a_fine_bed(method, bed, way):
     scene = add(bed, method)
     assert rise(scene, *WAYS[way](half(scene))) <= MOST
 
@@ -108,14 +107,14 @@ def test_neither_does_one_on_a_fine_bed(method: str, bed: str, way: str) -> None
     ids=["hexagonal", "staggered", "narrow", "with noise", "fast"],
 )
 @pytest.mark.parametrize("method", ["virtual_master", "hybrid"])
-def test_neither_does_one_on_another_device(method: str, tables: dict[str, object]) -> None:
+def test_neither_does_one_on_another_device(method, tables):
     scene = resolve({"control": {"method": method}, **tables})
     assert rise(scene, *WAYS["slanting"](half(scene))) <= MOST
 
 
 @pytest.mark.parametrize("bed", ["paper", "design"])
 @pytest.mark.parametrize("method", ["virtual_master", "hybrid"])
-def test_a_raised_ridge_ends_at_the_rim_as_high_as_it_is(method: str, bed: str) -> None:
+def test_a_raised_ridge_ends_at_the_rim_as_high_as_it_is(method, bed):
     # 19 mm on the paper's bed and 43 on design with Method I without a rim.
     scene = add(bed, method)
     start, end = WAYS["slanting"](half(scene))
@@ -125,13 +124,13 @@ def test_a_raised_ridge_ends_at_the_rim_as_high_as_it_is(method: str, bed: str) 
 
 @pytest.mark.parametrize("beside", [-1.0, 0.0, 0.5])
 @pytest.mark.parametrize("method", METHODS)
-def test_a_finger_lifted_over_the_outer_cells_raises_them(method: str, beside: float) -> None:
+def test_a_finger_lifted_over_the_outer_cells_raises_them(method, beside):
     scene = add("paper", method)
     place = half(scene) + beside * 3.0, 0.0
     assert rise(scene, place, place, lifted=8.0) > 8.0
 
 
-def deviation(method: str, beyond: float, image: str, outside: float = 0.0) -> float:
+def deviation(method, beyond, image, outside=0.0):
     """Return the rms deviation of the force from its set point, N, along the rim, lifted 8 mm, at 12 mm/s.
 
     The lowest point is so far beyond the last row, mm; judged from the lift on, also without contact. The
@@ -158,9 +157,7 @@ def deviation(method: str, beyond: float, image: str, outside: float = 0.0) -> f
         (3.0, "turned again", 0.09), (5.0, "turned", 0.09),
     ],
 )  # fmt: skip
-def test_along_the_rim_method_three_is_no_worse_than_method_one(
-    beyond: float, image: str, most: float
-) -> None:
+def test_along_the_rim_method_three_is_no_worse_than_method_one(beyond, image, most):
     # It was lost from 1 mm on, at 0.3 to 0.4 N.
     three = deviation("hybrid", beyond, image)
     assert three <= 1.1 * deviation("virtual_master", beyond, image)
@@ -171,9 +168,7 @@ def test_along_the_rim_method_three_is_no_worse_than_method_one(
     ("beyond", "image", "most"),
     [(0.0, "as it is", 1.75), (1.5, "mirrored", 1.5), (5.0, "as it is", 1.1), (0.0, "turned", 0.7)],
 )
-def test_pressed_in_from_outside_method_three_is_as_much_worse_as_the_page_says(
-    beyond: float, image: str, most: float
-) -> None:
+def test_pressed_in_from_outside_method_three_is_as_much_worse_as_the_page_says(beyond, image, most):
     one, three = (deviation(method, beyond, image, 20.0 - beyond) for method in ("virtual_master", "hybrid"))
     print(f"{beyond:g} mm: Method I {1e3 * one:.0f} mN, Method III {1e3 * three:.0f} mN")
     assert three <= most * one
@@ -181,7 +176,7 @@ def test_pressed_in_from_outside_method_three_is_as_much_worse_as_the_page_says(
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_it_is_as_in_a_run_alone(method: str) -> None:
+def test_it_is_as_in_a_run_alone(method):
     ends = (0.0, 10, 0, 41), (0.3, 10, 0, 37), (0.5, 10, 0, 37), (1.7, 22, 0, 37), (2.0, 22, 0, 37)
     gain = "trim_time" if method == "hybrid" else "force_gain"
     controls = ({"method": method, gain: value} for value in (0.5, 5.0))

@@ -1,8 +1,6 @@
 """Runs in a stack come to what they come to alone, and what befalls one of them is its own affair."""
 
-from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -15,9 +13,8 @@ from digiclay.core.engine.simulation import begin, periods
 from digiclay.core.metrics.metric_table import METRICS
 from digiclay.core.model.trajectory import Waypoint
 from digiclay.core.scene.assembly import assemble
-from digiclay.core.scene.schema import Scene
 from digiclay.core.session.accuracy import estimate_errors, make_reference
-from digiclay.core.session.run_scene import Result, run
+from digiclay.core.session.run_scene import run
 
 from tests.assemble import STACKABLE, followed, moved, sample
 
@@ -33,9 +30,9 @@ RELATIVE, ABSOLUTE = 1e-9, {"m": HEIGHT, "N": FORCE, "m3": 1e-15, "s": 1e-12, "1
 NOTHING = {"height": 1e-15, "force": 1e-12, "total_force": 1e-12}
 
 
-def together(scenes: Sequence[Scene]) -> list[Any]:
+def together(scenes):
     assert len({describe_structure(one) for one in scenes}) == 1
-    done: dict[int, Any] = {}
+    done = {}
     for number, result in run_together(scenes):
         history = getattr(result, "history", None)
         if history:  # valid until the next result is asked for
@@ -44,12 +41,12 @@ def together(scenes: Sequence[Scene]) -> list[Any]:
     return [done[number] for number in range(len(scenes))]
 
 
-def judged(scenes: Sequence[Scene], *, errors: bool = False) -> list[Any]:
+def judged(scenes, *, errors=False):
     done = dict(measure_together(scenes, errors=errors))
     return [done[number] for number in range(len(scenes))]
 
 
-def assert_figures(found: Any, alone: Result) -> None:
+def assert_figures(found, alone):
     for name in (*METRICS, "losses", "control_periods", "incomplete"):
         value, unit = alone.metrics[name], alone.metrics["units"].get(name, "1")
         assert found.metrics["units"].get(name, "1") == unit
@@ -58,7 +55,7 @@ def assert_figures(found: Any, alone: Result) -> None:
         assert found.metrics[name] == expected, name
 
 
-def assert_as_alone(found: Any, alone: Result) -> None:
+def assert_as_alone(found, alone):
     assert found.history.keys() == alone.history.keys()
     for name, values in alone.history.items():
         tolerance = HEIGHT if name == "height" else FORCE
@@ -67,7 +64,7 @@ def assert_as_alone(found: Any, alone: Result) -> None:
     assert_figures(found, alone)
 
 
-def assert_estimated_as_alone(found: Any, scene: Scene, alone: Result) -> None:
+def assert_estimated_as_alone(found, scene, alone):
     errors = estimate_errors(scene, alone.history)
     assert errors.height > 1e-12  # there is something to estimate
     for name, value in errors._asdict().items():
@@ -75,7 +72,7 @@ def assert_estimated_as_alone(found: Any, scene: Scene, alone: Result) -> None:
         assert found.metrics[f"{name}_error"] == expected, name
 
 
-def assert_all_as_alone(scenes: Sequence[Scene], *, judge: bool = False, errors: bool = False) -> list[Any]:
+def assert_all_as_alone(scenes, *, judge=False, errors=False):
     results = together(scenes)
     evaluated = judged(scenes, errors=errors) if judge or errors else results
     if errors:
@@ -90,7 +87,7 @@ def assert_all_as_alone(scenes: Sequence[Scene], *, judge: bool = False, errors:
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_runs_with_fingers_ends_and_devices_of_their_own_come_to_what_they_come_to_alone(method: str) -> None:
+def test_runs_with_fingers_ends_and_devices_of_their_own_come_to_what_they_come_to_alone(method):
     devices = ((f"valve.stroke={25 + 5 * i}e-6", f"actuator.rest_height={40 - 0.2 * i}e-3") for i in range(2))
     known = [sample(STACKABLE[method], f"control.method={method}", *device) for device in devices]
     scenes = [moved(one, 0.7e-3 * i, -0.2e-3 * i, 0.5 + 0.05 * i, 0.3) for i, one in enumerate(known)]
@@ -98,7 +95,7 @@ def test_runs_with_fingers_ends_and_devices_of_their_own_come_to_what_they_come_
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_a_batch_has_no_more_active_cells_than_one_of_its_runs_alone(method: str) -> None:
+def test_a_batch_has_no_more_active_cells_than_one_of_its_runs_alone(method):
     # Its margin is narrower, since it makes its set anew for all runs as soon as one needs it.
     settings = f"control.method={method}", "recorder=absent", "simulation.duration=0.4"
     scene = sample(STACKABLE[method], *settings)
@@ -131,7 +128,7 @@ CHANGES = {
 
 
 @pytest.mark.parametrize("changes", CHANGES.values(), ids=CHANGES)
-def test_runs_with_parameters_of_their_own_come_to_what_they_come_to_alone(changes: str) -> None:
+def test_runs_with_parameters_of_their_own_come_to_what_they_come_to_alone(changes):
     pairs = [one.split("=") for one in changes.split()]
     settings = [[f"{key}={value}" for value in values.split("|")] for key, values in pairs]
     scenes = [sample("tap", "simulation.duration=0.3", *one) for one in zip(*settings, strict=True)]
@@ -175,14 +172,14 @@ def test_what_is_recorded_and_judged_of_a_run_is_that_of_the_run_alone(name, key
     assert_all_as_alone([moved(one, 0.0, 0.0, pace=pace) for one in known], judge=True)
 
 
-def test_every_metric_of_a_ridge_is_that_of_the_run_alone() -> None:
+def test_every_metric_of_a_ridge_is_that_of_the_run_alone():
     way = ((0, -14, 0, 41.5), (0.3, -14, 0, 37), (0.6, -14, 0, 37), (1.8, 14, 0, 37), (2.1, 14, 0, 37))
     methods = ({"method": "virtual_master", "force_gain": gain} for gain in (3, 5))
     for found in assert_all_as_alone([followed("", way, control=one) for one in methods], judge=True):
         assert None not in (found.metrics[name] for name in METRICS)
 
 
-def test_pins_on_end_stops_and_relaxed_pulp_come_to_what_they_come_to_alone() -> None:
+def test_pins_on_end_stops_and_relaxed_pulp_come_to_what_they_come_to_alone():
     method = ("control.method=elastic", "control.stiffness=5")
     low = [sample("tap", f"actuator.rest_height={rest}", *method) for rest in ("1e-3", "1.5e-3")]
     for found in assert_all_as_alone([moved(one, 0.0, -40e-3) for one in low], errors=True):
@@ -210,7 +207,7 @@ def test_a_bed_that_stands_still_or_shapes_itself_does_so_as_alone(name, setting
     assert_all_as_alone([moved(known, 0.7e-3 * i, -0.5e-3 * i, lasting, 0.5) for i in range(2)])
 
 
-def test_a_run_that_diverges_ends_in_its_own_error_and_the_others_go_on() -> None:
+def test_a_run_that_diverges_ends_in_its_own_error_and_the_others_go_on():
     # Steps far too long for Euler; only the middle one's finger gets to the bed.
     long = ("simulation.control_period=50e-3", "simulation.physics_step=50e-3", "simulation.duration=2.0")
     known = sample("slow_press", "simulation.stepper=euler", *long)
@@ -227,7 +224,7 @@ def test_a_run_that_diverges_ends_in_its_own_error_and_the_others_go_on() -> Non
         assert_figures(measured[other], alone)
 
 
-def test_a_run_that_cannot_fit_in_memory_is_told_and_the_others_go_on() -> None:
+def test_a_run_that_cannot_fit_in_memory_is_told_and_the_others_go_on():
     known = sample("tap")
     endless = replace(known, simulation=replace(known.simulation, duration=1e6))
     found = together([endless, known])
@@ -236,7 +233,7 @@ def test_a_run_that_cannot_fit_in_memory_is_told_and_the_others_go_on() -> None:
     assert_as_alone(found[1], run(known))
 
 
-def test_a_stack_without_recorder_has_no_history_shares_its_time_and_can_be_stopped() -> None:
+def test_a_stack_without_recorder_has_no_history_shares_its_time_and_can_be_stopped():
     scenes = [sample("tap", f"control.force_gain={gain}", "recorder=absent") for gain in (3, 5)]
     first, second = together(scenes)
     assert (first.history, second.history) == ({}, {})
@@ -265,7 +262,7 @@ def test_without_all_commands_or_unasked_a_run_is_judged_without_errors_or_histo
         "simulation.control_period=10 ms",
     ],
 )
-def test_scenes_of_another_structure_do_not_stand_together(setting: str) -> None:
+def test_scenes_of_another_structure_do_not_stand_together(setting):
     scenes = [sample("tap"), sample("tap", setting)]
     assert describe_structure(scenes[1]) != describe_structure(scenes[0])
     for together in (run_together, measure_together):
@@ -277,14 +274,14 @@ def test_scenes_of_another_structure_do_not_stand_together(setting: str) -> None
 NOISES = (("1e-3", "5e-6", "1"), ("2e-3", "2e-6", "2"), ("0.5e-3", "20e-6", str(2**62 + 1)))
 
 
-def noisy(name: str, *settings: str) -> list[Scene]:
+def noisy(name, *settings):
     keys = ("force_noise", "height_noise", "seed")
     noises = ([f"sensors.{key}={value}" for key, value in zip(keys, noise, strict=True)] for noise in NOISES)
     return [sample(name, *settings, *noise) for noise in noises]
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_runs_with_noise_of_their_own_come_to_what_they_come_to_alone(method: str) -> None:
+def test_runs_with_noise_of_their_own_come_to_what_they_come_to_alone(method):
     scenes = noisy(STACKABLE[method], f"control.method={method}")
     # Fingers that come down elsewhere, up to far apart, and differently far: other cells, and not as many.
     ways = ((-8e-3, 0.5), (0.0, 0.45), (2e-3, 0.4))

@@ -1,7 +1,6 @@
 """Shapes through the physics: displayed by driving the pins, then formed by the finger, by every method."""
 
 from functools import cache
-from typing import Any
 
 import numpy as np
 import pytest
@@ -11,7 +10,7 @@ from digiclay.core.engine.simulation import begin, periods
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.scene_source import find, load
 from digiclay.core.scene.toml_table import resolve
-from digiclay.core.session.run_scene import Result, run
+from digiclay.core.session.run_scene import run
 
 from tests.assemble import followed
 
@@ -23,18 +22,18 @@ WAY = ((0.0, 0, 0, 75), (SHOWN, 0, 0, 75), (2.6, 0, 0, 47), (3.2, 0, 0, 46), (3.
 SHAPE = {"file": "dome", "rise": 10e-3}
 
 
-def scene(method: str | None, **sections: Any) -> Any:
+def scene(method, **sections):
     control = {"method": method} if method else "absent"
     return followed("", WAY, **{"control": control, "shape": SHAPE, **sections})
 
 
 @cache
-def formed(method: str) -> Result:
+def formed(method):
     return run(scene(method))
 
 
 @cache
-def wanted() -> np.ndarray:
+def wanted():
     return assemble(scene("elastic")).controller.display.heights
 
 
@@ -42,7 +41,7 @@ EDITING = [method for method in METHODS if method != "shape_display"]
 
 
 @pytest.mark.parametrize("method", EDITING)
-def test_every_method_takes_over_a_shape_that_stands(method: str) -> None:
+def test_every_method_takes_over_a_shape_that_stands(method):
     history = formed(method).history
     shown = history["height"][round(SHOWN / PERIOD)]
     assert np.abs(shown - wanted()).max() <= DEAD_BAND + 1e-12
@@ -73,7 +72,7 @@ def test_without_a_method_the_shape_stands_or_as_the_display_shows_it_and_costs_
 
 
 @pytest.mark.parametrize("method", ["virtual_master", "plastic", "push_pull"])
-def test_what_the_finger_forms_stays_on_the_shape(method: str) -> None:
+def test_what_the_finger_forms_stays_on_the_shape(method):
     last = formed(method).history["height"][-1]
     assert (last - wanted()).min() < -0.5e-3
     away = np.hypot(*formed(method).history["position"].T) > 17e-3
@@ -81,7 +80,7 @@ def test_what_the_finger_forms_stays_on_the_shape(method: str) -> None:
 
 
 @pytest.mark.parametrize("method", [name for name, known in METHODS.items() if known.recovers])
-def test_a_bed_that_recovers_goes_back_to_the_shape_and_not_to_rest(method: str) -> None:
+def test_a_bed_that_recovers_goes_back_to_the_shape_and_not_to_rest(method):
     height = formed(method).history["height"]
     pressed = height[round(3.2 / PERIOD)]
     # force_display gives way too: its field is softer than the press.
@@ -91,7 +90,7 @@ def test_a_bed_that_recovers_goes_back_to_the_shape_and_not_to_rest(method: str)
     assert np.abs(height[-1] - wanted()).max() <= left
 
 
-def test_a_session_without_a_shape_is_what_it_was_before() -> None:
+def test_a_session_without_a_shape_is_what_it_was_before():
     # The same bed, displayed flat: a shape that is no shape changes no number.
     bed = {"layout": {"rows": 15, "columns": 15}, "simulation": {"duration": 1.5}}
     one, other = (run(resolve(bed | shape)).history for shape in ({}, {"shape": SHAPE | {"rise": 0.0}}))
@@ -121,7 +120,7 @@ SESSIONS = {
 
 
 @pytest.mark.parametrize("name", SESSIONS)
-def test_every_sample_session_forms_what_it_says(name: str) -> None:
+def test_every_sample_session_forms_what_it_says(name):
     made = load(find(name))
     result = run(made)
     raised = (result.history["height"][-1] - made.actuator.rest_height) * 1e3

@@ -1,6 +1,5 @@
 """Two tracked hands shape a bed: off, late and trembling as optical tracking is, and worse."""
 
-from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 
@@ -23,7 +22,7 @@ WANTED = 0.4
 LASTS, PERIOD = 7.0, 5e-3
 
 
-def shape(time: float, side: float) -> np.ndarray:
+def shape(time, side):
     """Return where a hand is: it comes down, presses, lifts a ridge, draws it along, and leaves; m."""
     height = np.interp(time, [0.0, 0.6, 2.66, 5.46, 6.46, 6.8], [60, 48, 36, 43, 43, 90])
     along = np.interp(time, [5.46, 6.46], [-12, -6])
@@ -49,7 +48,7 @@ class Stream:
     beside: bool = False
     astray: bool = False
 
-    def messages(self) -> Iterator[tuple[float, list[tuple[object, Sequence[object]]]]]:
+    def messages(self):
         """Yield the messages with their times, s: identities and places."""
         random = np.random.default_rng(7)
         bias = [BIAS * np.array([0.5, -0.5, 0.7]), BIAS * np.array([-0.6, 0.5, -0.6])]
@@ -63,9 +62,7 @@ class Stream:
             for hand, side in enumerate((-1.0, 1.0)):
                 places[hand][0] += side * self.beside * np.interp(time, [0.3, 0.6], [40e-3, 0.0])
                 places[hand][1] += self.astray * (round(time * self.rate) % 30 == 7 * hand) * 20e-3
-            named: list[tuple[object, Sequence[object]]] = [
-                (name, place.tolist()) for name, place in zip(names, places, strict=True)
-            ]
+            named = [(name, place.tolist()) for name, place in zip(names, places, strict=True)]
             if self.gone[0] <= time < self.gone[1]:
                 named = named[:1]
             if self.hostile:
@@ -86,14 +83,14 @@ class Shaped:
     shaping: np.ndarray
     session: Session
 
-    def deviation(self, hand: int) -> float:
+    def deviation(self, hand):
         """Return the reference force deviation of a hand while shaping, N."""
         rows = self.shaping[:, hand]
         return float(np.sqrt(((self.force[rows, hand] - WANTED) ** 2).mean()))
 
 
 @cache
-def shaped(stream: Stream, tracking: Tracking = HANDS, lasts: float = LASTS) -> Shaped:
+def shaped(stream, tracking=HANDS, lasts=LASTS):
     """Return what becomes of a stream within a time, s, as `real_time_loop` has it."""
     scene = load(find("ridge_mound_valley"), [Setting("layout.rows", "19"), Setting("layout.columns", "27")])
     session = begin_session(replace(scene, fingers=2 * scene.fingers), LIMITS, tracking)
@@ -127,7 +124,7 @@ STREAMS = {
 
 
 @pytest.mark.parametrize("name", STREAMS)
-def test_tracked_hands_shape_as_softly_as_a_device_of_hands_would(name: str) -> None:
+def test_tracked_hands_shape_as_softly_as_a_device_of_hands_would(name):
     seen = shaped(STREAMS[name])
     for hand in (0, 1):
         assert seen.shaping[:, hand].sum() > 700  # 3.5 s
@@ -142,7 +139,7 @@ def test_tracked_hands_shape_as_softly_as_a_device_of_hands_would(name: str) -> 
 
 
 @pytest.mark.parametrize("gone", [True, False])
-def test_nobody_presses_on_after_a_dropout(gone: bool) -> None:
+def test_nobody_presses_on_after_a_dropout(gone):
     seen = shaped(Stream(**{"gone" if gone else "silent": (3.0, 3.6)}), lasts=4.4)
     out = (seen.time > 3.0 + HANDS.lift + 0.05) & (seen.time < 3.6)  # 50 ms at 250 mm/s are 12 mm
     assert not seen.force[out, 1].any()
@@ -156,7 +153,7 @@ def test_nobody_presses_on_after_a_dropout(gone: bool) -> None:
     assert seen.session.tracks.there.all()
 
 
-def test_without_a_part_tracked_hands_are_no_fingers() -> None:
+def test_without_a_part_tracked_hands_are_no_fingers():
     found = {}
     for part in ("clutch", "cutoff", "coupling"):
         found[part] = shaped(RENAMED, replace(HANDS, **{part: 0.0}), 4.0)  # pressed and lifted

@@ -2,7 +2,6 @@
 
 import itertools
 import re
-from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -148,7 +147,6 @@ def test_bodies_follow_the_skin_that_is_asked_for(skin):
 BEDS = (("aligned", 3.0), ("staggered", 3.0), ("hexagonal", 3.0), ("aligned", 2.3), ("staggered", 2.3))
 #: A crest is as long as the line its shape was drawn along, to this share.
 LENGTH = 0.05
-Heights = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
 
 def round_top(away, half):

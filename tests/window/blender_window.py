@@ -6,7 +6,6 @@ import shlex
 import shutil
 import subprocess
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -18,29 +17,26 @@ ADDON = HERE.parents[1] / "addon" / "digiclay"
 #: A run takes two minutes under a virtual screen with software GL, and has taken more than eight on a busy
 #: machine; beyond this it hangs, s.
 LIMIT = 1200
-Seen = dict[str, Any]
 #: Pins at rest, and how far a pin is down at least that a finger of 4 mm depth has passed, mm.
 REST, FORMED = 40.0, 1.0
 
 
-def bed(seen: Seen, name: str) -> np.ndarray:
+def bed(seen, name):
     """Return the heights of a step, mm, rows by columns."""
     return np.array(seen[name]["bed"])
 
 
-def up(seen: Seen, name: str) -> np.ndarray:
+def up(seen, name):
     """Return how far the pins are up in a step, mm."""
     return bed(seen, name) - REST
 
 
-def down(seen: Seen, name: str) -> np.ndarray:
+def down(seen, name):
     """Return how far the pins are down in a step, mm."""
     return REST - bed(seen, name)
 
 
-def played(
-    script: str, out: Path, size: tuple[int, int] = (1280, 800), by_hand: bool = False, display: str = ""
-) -> Seen:
+def played(script, out, size=(1280, 800), by_hand=False, display=""):
     """Play a script of this folder in a Blender with the extension; return what it saw and its "output".
 
     Events come from the script, or `by_hand` from outside: Blender takes one of the two. The folder is empty
@@ -66,7 +62,7 @@ def played(
             shutil.copy(picture, kept)
     said = f"{done.stdout[-6000:]}\n{done.stderr[-6000:]}"
     assert (out / "seen.json").is_file(), f"Blender ended with {done.returncode} and no result:\n{said}"
-    result: Seen = json.loads((out / "seen.json").read_text())
+    result = json.loads((out / "seen.json").read_text())
     assert "error" not in result, f"{result['error']}\n{said}"
     assert "Traceback" not in said, said
     # A blank screen has one color, a window without a bed hundreds.

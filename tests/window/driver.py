@@ -13,10 +13,8 @@ import json
 import subprocess
 import sys
 import traceback
-from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
 import addon_utils
 import bpy
@@ -28,49 +26,49 @@ EXTENSION = "bl_ext.user_default.digiclay"
 OUT, SCRIPT = (Path(text) for text in sys.argv[sys.argv.index("--") + 1 :][:2])
 #: Time between steps, s: software GL draws a window of this size in a third of it.
 PAUSE = 0.4
-SEEN: dict[str, Any] = {}
+SEEN = {}
 
 
-def part(name: str) -> Any:
+def part(name):
     return importlib.import_module(f"{EXTENSION}.{name}")
 
 
-def window() -> Any:
+def window():
     return bpy.context.window_manager.windows[0]
 
 
-def event(kind: str, value: str = "PRESS", at: tuple[int, int] = (0, 0), **modifiers: Any) -> None:
+def event(kind, value="PRESS", at=(0, 0), **modifiers):
     window().event_simulate(kind, value, x=at[0], y=at[1], **modifiers)
 
 
-def key(kind: str, at: tuple[int, int], **modifiers: Any) -> None:
+def key(kind, at, **modifiers):
     event(kind, "PRESS", at, **modifiers)
     event(kind, "RELEASE", at, **{name: held for name, held in modifiers.items() if name != "unicode"})
 
 
-def click(at: tuple[int, int]) -> Iterator[float | None]:
+def click(at):
     event("MOUSEMOVE", "NOTHING", at)
     yield 0.2
     key("LEFTMOUSE", at)
     yield 0.3
 
 
-def view() -> tuple[Any, Any]:
+def view():
     area = next(a for a in window().screen.areas if a.type == "VIEW_3D")
     return area, next(r for r in area.regions if r.type == "WINDOW")
 
 
-def middle() -> tuple[int, int]:
+def middle():
     _, region = view()
     return region.x + region.width // 2, region.y + region.height // 2
 
 
-def evaluate() -> None:
+def evaluate():
     """Have Blender work out where things stand, unknown from an undo to the next picture."""
     window().view_layer.update()
 
 
-def pixel(place: Any, region: Any = None) -> tuple[int, int]:
+def pixel(place, region=None):
     """Return where a place in the world is seen, in the first 3D view or another region, window pixels."""
     area, first = view()
     looking = region.data if region else area.spaces.active.region_3d
@@ -78,24 +76,24 @@ def pixel(place: Any, region: Any = None) -> tuple[int, int]:
     return (region or first).x + round(at.x), (region or first).y + round(at.y)
 
 
-def world(x: float, y: float, z: float = 40.0) -> Vector:
+def world(x, y, z=40.0):
     """Return where a place in the first bed's space, mm, is in the world; 40 mm: the pins at rest."""
     evaluate()
     return beds()[0].matrix_world @ (part("bridge").SCALE * 1e-3 * Vector((x, y, z)))
 
 
-def on_the_bed(x: float, y: float, z: float = 40.0) -> tuple[int, int]:
+def on_the_bed(x, y, z=40.0):
     return pixel(world(x, y, z))
 
 
-def call(operator: Any, *how: str | bool, **properties: Any) -> set[str]:
+def call(operator, *how, **properties):
     area, region = view()
     with bpy.context.temp_override(window=window(), area=area, region=region):
-        done: set[str] = operator(*how, **properties)
+        done = operator(*how, **properties)
     return done
 
 
-def open_sidebar(tab: str = "Digital Clay") -> Iterator[float | None]:
+def open_sidebar(tab="Digital Clay"):
     area, _ = view()
     area.spaces.active.show_region_ui = True
     yield None
@@ -105,7 +103,7 @@ def open_sidebar(tab: str = "Digital Clay") -> Iterator[float | None]:
     yield None
 
 
-def empty_scene() -> Iterator[float | None]:
+def empty_scene():
     call(bpy.ops.object.select_all, action="SELECT")
     call(bpy.ops.object.delete)
     bpy.ops.ed.undo_push(message="Empty scene")
@@ -113,13 +111,13 @@ def empty_scene() -> Iterator[float | None]:
     yield None
 
 
-def add_paper_bed() -> Iterator[float | None]:
+def add_paper_bed():
     call(bpy.ops.mesh.digital_clay_add, bed="paper")
     key("HOME", middle())
     yield None
 
 
-def scene_with_bed(**chosen: Any) -> Iterator[float | None]:
+def scene_with_bed(**chosen):
     yield from empty_scene()
     call(bpy.ops.mesh.digital_clay_add, **chosen)
     bpy.ops.ed.undo_push(message="Add")
@@ -127,35 +125,35 @@ def scene_with_bed(**chosen: Any) -> Iterator[float | None]:
     yield None
 
 
-def beds() -> list[Any]:
+def beds():
     return [thing for thing in window().scene.objects if part("roles").is_bed(thing)]
 
 
-def fingertip(number: int = 0) -> Any:
+def fingertip(number=0):
     return part("roles").fingertip_of(beds()[number])
 
 
-def sessions() -> list[Any]:
-    running: list[Any] = part("sessions.running").list_sessions()
+def sessions():
+    running = part("sessions.running").list_sessions()
     return running
 
 
-def session() -> Any:
+def session():
     """Return the session of the first bed, or None."""
     return part("sessions.running").find(beds()[0])
 
 
-def stopped() -> Iterator[float | None]:
+def stopped():
     yield from until(lambda: not sessions())
 
 
-def heights() -> Any:
+def heights():
     """Return the heights drawn of the first bed, mm, rows by columns."""
     bed = beds()[0]
     return 1e3 * part("bridge").read_cells(bed.data)["height"].reshape(bed.digiclay.layout.rows, -1)
 
 
-def preferences() -> Any:
+def preferences():
     """Return the extension's preferences; enabled by `main` it has none before."""
     entry = bpy.context.preferences.addons.new()
     entry.module = EXTENSION
@@ -163,7 +161,7 @@ def preferences() -> Any:
 
 
 @contextmanager
-def unfolded(name: str, root: str, *sections: str) -> Iterator[str]:
+def unfolded(name, root, *sections):
     """Show a panel with some sections unfolded in a tab of its own; Blender knows others as folded."""
     panels = part("panels")
     every = [kind for kind in panels.CLASSES if issubclass(kind, bpy.types.Panel)]
@@ -190,21 +188,14 @@ def unfolded(name: str, root: str, *sections: str) -> Iterator[str]:
     panels.register()
 
 
-def select(thing: Any) -> None:
+def select(thing):
     call(bpy.ops.object.select_all, action="DESELECT")
     thing.select_set(True)
     window().view_layer.objects.active = thing
     bpy.ops.ed.undo_push(message="Select")
 
 
-def grab(
-    offset: tuple[float, float, float],
-    axis: str,
-    steps: int = 6,
-    look_as: str = "",
-    end: str = "LEFTMOUSE",
-    periods: int = 0,
-) -> Iterator[float | None]:
+def grab(offset, axis, steps=6, look_as="", end="LEFTMOUSE", periods=0):
     """Move what is selected with G along an axis, by an offset in mm, step by step, and confirm it.
 
     Sessions follow each step before the next, for so many control `periods` at least. With `look_as` what
@@ -233,14 +224,14 @@ def grab(
     yield None
 
 
-def start(thing: Any = None) -> Iterator[float | None]:
+def start(thing=None):
     if thing is not None:
         select(thing)
     call(bpy.ops.digiclay.session, "INVOKE_DEFAULT")
     yield from settle()
 
 
-def after(name: str, *keys: str, **modifiers: bool) -> Iterator[float | None]:
+def after(name, *keys, **modifiers):
     """Press keys over the 3D view; look when the sessions have taken up whatever has happened."""
     for kind in keys:
         key(kind, middle(), **modifiers)
@@ -248,11 +239,11 @@ def after(name: str, *keys: str, **modifiers: bool) -> Iterator[float | None]:
     look(name)
 
 
-def undo(name: str, redo: bool = False) -> Iterator[float | None]:
+def undo(name, redo=False):
     yield from after(name, "Z", ctrl=True, shift=redo)
 
 
-def until(found: Callable[[], bool], every: float = 0.25) -> Iterator[float | None]:
+def until(found, every=0.25):
     """Wait until something is so, however slow the machine is; what is not so after minutes never will be."""
     for _ in range(int(120.0 / every)):
         yield every
@@ -261,13 +252,13 @@ def until(found: Callable[[], bool], every: float = 0.25) -> Iterator[float | No
     raise AssertionError("What was waited for did not come")
 
 
-def rounds(count: int = 3) -> Iterator[float | None]:
+def rounds(count=3):
     """Let Blender go round its main loop: in each it reads events, handles them, and draws."""
     for _ in range(count):
         yield 0.02
 
 
-def settle(ticks: int = 3) -> Iterator[float | None]:
+def settle(ticks=3):
     running = part("sessions.running")
     start = max((session.tick for session in running.list_sessions()), default=0)
     for _ in range(100):
@@ -278,7 +269,7 @@ def settle(ticks: int = 3) -> Iterator[float | None]:
     raise AssertionError("The session does not tick any more")
 
 
-def simulate(periods: int) -> Iterator[float | None]:
+def simulate(periods):
     begun = {one.uid: one.state.period for one in part("sessions.running").list_sessions()}
     for _ in range(200):
         sessions = part("sessions.running").list_sessions()
@@ -288,11 +279,11 @@ def simulate(periods: int) -> Iterator[float | None]:
     raise AssertionError("The session does not simulate any more")
 
 
-def look(name: str) -> None:
+def look(name):
     """Write down what stands in the scene; everything is fetched anew, since undo invalidates it."""
     evaluate()
     bridge, running = part("bridge"), part("sessions.running")
-    found: dict[str, Any] = {"beds": len(beds()), "said": running.last_message()}
+    found = {"beds": len(beds()), "said": running.last_message()}
     found["sessions"] = len(running.list_sessions())
     for bed in beds()[:1]:
         session = running.find(bed)
@@ -316,7 +307,7 @@ def look(name: str) -> None:
     SEEN[name] = found
 
 
-def shot(name: str) -> None:
+def shot(name):
     bpy.ops.wm.redraw_timer(type="DRAW_WIN_SWAP", iterations=1)
     # Blender's own screenshot reads a buffer that software GL leaves black.
     file = OUT / f"{name}.png"
@@ -325,7 +316,7 @@ def shot(name: str) -> None:
     SEEN.setdefault("colors", {})[name] = len(np.unique(pixels.reshape(-1, pixels.shape[2]), axis=0))
 
 
-def read_shot(name: str) -> Any:
+def read_shot(name):
     """Return the pixels of a picture, (height, width, channels), the lower row first."""
     image = bpy.data.images.load(str(OUT / f"{name}.png"))
     pixels = np.array(image.pixels[:], np.float32).reshape(image.size[1], image.size[0], image.channels)
@@ -333,18 +324,18 @@ def read_shot(name: str) -> Any:
     return pixels
 
 
-def hand_over() -> None:
+def hand_over():
     (OUT / "seen.json").write_text(json.dumps(SEEN))
 
 
-def finish() -> None:
+def finish():
     """Hand over what was seen, and leave with the extension taken back."""
     hand_over()
     addon_utils.disable(EXTENSION)
     bpy.ops.wm.quit_blender()
 
 
-def main() -> None:
+def main():
     faulthandler.enable()  # Blender that crashes says at which line of Python it did
     bpy.context.preferences.view.show_splash = False
     bpy.context.preferences.view.smooth_view = 0  # the mouse is sent by where things are seen
@@ -356,8 +347,6 @@ def main() -> None:
         SEEN["error"] = f"{EXTENSION} cannot be enabled"
     sys.path[:0] = [str(SCRIPT.parent), str(SCRIPT.parents[2])]  # scripts share what a hand does
     found = importlib.util.spec_from_file_location("script", SCRIPT)
-    assert found is not None
-    assert found.loader is not None
     played = importlib.util.module_from_spec(found)
     found.loader.exec_module(played)
     if "error" not in SEEN and not getattr(played, "FINE_PINS", False):
@@ -366,7 +355,7 @@ def main() -> None:
             area.spaces.active.overlay.show_floor = False  # a sixth of what is left
     steps = played.script(sys.modules[__name__])
 
-    def step() -> float | None:
+    def step():
         try:
             if "error" not in SEEN:
                 return next(steps) or PAUSE

@@ -2,9 +2,7 @@
 
 import os
 import time
-from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import bpy
 
@@ -20,24 +18,24 @@ TAB, START = (-10, 178), (-130, 45)
 HALF = 24.0
 
 
-def in_the_sidebar(blender: Any, place: tuple[int, int]) -> tuple[int, int]:
+def in_the_sidebar(blender, place):
     area, _ = blender.view()
     bar = next(region for region in area.regions if region.type == "UI")
     return bar.x + bar.width + place[0], blender.window().height - (bar.y + bar.height) + place[1]
 
 
-def middle(blender: Any) -> tuple[int, int]:
+def middle(blender):
     x, y = blender.middle()
     return x, blender.window().height - 1 - y
 
 
-def done(blender: Any, *words: str) -> Iterator[float | None]:
+def done(blender, *words):
     process = hand(*words)
     yield from blender.until(lambda: process.poll() is not None)
     yield 1.0
 
 
-def add(blender: Any) -> Iterator[float | None]:
+def add(blender):
     typed = " ".join(f"key {letter} sleep 0.05" for letter in "dig")
     yield from done(blender, to(middle(blender)), "key shift+a sleep 0.5", typed, "sleep 0.5 key Return")
     blender.SEEN["added"] = len(blender.beds())
@@ -46,20 +44,20 @@ def add(blender: Any) -> Iterator[float | None]:
     blender.SEEN["distance"] = blender.view()[0].spaces.active.region_3d.view_distance
 
 
-def open_tab(blender: Any) -> Iterator[float | None]:
+def open_tab(blender):
     yield from done(blender, "key n")
     yield from done(blender, to(in_the_sidebar(blender, TAB)), "click 1")
     bar = next(region for region in blender.view()[0].regions if region.type == "UI")
     blender.SEEN["tab"] = bar.active_panel_category
 
 
-def start(blender: Any) -> Iterator[float | None]:
+def start(blender):
     yield from done(blender, to(in_the_sidebar(blender, START)), "click 1")
     blender.SEEN["started"] = len(blender.sessions())
     blender.SEEN["tool"] = blender.window().workspace.tools.from_space_view3d_mode("OBJECT").idname
 
 
-def draw(blender: Any) -> Iterator[float | None]:
+def draw(blender):
     """Draw a line over the middle with Ctrl held; look at the finger on its way."""
     first, last = on_the_screen(blender, -HALF, 0.0), on_the_screen(blender, HALF, 0.0)
     words = to(first), "keydown ctrl mousedown 1", drag(first, last, 2.0, 60), "mouseup 1 keyup ctrl"
@@ -70,7 +68,7 @@ def draw(blender: Any) -> Iterator[float | None]:
     note(blender, "drawn")
 
 
-def stop(blender: Any) -> Iterator[float | None]:
+def stop(blender):
     yield from done(blender, "key Escape")
     blender.SEEN["left"] = len(blender.sessions())
 
@@ -85,13 +83,13 @@ STEPS = (
 )
 
 
-def waiting() -> float:
+def waiting():
     """Return how long Blender has waited for the processor, s; 0 where that is not counted."""
     counts = Path("/proc/self/schedstat")
     return 1e-9 * int(counts.read_text().split()[1]) if counts.is_file() else 0.0
 
 
-def along(blender: Any) -> float:
+def along(blender):
     """Return where the finger is along its line, mm; before the line where it begins."""
     (session,) = blender.sessions()
     dragging = blender.part("strokes.stroke").DRAGGING
@@ -99,7 +97,7 @@ def along(blender: Any) -> float:
     return 1e3 * float(session.pose[0]) if on_the_way else -HALF
 
 
-def script(blender: Any) -> Iterator[float | None]:
+def script(blender):
     """Do what the page says, in the file that Blender starts with; then take hold of the ball."""
     catch_up(blender)
     yield from focus_window()
@@ -114,13 +112,13 @@ def script(blender: Any) -> Iterator[float | None]:
     yield from ball(blender)
 
 
-def point(blender: Any) -> Iterator[float | None]:
+def point(blender):
     """Point at the pins with the sidebar closed: a picture of the guide."""
     yield from done(blender, "key n", "sleep 0.5", to(on_the_screen(blender, -16.0, -22.0)))
     blender.shot("guide_press")
 
 
-def ball(blender: Any) -> Iterator[float | None]:
+def ball(blender):
     blender.call(bpy.ops.wm.tool_set_by_id, name="builtin.select_box")
     tip = blender.fingertip()
     before = list(tip.matrix_world.translation)

@@ -1,8 +1,5 @@
 """Raises, levels and smooths clay with the Press tool as a hand does: X events from outside."""
 
-from collections.abc import Iterator
-from typing import Any
-
 import bpy
 import numpy as np
 
@@ -27,7 +24,7 @@ QUICK, SLOWER = (0.5, 125), (0.6, 125)
 SPIKE, SPIKES = 12e-3, ((0.0, 0.0), (0.0, 18.0))
 
 
-def put_spikes(blender: Any) -> None:
+def put_spikes(blender):
     session = blender.session()
     system = session.system
     state = blender.part("core.engine.simulation").begin(system)
@@ -44,14 +41,14 @@ def put_spikes(blender: Any) -> None:
     blender.call(bpy.ops.ed.undo_push, message="Spikes")
 
 
-def script(blender: Any) -> Iterator[float | None]:
+def script(blender):
     yield from prepare(blender)
     yield from raise_and_level(blender)
     yield from reset(blender)
     yield from smooth(blender)
 
 
-def raise_and_level(blender: Any) -> Iterator[float | None]:
+def raise_and_level(blender):
     """Raise by the header's brush, by Ctrl, and lower by Ctrl; level the middle of what was lowered."""
     settings = brush(blender)
     for name, kind, y, key in (
@@ -74,15 +71,15 @@ def raise_and_level(blender: Any) -> Iterator[float | None]:
     settings.brush = "LOWER"
 
 
-def smooth(blender: Any) -> Iterator[float | None]:
+def smooth(blender):
     """Smooth by Shift and by the header's brush, undo, cancel, and form a line by Shift and a click."""
     yield from act(blender, to(on_the_screen(blender, -27.0, -27.0)), "click 1")
     put_spikes(blender)
     yield from blender.settle(5)
     note(blender, "before")
-    first: list[list[float]] = []
+    first = []
 
-    def started() -> bool:
+    def started():
         strokes = blender.session().strokes
         if strokes:
             first.append([1e3 * strokes[-1].samples[0].x, 1e3 * strokes[-1].samples[0].y])
@@ -102,7 +99,7 @@ def smooth(blender: Any) -> Iterator[float | None]:
     yield from click(blender)
 
 
-def by_brush(blender: Any) -> Iterator[float | None]:
+def by_brush(blender):
     """Smooth with the brush of the header; then once more, and take that back by Esc."""
     settings = brush(blender)
     settings.brush = "SMOOTH"
@@ -120,7 +117,7 @@ def by_brush(blender: Any) -> Iterator[float | None]:
     settings.brush = "LOWER"
 
 
-def click(blender: Any) -> Iterator[float | None]:
+def click(blender):
     """Press once, then click with Shift: the line between the two."""
     ends = [on_the_screen(blender, x, -24.0) for x in (-27.0, 27.0)]
     yield from act(blender, to(ends[0]), "click 1")

@@ -1,8 +1,6 @@
 """Draws while a 3D mouse turns the view, in a quad view and a second window; leaves sculpt mode."""
 
 import subprocess
-from collections.abc import Iterator
-from typing import Any
 
 import bpy
 import numpy as np
@@ -10,7 +8,6 @@ import numpy as np
 from tests.window import space_mouse
 from tests.window.hand_strokes import (
     HALF,
-    Pixel,
     act,
     done,
     drag,
@@ -31,7 +28,7 @@ LEAVE = (450, 13)
 TURN = (0, 0, 0, 0, 15, 0)
 
 
-def script(blender: Any) -> Iterator[float | None]:
+def script(blender):
     yield from prepare(blender)
     yield from turned(blender)
     yield from reset(blender)
@@ -41,16 +38,16 @@ def script(blender: Any) -> Iterator[float | None]:
     yield from sculpting(blender)
 
 
-def held_stroke(blender: Any) -> Any:
+def held_stroke(blender):
     (session,) = blender.sessions()
     return session.strokes[-1] if session.strokes and session.strokes[-1].held else None
 
 
-def followed(blender: Any) -> Iterator[float | None]:
+def followed(blender):
     yield from blender.until(lambda: held_stroke(blender) is not None and held_stroke(blender).reached > 0)
 
 
-def let_go(blender: Any, name: str) -> Iterator[float | None]:
+def let_go(blender, name):
     yield from followed(blender)
     path = [[1e3 * sample.x, 1e3 * sample.y] for sample in held_stroke(blender).samples]
     yield from act(blender, "mouseup 1")
@@ -58,7 +55,7 @@ def let_go(blender: Any, name: str) -> Iterator[float | None]:
     blender.SEEN[name]["path"] = path
 
 
-def turned(blender: Any) -> Iterator[float | None]:
+def turned(blender):
     looking = blender.view()[0].spaces.active.region_3d
     start, end = ends(blender)
     before, distance = np.array(looking.view_rotation), looking.view_distance
@@ -68,7 +65,7 @@ def turned(blender: Any) -> Iterator[float | None]:
     process = hand(to(start), "mousedown 1", *[there, back] * 60)
     yield from followed(blender)
 
-    def is_turned() -> bool:
+    def is_turned():
         space_mouse.push(TURN)
         return bool(np.abs(np.array(looking.view_rotation) - before).max() > 0.03)
 
@@ -86,7 +83,7 @@ def turned(blender: Any) -> Iterator[float | None]:
     blender.shot("elsewhere_turned")
 
 
-def quarter(blender: Any) -> Iterator[float | None]:
+def quarter(blender):
     blender.call(bpy.ops.screen.region_quadview)
     yield from blender.until(lambda: top_quarter(blender) is not None)
     yield from draw_in(blender, "quarter", blender.window(), top_quarter(blender), (0, 0))
@@ -95,7 +92,7 @@ def quarter(blender: Any) -> Iterator[float | None]:
     yield None
 
 
-def draw_in(blender: Any, name: str, window: Any, region: Any, corner: Pixel) -> Iterator[float | None]:
+def draw_in(blender, name, window, region, corner):
     """Draw along the middle row in a region of a window whose top left corner is somewhere on the screen."""
     seen = (blender.pixel(blender.world(x, 0.0), region) for x in (-HALF, HALF))
     start, end = ((corner[0] + across, corner[1] + window.height - 1 - up) for across, up in seen)
@@ -103,9 +100,9 @@ def draw_in(blender: Any, name: str, window: Any, region: Any, corner: Pixel) ->
     yield from let_go(blender, name)
 
 
-def windows_on_screen() -> dict[str, dict[str, int]]:
+def windows_on_screen():
 
-    def told(*words: str) -> list[str]:
+    def told(*words):
         return subprocess.run(["xdotool", *words], check=True, capture_output=True, text=True).stdout.split()
 
     lines = {
@@ -115,7 +112,7 @@ def windows_on_screen() -> dict[str, dict[str, int]]:
     return {one: {k: int(v) for k, v in (text.split("=") for text in found)} for one, found in lines.items()}
 
 
-def second_window(blender: Any) -> Iterator[float | None]:
+def second_window(blender):
     first = set(windows_on_screen())
     bpy.ops.wm.window_new()
     yield from blender.until(lambda: len(windows_on_screen()) > len(first))
@@ -136,7 +133,7 @@ def second_window(blender: Any) -> Iterator[float | None]:
     yield from focus_window()
 
 
-def sculpting(blender: Any) -> Iterator[float | None]:
+def sculpting(blender):
     blender.select(blender.beds()[0])
     home = blender.window().workspace
     blender.window().workspace = bpy.data.workspaces["Sculpting"]

@@ -1,9 +1,7 @@
 """Draws faster than strokes are formed, from outside Blender: a queue, its end at once, Esc, undo, load."""
 
 import time
-from collections.abc import Iterator
 from itertools import pairwise
-from typing import Any
 
 import bpy
 
@@ -29,7 +27,7 @@ WAVE = ((-27.0, -9.0), (-9.0, 12.0), (9.0, -12.0), (27.0, 9.0))
 LOADS = {"alone": (30, 0.0), "few redraws": (4, 0.0), "a load": (30, 0.15)}
 
 
-def draw(blender: Any, *paths: tuple[tuple[float, float], ...], then: str = "") -> Any:
+def draw(blender, *paths, then=""):
     words = []
     for path in paths:
         places = [on_the_screen(blender, *place) for place in path]
@@ -39,11 +37,11 @@ def draw(blender: Any, *paths: tuple[tuple[float, float], ...], then: str = "") 
     return hand(*words, then)
 
 
-def drawn(blender: Any, *paths: Any) -> Iterator[float | None]:
+def drawn(blender, *paths):
     yield from done(blender, draw(blender, *paths))
 
 
-def script(blender: Any) -> Iterator[float | None]:
+def script(blender):
     yield from prepare(blender, "TOP", bed="paper")
     yield from act(blender, to(on_the_screen(blender, 0.0, 0.0)), "click 1")  # the session begins
     yield from reset(blender)
@@ -57,7 +55,7 @@ def script(blender: Any) -> Iterator[float | None]:
         yield from under_load(blender, name, rate, load)
 
 
-def queue(blender: Any) -> Iterator[float | None]:
+def queue(blender):
     # So few are for a finger that is moved by hand.
     preferences, usual = blender.preferences(), blender.preferences().most_periods
     preferences.most_periods = 1
@@ -86,7 +84,7 @@ def queue(blender: Any) -> Iterator[float | None]:
     yield from reset(blender)
 
 
-def haste(blender: Any) -> Iterator[float | None]:
+def haste(blender):
     loop = blender.part("live.loop").LOOP
     for name, keys in (("finished", "key Return"), ("let go on", "key Return sleep 0.05 key Escape")):
         yield from done(blender, draw(blender, *LINES, then=keys))
@@ -101,7 +99,7 @@ def haste(blender: Any) -> Iterator[float | None]:
         yield from reset(blender)
 
 
-def taken_back(blender: Any) -> Iterator[float | None]:
+def taken_back(blender):
     """Take back queued strokes, redo them; save a queue, and press Esc three times while it is formed."""
     away = to(on_the_screen(blender, 0.0, -33.0))
     yield from drawn(blender, *LINES)
@@ -128,11 +126,11 @@ def taken_back(blender: Any) -> Iterator[float | None]:
     yield from reset(blender)
 
 
-def under_load(blender: Any, name: str, rate: int, load: float) -> Iterator[float | None]:
+def under_load(blender, name, rate, load):
     preferences = blender.preferences()
     preferences.redraw_rate = rate
 
-    def burn() -> float | None:
+    def burn():
         until = time.perf_counter() + load
         while time.perf_counter() < until:
             pass
@@ -142,7 +140,7 @@ def under_load(blender: Any, name: str, rate: int, load: float) -> Iterator[floa
         bpy.app.timers.register(burn)
     process, path = draw(blender, WAVE), []
 
-    def formed() -> bool:
+    def formed():
         strokes = blender.session().strokes
         path[:] = [(sample.x, sample.y) for sample in strokes[0].samples] if strokes else path
         return bool(path) and not strokes and process.poll() is not None

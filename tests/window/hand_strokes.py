@@ -1,9 +1,7 @@
 """Draws with the Press tool as a hand does: X events from outside Blender, in continuous motion."""
 
 import subprocess
-from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import bpy
 import numpy as np
@@ -17,71 +15,58 @@ TAPS = ((-24.0, 24.0), (0.0, 24.0), (24.0, 24.0))
 DRAWN = Path(__file__).parents[2] / "benchmarks" / "strokes"
 THINGS = ("letter_a", "r_lowered", "smiley", "spiral", "coin", "portrait")
 
-Pixel = tuple[int, int]
-Place = tuple[float, float]
 
-
-def on_the_screen(blender: Any, x: float, y: float) -> Pixel:
+def on_the_screen(blender, x, y):
     """Return where a place on the pins at rest, mm, is on the screen: pixels from its top left corner."""
     left, up = blender.on_the_bed(x, y)
     return left, blender.window().height - 1 - up
 
 
-def hand(*words: str) -> subprocess.Popen[bytes]:
+def hand(*words):
     return subprocess.Popen(["xdotool", *" ".join(words).split()])
 
 
-def to(at: Pixel, pause: float = 0.05) -> str:
+def to(at, pause=0.05):
     """Return what moves the hand to a pixel and leaves it there for a while, s."""
     return f"mousemove {at[0]} {at[1]} sleep {pause:.4f}"
 
 
-def drag(start: Pixel, end: Pixel, duration: float, rate: float) -> str:
+def drag(start, end, duration, rate):
     count = max(2, round(duration * rate))
     way = np.linspace(start, end, count + 1)[1:].round().astype(int)
     return " ".join(to((int(x), int(y)), duration / count) for x, y in way)
 
 
-def line(
-    blender: Any,
-    start: Place,
-    end: Place,
-    duration: float = 1.0,
-    rate: float = 60,
-    key: str = "",
-    last: str = "mouseup 1",
-) -> subprocess.Popen[bytes]:
+def line(blender, start, end, duration=1.0, rate=60, key="", last="mouseup 1"):
     """Start a hand that draws a line over the bed, mm, with a key held down, and ends it by some words."""
     first, final = on_the_screen(blender, *start), on_the_screen(blender, *end)
     down, up = (f"keydown {key} sleep 0.2", f"keyup {key}") if key else ("", "")
     return hand(to(first), down, "mousedown 1", drag(first, final, duration, rate), last, up)
 
 
-def done(blender: Any, process: subprocess.Popen[bytes]) -> Iterator[float | None]:
+def done(blender, process):
     yield from blender.until(lambda: process.poll() is not None)
     yield from blender.rounds()
 
 
-def finish(blender: Any, process: subprocess.Popen[bytes]) -> Iterator[float | None]:
+def finish(blender, process):
     """Wait until the hand is done, and then until the fingertip is, and the pins have come to rest."""
     yield from done(blender, process)
     yield from blender.until(lambda: not any(session.strokes for session in blender.sessions()))
     yield from rest(blender)
 
 
-def rest(blender: Any) -> Iterator[float | None]:
+def rest(blender):
     """Let the pins come to rest: a tick simulates all the time since the one before, however long it was."""
     yield 2.0
     yield from blender.settle()
 
 
-def act(blender: Any, *words: str) -> Iterator[float | None]:
+def act(blender, *words):
     yield from finish(blender, hand(*words))
 
 
-def stroke(
-    blender: Any, name: str, start: Place, end: Place, *how: Any, picture: str = "", key: str = ""
-) -> Iterator[float | None]:
+def stroke(blender, name, start, end, *how, picture="", key=""):
     """Draw a line, finish it, and write it down; take a picture as soon as the hand is done."""
     process = line(blender, start, end, *how, key=key)
     if picture:
@@ -91,7 +76,7 @@ def stroke(
     note(blender, name)
 
 
-def note(blender: Any, name: str) -> None:
+def note(blender, name):
     """Write down the heights, how many strokes the fingertip has finished, and how the view is turned."""
     blender.look(name)
     session, (area, _) = blender.session(), blender.view()
@@ -103,17 +88,17 @@ def note(blender: Any, name: str) -> None:
     }
 
 
-def ends(blender: Any, y: float = 0.0) -> tuple[Pixel, Pixel]:
+def ends(blender, y=0.0):
     return on_the_screen(blender, -HALF, y), on_the_screen(blender, HALF, y)
 
 
-def reset(blender: Any) -> Iterator[float | None]:
+def reset(blender):
     if blender.call(bpy.ops.digiclay.session_reset.poll):
         blender.call(bpy.ops.digiclay.session_reset)
     yield from blender.settle()
 
 
-def add_bed(blender: Any, **chosen: Any) -> None:
+def add_bed(blender, **chosen):
     blender.call(bpy.ops.object.select_all, action="SELECT")
     blender.call(bpy.ops.object.delete)
     blender.call(bpy.ops.mesh.digital_clay_add, **chosen)
@@ -121,24 +106,24 @@ def add_bed(blender: Any, **chosen: Any) -> None:
     catch_up(blender)
 
 
-def catch_up(blender: Any) -> None:
+def catch_up(blender):
     """Let the session catch up between two frames: one takes software GL half a second."""
     blender.preferences().most_periods = 1000
 
 
-def take_tool(blender: Any) -> None:
+def take_tool(blender):
     blender.call(bpy.ops.wm.tool_set_by_id, name="digiclay.press_tool")
     blender.call(bpy.ops.object.select_all, action="DESELECT")
 
 
-def focus_window() -> Iterator[float | None]:
+def focus_window():
     """Make Blender's window the active one: else a button is pressed where the pointer is by then."""
     # A slow server has the time it needs.
     hand("search --onlyvisible --class blender windowfocus --sync").wait(300)
     yield None
 
 
-def prepare(blender: Any, view: str = "", **chosen: Any) -> Iterator[float | None]:
+def prepare(blender, view="", **chosen):
     add_bed(blender, **chosen)
     if view:
         blender.call(bpy.ops.view3d.view_axis, type=view)
@@ -146,11 +131,11 @@ def prepare(blender: Any, view: str = "", **chosen: Any) -> Iterator[float | Non
     yield from focus_window()
 
 
-def brush(blender: Any) -> Any:
+def brush(blender):
     return blender.part("press.brush").tool_settings(bpy.context)
 
 
-def script(blender: Any) -> Iterator[float | None]:
+def script(blender):
     yield from prepare(blender)
     for duration, rate in STROKES:
         how, picture = (duration, rate), f"hand_{duration:g}"
@@ -165,7 +150,7 @@ def script(blender: Any) -> Iterator[float | None]:
     yield from things(blender)
 
 
-def message(blender: Any) -> Iterator[float | None]:
+def message(blender):
     """Draw a stroke after another one, with no key between them, while Blender shows a message."""
     tip = blender.fingertip()
     size = tip.scale.copy()
@@ -177,7 +162,7 @@ def message(blender: Any) -> Iterator[float | None]:
     yield from reset(blender)
 
 
-def taps(blender: Any) -> Iterator[float | None]:
+def taps(blender):
     note(blender, "before the taps")
     yield from act(blender, *(to(on_the_screen(blender, *at), 0.08) + " click 1 sleep 0.15" for at in TAPS))
     note(blender, "taps")
@@ -186,7 +171,7 @@ def taps(blender: Any) -> Iterator[float | None]:
     yield from reset(blender)
 
 
-def navigation(blender: Any) -> Iterator[float | None]:
+def navigation(blender):
     start, end = ends(blender)
     middle = (start[0] + end[0]) // 2, (start[1] + end[1]) // 2
     note(blender, "before orbit")
@@ -207,7 +192,7 @@ def navigation(blender: Any) -> Iterator[float | None]:
     yield from reset(blender)
 
 
-def pie_menu(blender: Any) -> Iterator[float | None]:
+def pie_menu(blender):
     """Pan in the middle of a stroke; then open the pie menu of the shading, and let go over Solid."""
     start, end = ends(blender)
     x, y = (start[0] + end[0]) // 2, (start[1] + end[1]) // 2
@@ -228,7 +213,7 @@ def pie_menu(blender: Any) -> Iterator[float | None]:
     yield from reset(blender)
 
 
-def taken_back(blender: Any) -> Iterator[float | None]:
+def taken_back(blender):
     for name, key in (("undone", "ctrl+z"), ("escaped", "Escape")):
         process = line(blender, (-HALF, 0.0), (HALF, 0.0), last="sleep 2")
         yield from blender.until(lambda: any(s.strokes and s.strokes[0].reached for s in blender.sessions()))
@@ -238,7 +223,7 @@ def taken_back(blender: Any) -> Iterator[float | None]:
         note(blender, name)
 
 
-def follow(blender: Any, recorded_stroke: Any) -> str:
+def follow(blender, recorded_stroke):
     start, *moves = recorded_stroke.moves
     words, before = [to(on_the_screen(blender, 1e3 * start[1], 1e3 * start[2])), "mousedown 1"], 0.0
     for time, x, y in moves:
@@ -247,7 +232,7 @@ def follow(blender: Any, recorded_stroke: Any) -> str:
     return " ".join([*words, "mouseup 1"])
 
 
-def things(blender: Any) -> Iterator[float | None]:
+def things(blender):
     """Form some things of the gallery on an empty bed, stroke by stroke, with what each has in the header."""
     read = blender.part("recorded.pointer_strokes").read_strokes
     drawn = [(name, read(DRAWN / f"{name}.toml")) for name in THINGS]
@@ -271,7 +256,7 @@ def things(blender: Any) -> Iterator[float | None]:
         yield from reset(blender)
 
 
-def choose(blender: Any, stroke: Any) -> None:
+def choose(blender, stroke):
     settings = brush(blender)
     settings.brush, settings.strength = stroke.kind.value, stroke.strength
     settings.path, settings.symmetry = stroke.path.upper(), stroke.symmetry.upper()

@@ -1,8 +1,5 @@
 """Erases, locks and stamps with the Press tool, about a placed center: X events from outside."""
 
-from collections.abc import Iterator
-from typing import Any
-
 import bpy
 
 from tests.window.hand_strokes import (
@@ -27,7 +24,7 @@ HOW = (0.5, 60)
 LONG, CENTER = 21.0, (6.0, -3.0)
 
 
-def keep(blender: Any, name: str) -> None:
+def keep(blender, name):
     note(blender, name)
     session = blender.session()
     locked = blender.part("core.base.modes").Mode.LOCKED
@@ -35,7 +32,7 @@ def keep(blender: Any, name: str) -> None:
     blender.shot(f"verbs_{name.replace(' ', '_')}")
 
 
-def script(blender: Any) -> Iterator[float | None]:
+def script(blender):
     yield from prepare(blender)
     settings = brush(blender)
     yield from stroke(blender, "groove", (-LONG, 0.0), (LONG, 0.0), *HOW)
@@ -54,7 +51,7 @@ def script(blender: Any) -> Iterator[float | None]:
     yield from center(blender, settings)
 
 
-def locks(blender: Any, settings: Any) -> Iterator[float | None]:
+def locks(blender, settings):
     """Turn the locks over, undo that, and clear them; take one off by Ctrl before."""
     settings.brush = "LOCK"
     blender.call(bpy.ops.digiclay.press_locks_invert, "INVOKE_DEFAULT", True)
@@ -69,7 +66,7 @@ def locks(blender: Any, settings: Any) -> Iterator[float | None]:
     keep(blender, "cleared")
 
 
-def stamp(blender: Any, settings: Any) -> Iterator[float | None]:
+def stamp(blender, settings):
     """Stamp a pyramid by dragging from its middle, and take it back; press one in by Ctrl."""
     settings.brush, settings.stamp, settings.height = "STAMP", "pyramid", 12.0
     start, end = (on_the_screen(blender, x, 18.0) for x in (0.0, 15.0))
@@ -86,7 +83,7 @@ def stamp(blender: Any, settings: Any) -> Iterator[float | None]:
     keep(blender, "imprinted")
 
 
-def center(blender: Any, settings: Any) -> Iterator[float | None]:
+def center(blender, settings):
     """Place a center and draw a ray five times about it; mirror a line across a placed axis."""
     settings.brush, settings.symmetry, settings.radial = "RAISE", "RADIAL", 5
     yield from reset(blender)

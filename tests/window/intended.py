@@ -9,8 +9,6 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-from digiclay.core.base.arrays import Floats
-from numpy.typing import NDArray
 
 Corners = Sequence[tuple[float, float]]
 
@@ -27,7 +25,7 @@ class Line:
     section: tuple[float, float] = TIP
     area: bool = False
 
-    def evaluate(self, x: Floats, y: Floats) -> Floats:
+    def evaluate(self, x, y):
         """Return heights at some places: even up to the flat part, and then down to nothing."""
         far = find_distance(self.corners, x, y)
         if self.area:
@@ -36,13 +34,13 @@ class Line:
         return np.asarray(self.height * np.clip((half - far) / (half - flat), 0.0, 1.0))
 
 
-def _arc(x: float, y: float, radius: float, start: float, end: float) -> Corners:
+def _arc(x, y, radius, start, end):
     """Return the corners of an arc from angle to angle, degrees."""
     angles = np.radians(np.linspace(start, end, 1 + max(2, round(abs(end - start)))))
     return [(x + radius * np.cos(a), y + radius * np.sin(a)) for a in angles.tolist()]
 
 
-def _round(corners: Corners) -> Corners:
+def _round(corners):
     """Return a closed polygon with its corners cut off, and those that this leaves once more."""
     for _ in range(2):
         start, end = np.array(corners[:-1]), np.array(corners[1:])
@@ -51,12 +49,12 @@ def _round(corners: Corners) -> Corners:
     return corners
 
 
-def _mirror(*lines: Line) -> list[Line]:
+def _mirror(*lines):
     """Return lines and their mirror images."""
     return [replace(line, corners=[(s * x, y) for x, y in line.corners]) for line in lines for s in (1, -1)]
 
 
-def _draw_r(height: float) -> list[Line]:
+def _draw_r(height):
     """Stem, bowl and leg of a letter R."""
     bowl = [(-28.0, 50.0), *_arc(4.0, 25.0, 25.0, 90.0, -90.0), (-28.0, 0.0)]
     return [
@@ -105,7 +103,7 @@ PORTRAIT = (
     ],
 )  # fmt: skip
 #: Layers of lines: where those of a layer cross the greater height counts; layers add up.
-RELIEFS: dict[str, tuple[list[Line], ...]] = {
+RELIEFS = {
     "letter_a": (LETTER_A,),
     "r_lowered": (_draw_r(-4.0),),
     "r_raised": (_draw_r(8.0),),
@@ -122,14 +120,14 @@ RELIEFS: dict[str, tuple[list[Line], ...]] = {
 THINGS = tuple(RELIEFS)
 
 
-def find_relief(name: str, x: Floats, y: Floats) -> Floats:
+def find_relief(name, x, y):
     """Return the intended heights of one of `THINGS` above rest at some places (n,), m."""
     layers = [np.array([line.evaluate(1e3 * x, 1e3 * y) for line in layer]) for layer in RELIEFS[name]]
     heights = [one.max(axis=0).clip(0.0) + one.min(axis=0).clip(None, 0.0) for one in layers]
     return np.asarray(1e-3 * np.sum(heights, axis=0))
 
 
-def find_distance(corners: Corners, x: Floats, y: Floats) -> Floats:
+def find_distance(corners, x, y):
     """Return how far places (n,) are from a line through corners, or from a single one."""
     near = np.full(x.shape, np.inf)
     for (ax, ay), (bx, by) in pairwise(corners if len(corners) > 1 else [*corners, *corners]):
@@ -140,7 +138,7 @@ def find_distance(corners: Corners, x: Floats, y: Floats) -> Floats:
     return near
 
 
-def _lies_inside(corners: Corners, x: Floats, y: Floats) -> NDArray[np.bool_]:
+def _lies_inside(corners, x, y):
     """Return whether places are inside a closed polygon, by how often a ray crosses it."""
     inside = np.zeros(x.shape, np.bool_)
     for (ax, ay), (bx, by) in pairwise(corners):

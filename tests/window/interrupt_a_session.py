@@ -1,13 +1,10 @@
 """Deletes, edits and switches what a session needs while it runs; disables the extension; loads a file."""
 
-from collections.abc import Iterator
-from typing import Any
-
 import addon_utils
 import bpy
 
 
-def press(blender: Any) -> Iterator[float | None]:
+def press(blender):
     tip = blender.fingertip()
     for z in (46.0, 43.0, 40.0, 38.0, 37.0, 37.0, 40.0, 46.0):
         tip.location.z = (z + 8.0) * 1e-3 * blender.part("bridge").SCALE
@@ -16,7 +13,7 @@ def press(blender: Any) -> Iterator[float | None]:
     yield None
 
 
-def edit_in_mid_stroke(blender: Any) -> Iterator[float | None]:
+def edit_in_mid_stroke(blender):
     """Draw a stroke, go to Edit Mode before the fingertip has formed it, stop with Esc, and go on."""
     blender.select(blender.beds()[0])
     yield None
@@ -43,7 +40,7 @@ def edit_in_mid_stroke(blender: Any) -> Iterator[float | None]:
     settings.brush = "LOWER"
 
 
-def script(blender: Any) -> Iterator[float | None]:
+def script(blender):
     after = blender.after
     yield from blender.scene_with_bed()
     yield from blender.open_sidebar()

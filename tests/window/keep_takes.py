@@ -2,14 +2,12 @@
 
 import os
 import shutil
-from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import bpy
 
 
-def script(blender: Any) -> Iterator[float | None]:
+def script(blender):
     """Do what a user does with takes; the Takes panel is in sight from the first take on."""
     yield from blender.empty_scene()
     yield from blender.add_paper_bed()
@@ -55,14 +53,14 @@ def script(blender: Any) -> Iterator[float | None]:
     yield from leave_files(blender)
 
 
-def to_height(blender: Any, height: float, steps: int, periods: int = 0) -> Iterator[float | None]:
+def to_height(blender, height, steps, periods=0):
     """Move the fingertip with G until its lowest point is at a height, mm; see `grab`."""
     now = 1e3 * blender.part("bridge").pose(blender.fingertip())[2]
     yield from blender.grab((0, 0, height - now), "Z", steps=steps, periods=periods)
     yield from blender.settle()
 
 
-def ridge(blender: Any) -> Iterator[float | None]:
+def ridge(blender):
     yield from blender.grab((-16, 0, 0), "X", steps=2)
     yield from to_height(blender, 35.0, steps=4)
     # Lifted while its pins still sink, a fingertip is lost.
@@ -78,16 +76,16 @@ def ridge(blender: Any) -> Iterator[float | None]:
     note(blender, "ridge left")
 
 
-def autosave() -> Path:
+def autosave():
     return Path(bpy.app.tempdir).parent / f"{os.getpid()}_autosave.blend"
 
 
-def written() -> int:
+def written():
     """Return when Blender last saved by itself, ns; 0 when it has not."""
     return autosave().stat().st_mtime_ns if autosave().is_file() else 0
 
 
-def saved(blender: Any, earlier: int) -> Iterator[float | None]:
+def saved(blender, earlier):
     """Wait until Blender has saved by itself again, which the session must let it do; keep the file."""
     yield from blender.until(lambda: written() > earlier)
     blender.SEEN["saved by itself"] = True
@@ -98,7 +96,7 @@ def saved(blender: Any, earlier: int) -> Iterator[float | None]:
     blender.call(bpy.ops.digiclay.take_remove)
 
 
-def replayed(blender: Any) -> Iterator[float | None]:
+def replayed(blender):
     before = fingertip(blender)
     blender.call(bpy.ops.digiclay.take_replay, "INVOKE_DEFAULT")
     yield from blender.until(lambda: fingertip(blender) != before)
@@ -114,7 +112,7 @@ def replayed(blender: Any) -> Iterator[float | None]:
     note(blender, "replayed")
 
 
-def baked(blender: Any) -> Iterator[float | None]:
+def baked(blender):
     """Bake: stop it by Esc half way, then bake the take, play it, and free it again."""
     scene = blender.window().scene
     scene.frame_set(7)
@@ -136,7 +134,7 @@ def baked(blender: Any) -> Iterator[float | None]:
     places = [fingertip(blender)]
     blender.call(bpy.ops.screen.animation_play)
 
-    def moved() -> bool:
+    def moved():
         places.append(fingertip(blender))
         return max(places) - min(places) > 10e-3
 
@@ -150,11 +148,11 @@ def baked(blender: Any) -> Iterator[float | None]:
     note(blender, "freed")
 
 
-def fingertip(blender: Any) -> float:
+def fingertip(blender):
     return float(blender.fingertip().matrix_world.translation.z)
 
 
-def note(blender: Any, name: str) -> None:
+def note(blender, name):
     blender.look(name)
     bed = blender.beds()[0]
     blender.SEEN[name] |= {
@@ -166,7 +164,7 @@ def note(blender: Any, name: str) -> None:
     }
 
 
-def leave_files(blender: Any) -> Iterator[float | None]:
+def leave_files(blender):
     """Record, and let the file go away: load another one, save it first, and quit Blender."""
     yield from recording(blender)
     bpy.ops.wm.read_homefile(use_empty=True)
@@ -193,7 +191,7 @@ def leave_files(blender: Any) -> Iterator[float | None]:
     yield 60.0
 
 
-def recording(blender: Any) -> Iterator[float | None]:
+def recording(blender):
     if not blender.beds():
         blender.call(bpy.ops.mesh.digital_clay_add, rows=9, columns=9)
     yield from blender.start(blender.beds()[0])
@@ -201,5 +199,5 @@ def recording(blender: Any) -> Iterator[float | None]:
     yield from blender.settle()
 
 
-def names(blender: Any) -> list[str]:
+def names(blender):
     return [entry.name for entry in blender.part("recorded.takes").list_takes(blender.beds()[0])]

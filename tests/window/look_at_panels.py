@@ -1,8 +1,6 @@
 """Played by `driver`: opens the tab with every panel unfolded, looks at each, and exports a form."""
 
-from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import bpy
 import numpy as np
@@ -20,7 +18,7 @@ PICTURES = {
 }
 
 
-def script(blender: Any) -> Iterator[float | None]:
+def script(blender):
     """Look at the tab without a bed, then at each panel of a bed, then at a bed that is to be rebuilt."""
     yield from blender.empty_scene()
     yield from blender.open_sidebar()
@@ -46,7 +44,7 @@ def script(blender: Any) -> Iterator[float | None]:
     yield from export(blender)
 
 
-def own_methods(blender: Any) -> Iterator[float | None]:
+def own_methods(blender):
     """Allow a folder with a method and a mistake, look at its parameters; take the permission back."""
     folder = Path(blender.OUT, "methods")
     blender.part("command_line").run(["new-method", "soft_pad", "--out", str(folder), "--quiet"])
@@ -72,7 +70,7 @@ def own_methods(blender: Any) -> Iterator[float | None]:
     yield from blender.open_sidebar()
 
 
-def refused(blender: Any) -> str:
+def refused(blender):
     try:
         blender.call(bpy.ops.digiclay.rebuild)
     except RuntimeError as error:
@@ -80,7 +78,7 @@ def refused(blender: Any) -> str:
     return ""
 
 
-def export(blender: Any) -> Iterator[float | None]:
+def export(blender):
     """Form a ridge and a pit on another bed, and take them out of the bed in every way there is."""
     yield from blender.empty_scene()
     yield from blender.add_paper_bed()
@@ -113,7 +111,7 @@ def export(blender: Any) -> Iterator[float | None]:
     yield from browser(blender)
 
 
-def browser(blender: Any) -> Iterator[float | None]:
+def browser(blender):
     """Export by File > Export: look at the browser's options, change the format, and confirm."""
     blender.call(bpy.ops.export_mesh.digital_clay, "INVOKE_DEFAULT", kind="solid", file_format="3mf")
     yield 1.0
@@ -132,7 +130,7 @@ def browser(blender: Any) -> Iterator[float | None]:
     blender.SEEN["files"] = sorted(path.name for path in blender.OUT.glob("*.3mf"))
 
 
-def form(blender: Any, bed: Any) -> None:
+def form(blender, bed):
     instant = blender.part("device.instant").Instant
     cells = blender.part("bridge").read_cells(bed.data)
     x, y = cells["position"].T * 1e3

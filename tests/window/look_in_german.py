@@ -1,8 +1,5 @@
 """Played by `driver`: draws the tab in German at two scales, and measures what its rows need and have."""
 
-from collections.abc import Iterator
-from typing import Any
-
 import blf
 import bpy
 
@@ -27,7 +24,7 @@ ICON, MARGIN, TABS = 26.0, 6.0, 55.0
 LABEL = 0.4
 
 
-def find_need(part: Any, scale: float, margin: float = ICON) -> tuple[float, str]:
+def find_need(part, scale, margin=ICON):
     """Return the width that a part of a layout needs at least, pixels, and the longest text in it."""
     if "items" not in part:
         text = part["draw_string"]
@@ -42,7 +39,7 @@ def find_need(part: Any, scale: float, margin: float = ICON) -> tuple[float, str
     return (sum(need for need, _ in needs), longest[1]) if part["type"] == "LAYOUT_ROW" else longest
 
 
-def script(blender: Any) -> Iterator[float | None]:
+def script(blender):
     """Unfold each panel, then those of a session that records; look at all of the overlay."""
     yield from blender.empty_scene()
     preferences = bpy.context.preferences
@@ -50,7 +47,7 @@ def script(blender: Any) -> Iterator[float | None]:
     yield from blender.add_paper_bed()
     drawn = blender.SEEN["drawn"] = {}
 
-    def measure(panel: Any, context: Any) -> None:
+    def measure(panel, context):
         scale = preferences.system.ui_scale
         points = preferences.ui_styles[0].widget.points
         blf.size(0, points * scale)
@@ -75,7 +72,7 @@ def script(blender: Any) -> Iterator[float | None]:
     blender.shot("german_overlay")
 
 
-def unfold(blender: Any, root: str, sections: str) -> Iterator[float | None]:
+def unfold(blender, root, sections):
     """Draw a panel, with some sections, in a tab of its own."""
     with blender.unfolded("german", root, *sections.split()) as tab:
         yield from blender.open_sidebar(tab)

@@ -3,13 +3,11 @@
 import time
 from dataclasses import dataclass, replace
 from math import cos, radians, sin
-from pathlib import Path
 
 import numpy as np
 from digiclay.core.base.arrays import Floats
 from digiclay.core.model.fingertip import LEVEL
 from digiclay.core.model.layout import Layout
-from digiclay.core.scene.schema import Scene
 from digiclay.core.session.render_settings import Still
 from digiclay.device import view
 from digiclay.device.instant import CLEARANCE, Instant
@@ -26,9 +24,7 @@ from tests.window.hand_strokes import DRAWN
 from tests.window.intended import find_relief
 
 
-def move(
-    strokes: tuple[PointerStroke, ...], angle: float, shift: tuple[float, float]
-) -> tuple[PointerStroke, ...]:
+def move(strokes, angle, shift):
     """Return strokes turned by an angle, rad, and shifted, m; depths and heights stay."""
     c, s, (x0, y0) = cos(angle), sin(angle), shift
     return tuple(
@@ -51,20 +47,20 @@ class Played:
     strokes: tuple[PointerStroke, ...]
 
 
-def make_bed(name: str = FIRST, side: int | None = None) -> Scene:
+def make_bed(name=FIRST, side=None):
     """Return a bed as Add makes it, or one with so many rows and columns."""
     bed = BEDS[name]
     layout = Layout(rows=side or bed.rows, columns=side or bed.columns, pitch=bed.pitch)
     return make_scene(bed.preset, layout, bed.method, bed.share)
 
 
-def begin(scene: Scene) -> Running:
+def begin(scene):
     """Return a session of a bed at rest, the fingertip above it."""
     above = np.array([0.0, 0.0, scene.actuator.rest_height + CLEARANCE, *LEVEL])
     return begin_session(1, "Bed", scene, above)[0]
 
 
-def play(scene: Scene, strokes: tuple[PointerStroke, ...]) -> Played:
+def play(scene, strokes):
     """Play strokes on a bed at rest."""
     session, force, rest = begin(scene), 0.0, scene.actuator.rest_height
     for after in play_strokes(session, strokes):
@@ -89,23 +85,23 @@ class Made:
     """Time that the hand drew, and processor time to form it, s."""
 
     @property
-    def correlation(self) -> float:
+    def correlation(self):
         """Pearson's coefficient of formed and intended heights over all pins."""
         return float(np.corrcoef(self.played.formed, self.intended)[0, 1])
 
     @property
-    def slope(self) -> float:
+    def slope(self):
         """Slope of the regression of formed on intended heights: 1 when nothing is scaled."""
         intended = self.intended - self.intended.mean()
         return float(self.played.formed @ intended / (intended @ intended))
 
     @property
-    def error(self) -> float:
+    def error(self):
         """Root of the mean square of formed less intended heights, m."""
         return float(np.sqrt(np.mean((self.played.formed - self.intended) ** 2)))
 
 
-def make(name: str) -> Made:
+def make(name):
     """Play the strokes of one of `THINGS` on the bed of their file."""
     recorded = read_strokes(DRAWN / f"{name}.toml")
     started = time.process_time()
@@ -126,7 +122,7 @@ CLEAR = 1e-3
 LETTERS, INSET, INK = 20, (16, 12), (26, 31, 38)
 
 
-def draw_made(made: Made, out: Path) -> None:
+def draw_made(made, out):
     """Draw a thing as it was formed and as it was intended, side by side, as a JPEG."""
     formed, intended = made.played.formed, made.intended
     lowest = min(float(formed.min()), float(intended.min()))
@@ -143,7 +139,7 @@ def draw_made(made: Made, out: Path) -> None:
     whole.save(out, quality=90)
 
 
-def draw_relief(scene: Scene, relief: Floats, lowest: float, out: Path) -> None:
+def draw_relief(scene, relief, lowest, out):
     """Draw the skin over pins at heights above rest, (n,), m, as a PNG, without fingertip; lowest of both."""
     looks = Still(width=WIDTH, height=HEIGHT, engine="cycles", samples=SAMPLES)
     rest = Instant.at_rest(scene.layout, scene.actuator)

@@ -1,8 +1,6 @@
 """Drives a session by playback and gizmo, in other windows and views; picks, copies and deletes beds."""
 
-from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any
 
 import bpy
 import numpy as np
@@ -11,7 +9,7 @@ import numpy as np
 ARROW = 65
 
 
-def script(blender: Any) -> Iterator[float | None]:
+def script(blender):
     yield from blender.scene_with_bed(rows=9, columns=9)
     yield from pick(blender)
     yield from escape(blender)
@@ -24,7 +22,7 @@ def script(blender: Any) -> Iterator[float | None]:
     yield from views(blender)
 
 
-def gizmo(blender: Any) -> Iterator[float | None]:
+def gizmo(blender):
     yield from blender.start(blender.beds()[0])
     blender.select(blender.fingertip())
     blender.call(bpy.ops.wm.tool_set_by_id, name="builtin.move")
@@ -35,7 +33,7 @@ def gizmo(blender: Any) -> Iterator[float | None]:
     here, there = np.array(blender.pixel(tip)), np.array(blender.pixel(below))
     arrow = here - ARROW * (there - here) / np.linalg.norm(there - here)
 
-    def mouse(at: Any, *kind: str) -> None:
+    def mouse(at, *kind):
         blender.event(*(kind or ("MOUSEMOVE", "NOTHING")), tuple(np.rint(at).astype(int).tolist()))
 
     # The arrow is lit up by one move over it, and taken by the next event.
@@ -57,7 +55,7 @@ def gizmo(blender: Any) -> Iterator[float | None]:
     at_rest(blender)
 
 
-def playback(blender: Any) -> Iterator[float | None]:
+def playback(blender):
     """Play a keyframed fingertip; the first Esc stops the session, the next one the playback."""
     tip = blender.fingertip()
     for frame, z in ((1, 0.54), (24, 0.44), (48, 0.54)):
@@ -81,11 +79,11 @@ def playback(blender: Any) -> Iterator[float | None]:
     at_rest(blender)
 
 
-def lowest(blender: Any) -> float:
+def lowest(blender):
     return float(blender.heights().min())
 
 
-def windows(blender: Any) -> Iterator[float | None]:
+def windows(blender):
     """Close a second window in mid-session; then close the one the session was started in."""
     yield from blender.start(blender.beds()[0])
     bpy.ops.wm.window_new()
@@ -111,7 +109,7 @@ def windows(blender: Any) -> Iterator[float | None]:
     kept.append([entry.name for entry in list_takes(blender.beds()[0])])
 
 
-def closed(blender: Any, name: str, then: Callable[[], bool] = lambda: True) -> Iterator[float | None]:
+def closed(blender, name, then=lambda: True):
     with bpy.context.temp_override(window=bpy.context.window_manager.windows[-1]):
         bpy.ops.wm.window_close()
     yield 1.5
@@ -120,7 +118,7 @@ def closed(blender: Any, name: str, then: Callable[[], bool] = lambda: True) -> 
     blender.SEEN[name]["windows"] = len(bpy.context.window_manager.windows)
 
 
-def render(blender: Any) -> Iterator[float | None]:
+def render(blender):
     scene = blender.window().scene
     scene.camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
     scene.collection.objects.link(scene.camera)
@@ -131,10 +129,10 @@ def render(blender: Any) -> Iterator[float | None]:
     bpy.context.preferences.view.render_display_type = "NONE"
     yield from blender.start(blender.beds()[0])
     blender.call(bpy.ops.render.render, "INVOKE_DEFAULT")
-    waits: list[str] = []
+    waits = []
     blender.SEEN["waits in a render"] = waits
 
-    def rendered() -> bool:
+    def rendered():
         waits.extend({session.blocking_reason for session in blender.sessions()} - set(waits))
         return not bpy.app.is_job_running("RENDER")
 
@@ -142,7 +140,7 @@ def render(blender: Any) -> Iterator[float | None]:
     yield from blender.after("rendered")
 
 
-def views(blender: Any) -> Iterator[float | None]:
+def views(blender):
     """Press in an orthographic view, and in the top view of a quad view, and see what is written there."""
     blender.call(bpy.ops.wm.tool_set_by_id, name="digiclay.press_tool")
     area, _ = blender.view()
@@ -174,7 +172,7 @@ def views(blender: Any) -> Iterator[float | None]:
     yield None
 
 
-def top_quarter(blender: Any) -> Any:
+def top_quarter(blender):
     """Return the quarter of a quad view that looks from straight above, once it has been drawn as such."""
     area, _ = blender.view()
     quarters = [region for region in area.regions if region.type == "WINDOW"]
@@ -187,11 +185,11 @@ def top_quarter(blender: Any) -> Any:
 
 
 @contextmanager
-def drawn(blender: Any) -> Iterator[dict[int, bool]]:
+def drawn(blender):
     module = blender.part("overlay.draw")
     draw, seen = module.draw, {}
 
-    def noted(picture: Any, width: float, height: float) -> None:
+    def noted(picture, width, height):
         # What the cursor of the Press tool draws has words alone.
         if picture.dots:
             seen[bpy.context.region.as_pointer()] = bool(picture.words)
@@ -204,7 +202,7 @@ def drawn(blender: Any) -> Iterator[dict[int, bool]]:
         module.draw = draw
 
 
-def tapped(blender: Any, at: tuple[int, int], name: str) -> Iterator[float | None]:
+def tapped(blender, at, name):
     blender.event("MOUSEMOVE", "NOTHING", at)
     yield 0.3
     blender.event("LEFTMOUSE", "PRESS", at)
@@ -216,22 +214,22 @@ def tapped(blender: Any, at: tuple[int, int], name: str) -> Iterator[float | Non
     yield from blender.until(lambda: not held(blender))
 
 
-def held(blender: Any) -> bool:
+def held(blender):
     return "DIGICLAY_OT_press" in [operator.bl_idname for operator in blender.window().modal_operators]
 
 
-def at_rest(blender: Any) -> None:
+def at_rest(blender):
     blender.select(blender.beds()[0])
     blender.call(bpy.ops.digiclay.session_reset)
     blender.fingertip().location = 0.0, 0.0, 0.54
     bpy.ops.ed.undo_push(message="At rest")
 
 
-def modal() -> list[str]:
+def modal():
     return [one.bl_idname for one in bpy.context.window_manager.windows[0].modal_operators]
 
 
-def pick(blender: Any) -> Iterator[float | None]:
+def pick(blender):
     """Begin to pick in one workspace, and go on in another; there, click beside all views as well."""
     picked = blender.part("device.view").picked_pins
     blender.call(bpy.ops.digiclay.pick_pins, "INVOKE_DEFAULT")
@@ -257,7 +255,7 @@ def pick(blender: Any) -> Iterator[float | None]:
     yield None
 
 
-def escape(blender: Any) -> Iterator[float | None]:
+def escape(blender):
     """Press Esc while nobody drives the session: over a 3D view, and over another editor."""
     loop, session_loop = blender.part("live.loop"), blender.part("operators.session_loop")
     # Long enough that the key comes in it for sure; else it is a tenth of a second every 20 s.
@@ -279,7 +277,7 @@ def escape(blender: Any) -> Iterator[float | None]:
     session_loop.EVERY, session_loop.MOMENT = usual
 
 
-def counted(blender: Any, name: str) -> None:
+def counted(blender, name):
     """Count the beds, those with a fingertip, the objects of the scene, those hidden, and the sessions."""
     scene = blender.window().scene
     tips = [blender.part("roles").fingertip_of(bed) for bed in blender.beds()]
@@ -288,7 +286,7 @@ def counted(blender: Any, name: str) -> None:
     blender.SEEN[name] = [len(tips), whole, len(scene.objects), hidden, len(blender.sessions())]
 
 
-def looked(blender: Any, name: str) -> Iterator[float | None]:
+def looked(blender, name):
     watch = blender.part("device.repair")
     yield 1.0
     yield from blender.until(lambda: not bpy.app.timers.is_registered(watch._repair_when_idle))
@@ -298,12 +296,12 @@ def looked(blender: Any, name: str) -> Iterator[float | None]:
     counted(blender, name)
 
 
-def pressed(blender: Any, name: str, kind: str, **held: bool) -> Iterator[float | None]:
+def pressed(blender, name, kind, **held):
     blender.key(kind, blender.middle(), **held)
     yield from looked(blender, name)
 
 
-def changed_by_f9(blender: Any, name: str) -> Iterator[float | None]:
+def changed_by_f9(blender, name):
     """Click on "Linked" in the panel of a copy that F9 opens beside the mouse, and leave the panel."""
     x, y = blender.middle()
     blender.event("MOUSEMOVE", "NOTHING", (x, y))
@@ -318,7 +316,7 @@ def changed_by_f9(blender: Any, name: str) -> Iterator[float | None]:
         yield 0.3
 
 
-def units(blender: Any) -> Iterator[float | None]:
+def units(blender):
     """Delete a bed, undo and redo that; drag a copy off, undo and redo that; hide; delete in mid-session."""
     blender.event("MOUSEMOVE", "NOTHING", blender.middle())
     blender.select(blender.beds()[0])

@@ -2,9 +2,7 @@
 
 import subprocess
 import sys
-from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import bpy
 import numpy as np
@@ -17,7 +15,7 @@ STROKES = {"firm": (24.0, 1.0, 0.0, 0.0), "light": (0.0, 0.5, 0.0, 0.0), "leanin
 HALF = 12.0
 
 
-def draw(blender: Any, row: float, pressure: float, right: float, near: float) -> subprocess.Popen[bytes]:
+def draw(blender, row, pressure, right, near):
     places = (on_the_screen(blender, float(x), row) for x in np.linspace(-HALF, HALF, 31))
     (x, y), *later = places
     words = [f"to {x} {y} 0 {right} {near}", "sleep 0.1", f"to {x} {y} {pressure} {right} {near}", "down"]
@@ -26,7 +24,7 @@ def draw(blender: Any, row: float, pressure: float, right: float, near: float) -
     return subprocess.Popen([sys.executable, str(HAND), *words, "up"])
 
 
-def pressed(blender: Any, since: int) -> dict[str, Any]:
+def pressed(blender, since):
     """Return how high pins are where the finger was lowest since a period, mm, and its turns there."""
     (session,) = blender.sessions()
     poses = session.recording.path[since:, 0]
@@ -36,7 +34,7 @@ def pressed(blender: Any, since: int) -> dict[str, Any]:
     return {"formed": 1e3 * float(session.state.row(0)[cell][0]), "inside": lowest[:, 3:].tolist()}
 
 
-def script(blender: Any) -> Iterator[float | None]:
+def script(blender):
     yield from prepare(blender, "TOP")
     yield from blender.start()
     blender.call(bpy.ops.digiclay.take_record)

@@ -1,8 +1,5 @@
 """Clicks past a cube in all kinds of views; sets sizes with F, draws symmetric strokes, lines and rings."""
 
-from collections.abc import Iterator
-from typing import Any
-
 import bpy
 import numpy as np
 from mathutils import Vector
@@ -36,7 +33,7 @@ COVERED, BARE = (15.0, -15.0), (-27.0, -27.0)
 DISTANCE = 0.25
 
 
-def script(blender: Any) -> Iterator[float | None]:
+def script(blender):
     yield from past_objects(blender)
     yield from prepare(blender, "TOP")
     blender.call(bpy.ops.view3d.view_all)
@@ -49,7 +46,7 @@ def script(blender: Any) -> Iterator[float | None]:
     yield from shapes(blender)
 
 
-def write_down(blender: Any, name: str) -> None:
+def write_down(blender, name):
     """Note the sizes, in mm, and the sessions."""
     note(blender, name)
     bed, settings, session = blender.beds()[0], brush(blender), blender.session()
@@ -63,7 +60,7 @@ def write_down(blender: Any, name: str) -> None:
     }
 
 
-def done(blender: Any, *words: str, name: str = "") -> Iterator[float | None]:
+def done(blender, *words, name=""):
     """Let the hand do it, and the sessions take it up; write down what there is then."""
     process = hand(*words)
     yield from blender.until(lambda: process.poll() is not None)
@@ -72,11 +69,11 @@ def done(blender: Any, *words: str, name: str = "") -> Iterator[float | None]:
         write_down(blender, name)
 
 
-def keys(names: str) -> str:
+def keys(names):
     return " ".join(f"key {name} sleep 0.15" for name in names.split())
 
 
-def sizes(blender: Any) -> Iterator[float | None]:
+def sizes(blender):
     start, end = on_the_screen(blender, 0.0, 0.0), on_the_screen(blender, WIDER, 0.0)
     write_down(blender, "begun")
     yield from done(blender, to(start), keys("f"), drag(start, end, 0.4, 60))
@@ -96,7 +93,7 @@ def sizes(blender: Any) -> Iterator[float | None]:
     yield from done(blender, keys("ctrl+f 1 0 0 Return"))
 
 
-def symmetric(blender: Any) -> Iterator[float | None]:
+def symmetric(blender):
     brush(blender).symmetry = "XY"
     yield from stroke(blender, "symmetric", *MIRRORED, 0.8, picture="symmetric")
     yield from act(blender, keys("ctrl+z"))
@@ -105,7 +102,7 @@ def symmetric(blender: Any) -> Iterator[float | None]:
     yield from reset(blender)
 
 
-def shapes(blender: Any) -> Iterator[float | None]:
+def shapes(blender):
     """Drag a line, then click with Shift; drag a ring; draw with a stabilizer."""
     settings = brush(blender)
     settings.path = "LINE"
@@ -129,7 +126,7 @@ def shapes(blender: Any) -> Iterator[float | None]:
     settings.stabilizer = 0.0
 
 
-def put(blender: Any) -> None:
+def put(blender):
     bpy.ops.wm.redraw_timer(type="DRAW_WIN_SWAP", iterations=1)  # a view that has changed knows so when drawn
     area, _ = blender.view()
     looking = area.spaces.active.region_3d
@@ -140,7 +137,7 @@ def put(blender: Any) -> None:
     bpy.data.objects["Cube"].location = place + DISTANCE * way
 
 
-def try_both(blender: Any, name: str) -> Iterator[float | None]:
+def try_both(blender, name):
     """Click on the cube, then on the pins beside it; write down what each has pressed and selected."""
     put(blender)
     blender.call(bpy.ops.object.select_all, action="DESELECT")
@@ -155,7 +152,7 @@ def try_both(blender: Any, name: str) -> Iterator[float | None]:
     yield from reset(blender)
 
 
-def past_objects(blender: Any) -> Iterator[float | None]:
+def past_objects(blender):
     yield from put_cube(blender)
     area, _ = blender.view()
     space = area.spaces.active
@@ -184,7 +181,7 @@ def past_objects(blender: Any) -> Iterator[float | None]:
     yield from add_from_elsewhere(blender)
 
 
-def put_cube(blender: Any) -> Iterator[float | None]:
+def put_cube(blender):
     add_bed(blender)
     blender.call(bpy.ops.mesh.primitive_cube_add, size=0.12)
     blender.call(bpy.ops.wm.tool_set_by_id, name="digiclay.press_tool")
@@ -194,7 +191,7 @@ def put_cube(blender: Any) -> Iterator[float | None]:
     yield 1.0
 
 
-def drawn_under(blender: Any) -> Iterator[float | None]:
+def drawn_under(blender):
     put(blender)
     yield 0.5
     yield from finish(blender, line(blender, (-24.0, COVERED[1]), (24.0, COVERED[1])))
@@ -202,7 +199,7 @@ def drawn_under(blender: Any) -> Iterator[float | None]:
     yield from reset(blender)
 
 
-def quarters(blender: Any) -> Iterator[float | None]:
+def quarters(blender):
     bpy.data.objects["Cube"].location = blender.world(*COVERED) + Vector((0.0, 0.0, DISTANCE))
     yield 1.0
     blender.shot("past_quarters")
@@ -222,7 +219,7 @@ def quarters(blender: Any) -> Iterator[float | None]:
     blender.SEEN["quarters"] = found | {"count": len(regions)}
 
 
-def read_reports(blender: Any) -> str:
+def read_reports(blender):
     area = next(area for area in blender.window().screen.areas if area.type == "PROPERTIES")
     area.type = "INFO"
     with bpy.context.temp_override(window=blender.window(), area=area, region=area.regions[-1]):
@@ -231,7 +228,7 @@ def read_reports(blender: Any) -> str:
     return str(bpy.context.window_manager.clipboard)
 
 
-def add_from_elsewhere(blender: Any) -> Iterator[float | None]:
+def add_from_elsewhere(blender):
     """Add a small bed into a cube that is seen along each axis; write down where the bed is."""
     blender.call(bpy.ops.object.select_all, action="SELECT")
     blender.call(bpy.ops.object.delete)

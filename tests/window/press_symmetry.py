@@ -1,8 +1,6 @@
 """Draws symmetric strokes on a turned and shifted bed, one after the other without a pause, by X events."""
 
 import time
-from collections.abc import Iterator
-from typing import Any
 
 import bpy
 import numpy as np
@@ -34,7 +32,7 @@ TIMED = {
 }  # fmt: skip
 
 
-def script(blender: Any) -> Iterator[float | None]:
+def script(blender):
     """Do what a hand does."""
     yield from prepare(blender, "TOP", bed="paper")
     bed = blender.beds()[0]
@@ -69,13 +67,13 @@ def script(blender: Any) -> Iterator[float | None]:
     yield from impatient(blender)
 
 
-def is_pressing(blender: Any) -> bool:
+def is_pressing(blender):
     """Tell whether a fingertip is in the pins, or the stroke is done already."""
     (session,) = blender.sessions()
     return not session.strokes or bool((session.state.finger_forces() > 0.01).any())
 
 
-def begin(blender: Any) -> Iterator[float | None]:
+def begin(blender):
     """Have a bed at rest, and record from now on."""
     yield from reset(blender)
     bpy.ops.ed.undo_push(message="Reset")
@@ -83,7 +81,7 @@ def begin(blender: Any) -> Iterator[float | None]:
     yield from blender.settle()
 
 
-def write_down(blender: Any, name: str) -> None:
+def write_down(blender, name):
     """Note the heights, the periods of the last stroke up to the last order, and the recorded fingertips."""
     note(blender, name)
     (session,) = blender.sessions()
@@ -96,7 +94,7 @@ def write_down(blender: Any, name: str) -> None:
     }
 
 
-def impatient(blender: Any) -> Iterator[float | None]:
+def impatient(blender):
     """Draw three strokes at once, one of another symmetry; undo the last; Esc in the middle of a fourth."""
     settings = brush(blender)
     yield from begin(blender)
@@ -134,7 +132,7 @@ def impatient(blender: Any) -> Iterator[float | None]:
     yield from time_images(blender)
 
 
-def time_images(blender: Any) -> Iterator[float | None]:
+def time_images(blender):
     """Note the periods of strokes with several images, and the seconds until all is formed."""
     yield from prepare(blender, "TOP", bed="design")
     yield from act(blender, to(on_the_screen(blender, 0.0, 0.0), 0.3), "click 1 sleep 0.3")

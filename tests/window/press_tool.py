@@ -1,8 +1,6 @@
 """Draws a valley with the Press tool, changes the depth; turns what is shown on and off."""
 
 import os
-from collections.abc import Iterator
-from typing import Any
 
 import addon_utils
 import bpy
@@ -14,7 +12,7 @@ FINE_PINS = "DIGICLAY_SCREENSHOTS" in os.environ
 TICKS = 3
 
 
-def drag(blender: Any, way: list[tuple[float, float]], pause: float = 0.3) -> Iterator[float | None]:
+def drag(blender, way, pause=0.3):
     """Hold the mouse along a way over the bed, mm, at its start until the finger is there; it stays down."""
     for step, (x, y) in enumerate(way):
         at = blender.on_the_bed(x, y)
@@ -27,7 +25,7 @@ def drag(blender: Any, way: list[tuple[float, float]], pause: float = 0.3) -> It
     yield from come(blender)
 
 
-def come(blender: Any) -> Iterator[float | None]:
+def come(blender):
     """Wait until the finger has come to rest: it stays where it is while the session ticks on.
 
     By time alone a slow machine, on which nothing happens for a second, would be taken for a finger at rest.
@@ -46,12 +44,12 @@ def come(blender: Any) -> Iterator[float | None]:
     raise AssertionError("The finger does not come to rest")
 
 
-def let_go(blender: Any, x: float, y: float) -> Iterator[float | None]:
+def let_go(blender, x, y):
     blender.event("LEFTMOUSE", "RELEASE", blender.on_the_bed(x, y))
     yield from come(blender)
 
 
-def note(blender: Any, name: str) -> None:
+def note(blender, name):
     blender.look(name)
     tip = blender.fingertip()
     blender.SEEN[name] |= {
@@ -63,7 +61,7 @@ def note(blender: Any, name: str) -> None:
     }
 
 
-def script(blender: Any) -> Iterator[float | None]:
+def script(blender):
     yield from blender.empty_scene()
     yield from blender.add_paper_bed()
     # Software GL draws a frame or two a second; in between the session is to catch up.
@@ -90,13 +88,13 @@ def script(blender: Any) -> Iterator[float | None]:
     yield from disabled(blender)
 
 
-def said(blender: Any, name: str) -> None:
+def said(blender, name):
     """Write down what is shown beside the cursor."""
     chosen = blender.part("press.brush").tool_settings(bpy.context)
     blender.SEEN[name] = blender.part("press.tool").describe(blender.beds()[0], chosen)
 
 
-def keys(blender: Any) -> Iterator[float | None]:
+def keys(blender):
     """Hold Ctrl and Shift over the bed, with a hand at rest, and let go of Ctrl where nobody sees it."""
     at = blender.on_the_bed(-15, 5)
     for name, held in (("LEFT_CTRL", {"ctrl": True}), ("RIGHT_SHIFT", {"shift": True})):
@@ -113,7 +111,7 @@ def keys(blender: Any) -> Iterator[float | None]:
     said(blender, "moved without Ctrl")
 
 
-def edges(blender: Any) -> Iterator[float | None]:
+def edges(blender):
     """Move the mouse into corners of a view full of pins; find where the text beside it is drawn."""
     area, region = blender.view()
     looking = area.spaces.active.region_3d
@@ -139,7 +137,7 @@ def edges(blender: Any) -> Iterator[float | None]:
     yield 0.5
 
 
-def depths(blender: Any) -> Iterator[float | None]:
+def depths(blender):
     yield from drag(blender, [(-20.0, -20.0)])
     note(blender, "before the wheel")
     at = blender.on_the_bed(-20, -20)
@@ -177,7 +175,7 @@ def depths(blender: Any) -> Iterator[float | None]:
     yield from blender.settle()
 
 
-def disabled(blender: Any) -> Iterator[float | None]:
+def disabled(blender):
     """Disable the extension with the tool in hand and the mouse over the bed, and go on moving it."""
     yield from blender.add_paper_bed()
     tools, at = blender.window().workspace.tools, blender.on_the_bed(-15, 5)
@@ -193,7 +191,7 @@ def disabled(blender: Any) -> Iterator[float | None]:
     addon_utils.enable(blender.EXTENSION)  # for what comes after the script
 
 
-def shown(blender: Any) -> Iterator[float | None]:
+def shown(blender):
     blender.window().view_layer.objects.active = blender.beds()[0]
     blender.call(bpy.ops.digiclay.pick_pins, "INVOKE_DEFAULT")
     yield None
@@ -235,7 +233,7 @@ def shown(blender: Any) -> Iterator[float | None]:
     note(blender, "overlay on")
 
 
-def ended(blender: Any) -> Iterator[float | None]:
+def ended(blender):
     """End the session; then a press starts it anew, and losing the bed under the mouse ends the gesture."""
     blender.key("ESC", blender.middle())
     yield from blender.stopped()

@@ -1,8 +1,6 @@
 """Random events at a running session: moves, undos, mode switches, deletes, and all keys."""
 
 import random
-from collections.abc import Iterator
-from typing import Any
 
 import bpy
 import numpy as np
@@ -15,7 +13,7 @@ CHOICES = {
     "add": 6, "start": 40, "stop": 4, "pause": 12, "step": 8, "rewind": 12, "reset": 6, "method": 8,
     "scale": 5, "workspace": 5, "scene": 5, "play": 6, "parameter": 5, "duplicate": 4, "save": 3, "load": 2,
 }  # fmt: skip
-KEYS: dict[str, tuple[str, dict[str, bool]]] = {
+KEYS = {
     "undo": ("Z", {"ctrl": True}),
     "redo": ("Z", {"ctrl": True, "shift": True}),
     "edit": ("TAB", {}),
@@ -29,38 +27,38 @@ KEYS: dict[str, tuple[str, dict[str, bool]]] = {
 
 
 class Events:
-    def __init__(self, blender: Any, source: random.Random) -> None:
+    def __init__(self, blender, source):
         self.blender, self.source = blender, source
 
     @property
-    def tip(self) -> Any:
+    def tip(self):
         found = [self.blender.fingertip(number) for number in range(len(self.blender.beds()))]
         tips = [tip for tip in found if tip is not None]
         return self.source.choice(tips) if tips else None
 
-    def happen(self, name: str) -> None:
+    def happen(self, name):
         if name in KEYS:
             kind, modifiers = KEYS[name]
             self.blender.key(kind, self.somewhere(), **modifiers)
         else:
             getattr(self, name)()
 
-    def somewhere(self) -> tuple[int, int]:
+    def somewhere(self):
         _, region = self.blender.view()
         pick = self.source.random
         x = region.x + int(region.width * (0.2 + 0.5 * pick()))
         return x, region.y + int(region.height * (0.2 + 0.6 * pick()))
 
-    def move(self) -> None:
+    def move(self):
         if self.tip is not None:
             pick = self.source.uniform
             self.tip.location = pick(-0.35, 0.35), pick(-0.35, 0.35), pick(0.42, 0.56)
 
-    def turn(self) -> None:
+    def turn(self):
         if self.tip is not None:
             self.tip.rotation_quaternion = [self.source.uniform(-1, 1) for _ in range(4)]
 
-    def grab(self) -> None:
+    def grab(self):
         at = self.somewhere()
         self.blender.key("G", at)
         for _ in range(3):
@@ -68,16 +66,16 @@ class Events:
             self.blender.event("MOUSEMOVE", "NOTHING", at)
         self.blender.key(self.source.choice(["LEFTMOUSE", "RIGHTMOUSE", "ESC", "RET"]), at)
 
-    def select(self) -> None:
+    def select(self):
         things = list(self.blender.window().view_layer.objects)
         if things and bpy.context.mode == "OBJECT":
             self.blender.select(self.source.choice(things))
 
-    def add(self) -> None:
+    def add(self):
         if len(self.blender.beds()) < 3 and bpy.context.mode == "OBJECT":
             self.operator(bpy.ops.mesh.digital_clay_add, rows=11, columns=11)
 
-    def operator(self, operator: Any, *how: str, **properties: Any) -> None:
+    def operator(self, operator, *how, **properties):
         area, region = self.blender.view()
         with bpy.context.temp_override(window=self.blender.window(), area=area, region=region):
             willing = operator.poll()
@@ -89,13 +87,13 @@ class Events:
                 if not str(error).startswith("Error: "):  # what an operator reports is no fault
                     raise
 
-    def start(self) -> None:
+    def start(self):
         beds = self.blender.beds()
         if beds and bpy.context.mode == "OBJECT":
             self.blender.select(self.source.choice(beds))
         self.operator(bpy.ops.digiclay.session, "INVOKE_DEFAULT")
 
-    def revive(self) -> None:
+    def revive(self):
         """Have a session run again: what happens to none tells nothing about it."""
         if self.blender.sessions():
             return
@@ -106,45 +104,45 @@ class Events:
         self.add()
         self.start()
 
-    def method(self) -> None:
+    def method(self):
         methods = ["virtual_master", "cell_states", "plastic", "push_pull"]
         for bed in self.blender.beds():
             bed.digiclay.method = self.source.choice(methods)
 
-    def parameter(self) -> None:
+    def parameter(self):
         for bed in self.blender.beds():
             bed.digiclay.simulation.control_period = self.source.choice([5.0, 10.0])
 
-    def scale(self) -> None:
+    def scale(self):
         for bed in self.blender.beds():
             bed.scale = self.source.choice([(1, 1, 1), (1, 1, 1), (2, 2, 2), (1, 2, 1), (0, 0, 0)])
 
-    def workspace(self) -> None:
+    def workspace(self):
         name = self.source.choice(["Layout", "Layout", "Animation", "Modeling"])
         self.blender.window().workspace = bpy.data.workspaces[name]
 
-    def scene(self) -> None:
+    def scene(self):
         if len(bpy.data.scenes) < 2:
             bpy.data.scenes.new("Other")
             bpy.ops.ed.undo_push(message="Scene")
         self.blender.window().scene = self.source.choice([*bpy.data.scenes, bpy.data.scenes[0]])
 
-    def play(self) -> None:
+    def play(self):
         self.operator(bpy.ops.screen.animation_play)
 
-    def duplicate(self) -> None:
+    def duplicate(self):
         if bpy.context.mode == "OBJECT" and len(self.blender.beds()) < 3:
             self.operator(bpy.ops.object.duplicate, linked=self.source.random() < 0.5)
 
-    def save(self) -> None:
+    def save(self):
         bpy.ops.wm.save_as_mainfile(filepath=str(self.blender.OUT / "random.blend"))
 
-    def load(self) -> None:
+    def load(self):
         if (self.blender.OUT / "random.blend").is_file():
             bpy.ops.wm.open_mainfile(filepath=str(self.blender.OUT / "random.blend"))
 
 
-def check(blender: Any) -> None:
+def check(blender):
     for session in blender.sessions():
         state = blender.part("core.session.snapshot").load(session.system, session.snapshot)
         height = state.row(0)
@@ -159,14 +157,14 @@ def check(blender: Any) -> None:
             assert np.isfinite(blender.part("bridge").read_cells(bed.data)["height"]).all()
 
 
-def script(blender: Any) -> Iterator[float | None]:
+def script(blender):
     """Do random things, checking after each; then form a bed in peace."""
     yield from blender.scene_with_bed(rows=15, columns=15)
     blender.call(bpy.ops.digiclay.session, "INVOKE_DEFAULT")
     source = random.Random(20)
     events = Events(blender, source)
     names = source.choices(list(CHOICES), weights=list(CHOICES.values()), k=EVENTS)
-    done: list[str] = []
+    done = []
     blender.SEEN["done"] = done
     live = 0
     for name in names:

@@ -1,20 +1,17 @@
 """Forms a valley with G, undoes, pauses, saves and loads; forms a shape; forms with several fingertips."""
 
-from collections.abc import Iterator
-from typing import Any
-
 import bpy
 import numpy as np
 
 
-def script(blender: Any) -> Iterator[float | None]:
+def script(blender):
     for step in (valley, shape, several_fingers):
         yield from step(blender)
         bpy.ops.wm.read_homefile(use_empty=True)
         yield 1.0
 
 
-def valley(blender: Any) -> Iterator[float | None]:
+def valley(blender):
     after, undo = blender.after, blender.undo
     yield from blender.empty_scene()
     yield from blender.add_paper_bed()
@@ -69,7 +66,7 @@ def valley(blender: Any) -> Iterator[float | None]:
         yield 0.6
 
 
-def shape(blender: Any) -> Iterator[float | None]:
+def shape(blender):
     """Display a sample shape, press the fingertip into it live, and keep what was formed."""
     yield from blender.empty_scene()
     yield from blender.add_paper_bed()
@@ -128,7 +125,7 @@ def shape(blender: Any) -> Iterator[float | None]:
     blender.SEEN["beds after undo"] = len(blender.beds())
 
 
-def note(blender: Any, name: str) -> None:
+def note(blender, name):
     session, roles = blender.sessions()[0], blender.part("roles")
     bed = blender.beds()[0]
     blender.SEEN[name] = {
@@ -140,7 +137,7 @@ def note(blender: Any, name: str) -> None:
     }
 
 
-def list_hidden(blender: Any) -> list[int]:
+def list_hidden(blender):
     """Take a picture; return which fingertips the overlay in it covers."""
     module, (_, region), pictures = blender.part("overlay.draw"), blender.view(), []
     draw = module.draw
@@ -154,7 +151,7 @@ def list_hidden(blender: Any) -> list[int]:
     return [number for (number, _), covered in zip(tips, inside, strict=True) if covered]
 
 
-def several_fingers(blender: Any) -> Iterator[float | None]:
+def several_fingers(blender):
     """Press two fingertips, then a hand by its palm; delete it, undo that, copy a fingertip."""
     yield from blender.scene_with_bed(bed="paper")
     yield from blender.open_sidebar()

@@ -1,8 +1,5 @@
 """Looks at a bed as a designer does: pins and skin, from near and far, at rest and pressed by a hand."""
 
-from collections.abc import Iterator
-from typing import Any
-
 import bpy
 import numpy as np
 from mathutils import Vector
@@ -10,12 +7,12 @@ from mathutils import Vector
 from tests.window.hand_strokes import act, add_bed, done, finish, focus_window, hand, line, on_the_screen, to
 
 
-def count_orange(name: str, blender: Any) -> int:
+def count_orange(name, blender):
     red, green, blue = np.moveaxis(read_shot(name, blender), -1, 0)
     return int(((red > 0.85) & (green > 0.45) & (green < 0.75) & (blue < 0.35)).sum())
 
 
-def read_shot(name: str, blender: Any) -> np.ndarray:
+def read_shot(name, blender):
     _, region = blender.view()
     image = bpy.data.images.load(str(blender.OUT / f"{name}.png"))
     width, height = image.size
@@ -24,7 +21,7 @@ def read_shot(name: str, blender: Any) -> np.ndarray:
     return pixels[region.y : region.y + region.height, region.x : region.x + region.width, :3]
 
 
-def add_by_hand(blender: Any, name: str, add: Any = bpy.ops.mesh.digital_clay_add, **chosen: str) -> None:
+def add_by_hand(blender, name, add=bpy.ops.mesh.digital_clay_add, **chosen):
     """Add a bed as its menu entry does, beside or on what the factory file has; note how it is seen."""
     area, region = blender.view()
     for thing in [blender.beds()[0], blender.fingertip()] if blender.beds() else []:
@@ -34,7 +31,7 @@ def add_by_hand(blender: Any, name: str, add: Any = bpy.ops.mesh.digital_clay_ad
     blender.SEEN[name] = {"bed": rectangle_of_the_bed(blender), "room": room}
 
 
-def see_at_once(blender: Any) -> Iterator[float | None]:
+def see_at_once(blender):
     """Add beds from the default perspective and from above, with the sidebar closed and open; press lines."""
     area, region = blender.view()
     looking = area.spaces.active.region_3d
@@ -67,7 +64,7 @@ def see_at_once(blender: Any) -> Iterator[float | None]:
         setattr(looking, name, value)
 
 
-def draw_lines(blender: Any, count: int, depth: float) -> None:
+def draw_lines(blender, count, depth):
     """Put the pins where a fingertip of 8 mm would leave them after lines of 100 mm, of a depth in mm."""
     bed, bridge = blender.beds()[0], blender.part("bridge")
     place = bridge.read_cells(bed.data)["position"]
@@ -79,11 +76,11 @@ def draw_lines(blender: Any, count: int, depth: float) -> None:
     bridge.write_cells(bed.data, place, 1e-3 * height, mode=np.where(height < 40.0, 1, 0).astype(np.int8))
 
 
-def lines_at(count: int) -> np.ndarray:
+def lines_at(count):
     return 12.0 * (np.arange(count) - (count - 1) / 2)
 
 
-def measure_lines(blender: Any, count: int, name: str) -> list[float]:
+def measure_lines(blender, count, name):
     """Return by how much the luminance differs about each line, as the mean along it over a pitch."""
     shown, (_, region) = read_shot(name, blender) @ [0.2126, 0.7152, 0.0722], blender.view()
     left, right = (blender.on_the_bed(x, 0.0)[0] - region.x for x in (-40.0, -10.0))
@@ -94,7 +91,7 @@ def measure_lines(blender: Any, count: int, name: str) -> list[float]:
     return [float(np.ptp(profile[low:high])) for low, high in ends]
 
 
-def rectangle_of_the_bed(blender: Any) -> list[float]:
+def rectangle_of_the_bed(blender):
     bed = blender.beds()[0]
     corners = np.array([blender.pixel(bed.matrix_world @ Vector(corner)) for corner in bed.bound_box])
     _, region = blender.view()
@@ -102,7 +99,7 @@ def rectangle_of_the_bed(blender: Any) -> list[float]:
     return [float(value) for value in (*corners.min(axis=0), *corners.max(axis=0))]
 
 
-def count_covered(blender: Any) -> int:
+def count_covered(blender):
     """Return how many pins of the bed the overlay covers."""
     (bed, *_), (_, region) = blender.beds(), blender.view()
     places = np.array([blender.pixel(bed.matrix_world @ pin.co) for pin in bed.data.vertices])
@@ -110,7 +107,7 @@ def count_covered(blender: Any) -> int:
     return int(((low < places) & (places < high)).all(axis=1).sum())
 
 
-def note(blender: Any, name: str) -> None:
+def note(blender, name):
     form, bed = blender.part("device.view"), blender.beds()[0]
     blender.shot(name)
     blender.SEEN[name] = {
@@ -123,11 +120,11 @@ def note(blender: Any, name: str) -> None:
     }
 
 
-def watch_overlay(blender: Any) -> None:
+def watch_overlay(blender):
     module = blender.part("overlay.draw")
     draw = module.draw
 
-    def noted(picture: Any, width: float, height: float) -> None:
+    def noted(picture, width, height):
         if picture.boxes:
             box = picture.boxes[0]
             blender.SEEN["overlay"] = [box.x, box.y, box.x + box.width, box.y + box.height]
@@ -138,7 +135,7 @@ def watch_overlay(blender: Any) -> None:
     module.draw = noted
 
 
-def script(blender: Any) -> Iterator[float | None]:
+def script(blender):
     yield from see_at_once(blender)
     add_bed(blender)
     watch_overlay(blender)
@@ -186,7 +183,7 @@ def script(blender: Any) -> Iterator[float | None]:
     note(blender, "stopped")
 
 
-def levels_of_detail(blender: Any) -> Iterator[float | None]:
+def levels_of_detail(blender):
     area, _ = blender.view()
     looking = area.spaces.active.region_3d
     distance = looking.view_distance
@@ -200,7 +197,7 @@ def levels_of_detail(blender: Any) -> Iterator[float | None]:
     looking.view_distance = distance
 
 
-def pitch_in_pixels(blender: Any, distance: float) -> float:
+def pitch_in_pixels(blender, distance):
     """Return a pitch in a view whose middle is as far away, pixels at a UI scale of 1."""
     area, region = blender.view()
     lens = float(area.spaces.active.region_3d.window_matrix[1][1])

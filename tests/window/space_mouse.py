@@ -10,9 +10,7 @@ import socket
 import struct
 import subprocess
 import threading
-from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
 
 #: Blender asks libspnav only where this file is there, whatever it is.
 USUAL = "/var/run/spnav.sock"
@@ -23,7 +21,7 @@ MOTION, HAND = struct.Struct("8i"), struct.pack("i", 1)
 
 
 @contextmanager
-def driver(folder: Path, blender: str) -> Iterator[str]:
+def driver(folder, blender):
     path, mark = str(folder / "space_mouse"), folder / "made"
     # Where a true driver runs, the file is there already, and stays.
     files = (USUAL, str(mark))
@@ -35,16 +33,16 @@ def driver(folder: Path, blender: str) -> Iterator[str]:
             _run(blender, f"import os; os.remove({USUAL!r})")
 
 
-def _run(blender: str, words: str) -> None:
+def _run(blender, words):
     options = "--background --factory-startup --python-exit-code 3 --python-expr"
     subprocess.run([blender, *options.split(), words], check=True, timeout=300, capture_output=True)
 
 
-def _listen(path: str) -> Iterator[str]:
+def _listen(path):
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as listener:
         listener.bind(path)
         listener.listen()
-        programs: list[socket.socket] = []
+        programs = []
         threading.Thread(target=_serve, args=(listener, programs), daemon=True).start()
         try:
             yield path
@@ -54,7 +52,7 @@ def _listen(path: str) -> Iterator[str]:
                 program.close()
 
 
-def _serve(listener: socket.socket, programs: list[socket.socket]) -> None:
+def _serve(listener, programs):
     """Keep the programs that connect, and pass on what a hand sends, until the listener is shut down."""
     while True:
         try:
@@ -72,7 +70,7 @@ def _serve(listener: socket.socket, programs: list[socket.socket]) -> None:
                     program.sendall(sent)
 
 
-def push(*motions: tuple[int, int, int, int, int, int], pause: int = 16) -> None:
+def push(*motions, pause=16):
     """Push the cap of the 3D mouse: translations and turns, -500 to 500, 0: let go; a pause before, ms."""
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as hand:
         hand.connect(os.environ[VARIABLE])

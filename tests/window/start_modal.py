@@ -1,16 +1,13 @@
 """Starts each modal operator with something that fails, and the Press tool with a stamp that is not there."""
 
-from collections.abc import Iterator
-from typing import Any
-
 import bpy
 
 
-def list_modal(blender: Any) -> list[str]:
+def list_modal(blender):
     return sorted(operator.bl_idname for operator in blender.window().modal_operators)
 
 
-def script(blender: Any) -> Iterator[float | None]:
+def script(blender):
     yield from blender.scene_with_bed(rows=25, columns=25)
     yield from stamp(blender)
     blender.call(bpy.ops.digiclay.session_stop)
@@ -27,10 +24,10 @@ def script(blender: Any) -> Iterator[float | None]:
         yield None
 
 
-def start_failing(blender: Any, kind: type, action: Any) -> dict[str, Any]:
+def start_failing(blender, kind, action):
     """Start an operator with all that it prepares, after which something fails."""
 
-    def prepare(self: Any, context: Any, event: Any) -> None:
+    def prepare(self, context, event):
         raise blender.part("core.base.errors").DigiclayError("Something fails.")
 
     name = f"{kind.bl_idname}_fails"
@@ -46,7 +43,7 @@ def start_failing(blender: Any, kind: type, action: Any) -> dict[str, Any]:
     return {"said": said, "left": left}
 
 
-def stamp(blender: Any) -> Iterator[float | None]:
+def stamp(blender):
     """Press on the bed with a stamp from a file that is not there, then with one that is."""
     blender.call(bpy.ops.wm.tool_set_by_id, name="digiclay.press_tool")
     settings = blender.part("press.brush").tool_settings(bpy.context)

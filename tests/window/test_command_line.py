@@ -3,7 +3,6 @@
 import os
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -12,16 +11,15 @@ from tests.timeouts import TIMEOUT
 from tests.window.blender_window import BLENDER
 
 TOOL = Path(__file__).parents[2] / "tools" / "extension.py"
-Command = Callable[..., "subprocess.CompletedProcess[str]"]
 
 
 @pytest.fixture(scope="module")
-def execute(tmp_path_factory: pytest.TempPathFactory) -> Command:
+def execute(tmp_path_factory):
     """A function that runs a program where Blender has settings of its own, and requires its status."""
     environment = os.environ | {"BLENDER_USER_RESOURCES": str(tmp_path_factory.mktemp("settings"))}
     folder = tmp_path_factory.mktemp("installed")
 
-    def execute(*words: str, status: int = 0) -> subprocess.CompletedProcess[str]:
+    def execute(*words, status=0):
         done = subprocess.run(
             words, env=environment, cwd=folder, capture_output=True, text=True, timeout=TIMEOUT
         )
@@ -32,7 +30,7 @@ def execute(tmp_path_factory: pytest.TempPathFactory) -> Command:
 
 
 @pytest.fixture(scope="module")
-def command(execute: Command, tmp_path_factory: pytest.TempPathFactory) -> Command:
+def command(execute, tmp_path_factory):
     folder = tmp_path_factory.mktemp("built")
     execute(sys.executable, str(TOOL), "--out", str(folder))
     (archive,) = folder.glob("*.zip")
@@ -43,18 +41,18 @@ def command(execute: Command, tmp_path_factory: pytest.TempPathFactory) -> Comma
 
 
 @pytest.fixture(scope="module")
-def run(command: Command, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def run(command, tmp_path_factory):
     out = tmp_path_factory.mktemp("runs") / "a täp"
     command("run", "tap", "--out", str(out))
     return out
 
 
-def test_a_scene_is_described_and_run(command: Command, run: Path) -> None:
+def test_a_scene_is_described_and_run(command, run):
     assert "11 x 11 = 121 cells" in command("describe", "tap").stdout
     assert {"history.npz", "metrics.json", "scene.toml"} <= {file.name for file in run.iterdir()}
 
 
-def test_a_run_is_exported_and_rendered(command: Command, run: Path, tmp_path: Path) -> None:
+def test_a_run_is_exported_and_rendered(command, run, tmp_path):
     command("export", str(run), "--format", "stl,obj", "--out", str(tmp_path))
     assert {".stl", ".obj"} <= {file.suffix for file in tmp_path.iterdir()}
     picture = tmp_path / "still.png"
@@ -63,11 +61,11 @@ def test_a_run_is_exported_and_rendered(command: Command, run: Path, tmp_path: P
 
 
 @pytest.mark.parametrize("words", [("render", "nowhere"), ()])
-def test_what_cannot_be_done_is_told_in_one_line(words: tuple[str, ...], command: Command) -> None:
+def test_what_cannot_be_done_is_told_in_one_line(words, command):
     assert command(*words, status=2).stderr.strip()
 
 
-def test_a_batch_starts_blender_once_more_for_each_job(command: Command, tmp_path: Path) -> None:
+def test_a_batch_starts_blender_once_more_for_each_job(command, tmp_path):
     jobs = tmp_path / "erste Übung.toml"
     jobs.write_text(
         'scenes = ["tap"]\nmethods = ["virtual_master", "cell_states"]\nerrors = false\nexport = ["stl"]\n'
@@ -80,7 +78,7 @@ def test_a_batch_starts_blender_once_more_for_each_job(command: Command, tmp_pat
         assert {"film.mp4", "surface.stl", "metrics.json"} <= {file.name for file in run.iterdir()}
 
 
-def test_a_series_for_a_farm_is_run_by_blender(command: Command, execute: Command, tmp_path: Path) -> None:
+def test_a_series_for_a_farm_is_run_by_blender(command, execute, tmp_path):
     jobs, out, blender = tmp_path / "two.toml", tmp_path / "a färm", f"Blender={BLENDER}"
     jobs.write_text(
         'scenes = ["tap"]\nerrors = false\nsettings.a.simulation.duration = 0.1\n'

@@ -6,14 +6,12 @@ from pathlib import Path
 import numpy as np
 from digiclay.settings.devices import BEDS, FIRST
 
-from tests.window.blender_window import Seen
-
 PLAYED = {"script": "first_minute.py", "size": (1100, 720), "by_hand": True}
 REST = 40.0
 GUIDE = Path(__file__).parents[2] / "docs" / "guide.md"
 
 
-def test_the_script_takes_the_steps_of_the_page_and_each_does_what_it_says(seen: Seen) -> None:
+def test_the_script_takes_the_steps_of_the_page_and_each_does_what_it_says(seen):
     page = GUIDE.read_text(encoding="utf-8").partition("## First ridge")[2].partition("##")[0]
     steps = re.findall(r"^\d\. (.*?\.)(?=\s)", page, re.MULTILINE | re.DOTALL)
     assert [" ".join(step.split()) for step in steps] == seen["steps"]
@@ -26,7 +24,7 @@ def test_the_script_takes_the_steps_of_the_page_and_each_does_what_it_says(seen:
     assert (seen["started"], seen["tool"], seen["left"]) == (1, "digiclay.press_tool", 0)
 
 
-def test_a_ridge_stands_within_a_minute(seen: Seen) -> None:
+def test_a_ridge_stands_within_a_minute(seen):
     bed = BEDS[FIRST]
     height = np.array(seen["drawn"]["bed"]) - REST
     x, y = (1e3 * bed.pitch * (np.arange(count) - (count - 1) / 2) for count in (bed.columns, bed.rows))
@@ -41,6 +39,6 @@ def test_a_ridge_stands_within_a_minute(seen: Seen) -> None:
     assert seen["took"] - seen["waited"] < 60.0
 
 
-def test_a_click_on_the_ball_takes_hold_of_the_fingertip_and_g_moves_it(seen: Seen) -> None:
+def test_a_click_on_the_ball_takes_hold_of_the_fingertip_and_g_moves_it(seen):
     assert seen["taken hold of"]
     assert np.hypot(*seen["moved"][:2]) > 0.02

@@ -1,11 +1,9 @@
 """German labels in a real window: each fits into the room that its row has."""
 
-from tests.window.blender_window import Seen
-
 PLAYED = {"script": "look_in_german.py", "size": (1000, 700)}
 
 
-def test_no_german_label_of_a_panel_is_longer_than_its_row(seen: Seen) -> None:
+def test_no_german_label_of_a_panel_is_longer_than_its_row(seen):
     needs = [need for need, _ in seen["drawn"].values()]
     assert (len(needs) >= 50, min(needs) > 0.0) == (True, True)
     assert [name for name, (need, room) in seen["drawn"].items() if need > room] == []

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.window.blender_window import Seen, up
+from tests.window.blender_window import up
 from tests.window.hand_brushes import HALF, LONG, SPIKE
 
 PLAYED = {"script": "hand_brushes.py", "size": (1100, 640), "by_hand": True}
@@ -14,7 +14,7 @@ MIDDLE, ABOVE = (12, 12), (18, 12)
 
 
 @pytest.mark.parametrize(("name", "row"), [("raised", 12), ("inverted", 5)])
-def test_a_quick_drag_of_60_mm_raises_all_its_columns_by_15_mm(seen: Seen, name: str, row: int) -> None:
+def test_a_quick_drag_of_60_mm_raises_all_its_columns_by_15_mm(seen, name, row):
     risen = up(seen, name)[row, COLUMNS]
     assert (np.abs(risen - 15.0) < 2.0).mean() >= 0.95
 
@@ -28,7 +28,7 @@ def test_ctrl_lowers_level_fills_a_valley_the_header_smooths_and_a_click_with_sh
     assert up(seen, "line")[4, 3:22].max() < -1.0
 
 
-def test_shift_and_a_drag_smooth_a_spike_in_one_stroke(seen: Seen) -> None:
+def test_shift_and_a_drag_smooth_a_spike_in_one_stroke(seen):
     before, smoothed = up(seen, "before"), up(seen, "smoothed")
     assert before[MIDDLE] == pytest.approx(1e3 * SPIKE, abs=1e-3)
     assert smoothed[MIDDLE] < 0.4e3 * SPIKE
@@ -51,7 +51,7 @@ def test_shift_and_a_drag_smooth_a_spike_in_one_stroke(seen: Seen) -> None:
         pytest.param("escaped", "by brush", 1e-3, id="Esc in mid-stroke leaves the bed as before"),
     ],
 )
-def test_what_is_taken_back_is_as_before(seen: Seen, name: str, before: str, tolerance: float) -> None:
+def test_what_is_taken_back_is_as_before(seen, name, before, tolerance):
     np.testing.assert_allclose(up(seen, name), up(seen, before), rtol=0, atol=tolerance)
     assert seen[name]["sessions"] == 1
     assert np.abs(up(seen, "inverted") - up(seen, "raised")).max() > 10.0

@@ -6,7 +6,7 @@ from digiclay.core.model.layout import Layout, make_grid
 from digiclay.recorded.pointer_strokes import read_strokes
 from digiclay.settings.devices import BEDS
 
-from tests.window.blender_window import FORMED, Seen, down
+from tests.window.blender_window import FORMED, down
 from tests.window.hand_strokes import DRAWN, HALF, STROKES, TAPS, THINGS
 from tests.window.intended import find_relief
 
@@ -17,7 +17,7 @@ ROW = 12
 
 
 @pytest.mark.parametrize("when", [*(f"{duration:g}" for duration, _ in STROKES), "under a message"])
-def test_a_stroke_is_formed_in_all_its_columns_and_nowhere_else(seen: Seen, when: str) -> None:
+def test_a_stroke_is_formed_in_all_its_columns_and_nowhere_else(seen, when):
     # The timer of a message gives every operator events that name the release of the stroke before.
     assert seen["message"].endswith("goes on")
     assert (down(seen, f"stroke {when}")[ROW, COLUMNS] > FORMED).mean() >= 0.95
@@ -32,12 +32,12 @@ def test_a_stroke_is_formed_in_all_its_columns_and_nowhere_else(seen: Seen, when
         pytest.param("one tap undone", [True, True, False], id="one undo takes back one"),
     ],
 )
-def test_each_tap_is_a_press_of_its_own(seen: Seen, name: str, formed: list[bool]) -> None:
+def test_each_tap_is_a_press_of_its_own(seen, name, formed):
     cells = [(round((y + 36) / 3), round((x + 36) / 3)) for x, y in TAPS]
     assert [bool(down(seen, name)[cell] > FORMED) for cell in cells] == formed
 
 
-def test_the_view_turns_and_zooms_in_mid_stroke_and_the_stroke_goes_on(seen: Seen) -> None:
+def test_the_view_turns_and_zooms_in_mid_stroke_and_the_stroke_goes_on(seen):
     before, middle, after = (seen[name] for name in ("before orbit", "in mid-stroke", "after orbit"))
     assert np.abs(np.subtract(before["view"], middle["view"])).max() > 0.02
     assert middle["distance"] < before["distance"]
@@ -45,7 +45,7 @@ def test_the_view_turns_and_zooms_in_mid_stroke_and_the_stroke_goes_on(seen: See
     assert down(seen, "after orbit")[ROW, [3, 21]].min() > FORMED
 
 
-def test_a_stroke_pans_in_its_middle_and_ends_where_a_pie_menu_has_taken_the_release(seen: Seen) -> None:
+def test_a_stroke_pans_in_its_middle_and_ends_where_a_pie_menu_has_taken_the_release(seen):
     assert np.abs(seen["pie menu"]["panned"]).max() > 0.01
     row = down(seen, "pie menu")[ROW]
     # Formed up to the middle, and not to where the mouse went after the release.
@@ -54,13 +54,13 @@ def test_a_stroke_pans_in_its_middle_and_ends_where_a_pie_menu_has_taken_the_rel
 
 
 @pytest.mark.parametrize("name", ["undone", "escaped"])
-def test_an_unfinished_stroke_is_taken_back_and_the_session_goes_on(seen: Seen, name: str) -> None:
+def test_an_unfinished_stroke_is_taken_back_and_the_session_goes_on(seen, name):
     assert np.abs(down(seen, name)).max() < 1e-3
     assert seen[name]["sessions"] == 1
 
 
 @pytest.mark.parametrize("name", THINGS)
-def test_a_thing_drawn_by_a_hand_is_what_was_intended(seen: Seen, name: str) -> None:
+def test_a_thing_drawn_by_a_hand_is_what_was_intended(seen, name):
     plan = BEDS["design"]
     grid = make_grid(Layout(rows=plan.rows, columns=plan.columns, pitch=plan.pitch))
     intended = find_relief(name, *grid.positions.T)

@@ -5,17 +5,17 @@ import math
 import numpy as np
 import pytest
 
-from tests.window.blender_window import Seen, up
+from tests.window.blender_window import up
 from tests.window.hand_verbs import CENTER
 
 PLAYED = {"script": "hand_verbs.py", "size": (1300, 760), "by_hand": True}
 
 
-def locked(seen: Seen, name: str) -> np.ndarray:
+def locked(seen, name):
     return np.array(seen[name]["locked"]).reshape(25, 25)
 
 
-def test_erasing_brings_a_groove_back_to_rest_but_for_locked_pins(seen: Seen) -> None:
+def test_erasing_brings_a_groove_back_to_rest_but_for_locked_pins(seen):
     kept, groove, erased = locked(seen, "locked"), up(seen, "groove"), up(seen, "erased")
     assert groove[12, 12] < -3.0
     # In perspective a hand wanders where the ground is low.
@@ -31,13 +31,13 @@ def test_erasing_brings_a_groove_back_to_rest_but_for_locked_pins(seen: Seen) ->
     ("name", "before"),
     [("erasing undone", "locked"), ("inverting undone", "erasing undone"), ("stamping undone", "cleared")],
 )
-def test_each_is_one_undo_step(seen: Seen, name: str, before: str) -> None:
+def test_each_is_one_undo_step(seen, name, before):
     np.testing.assert_allclose(up(seen, name), up(seen, before), rtol=0, atol=1e-3)
     np.testing.assert_array_equal(locked(seen, name), locked(seen, before))
     assert seen[name]["sessions"] == 1
 
 
-def test_locks_are_turned_over_taken_off_by_ctrl_and_cleared(seen: Seen) -> None:
+def test_locks_are_turned_over_taken_off_by_ctrl_and_cleared(seen):
     kept = locked(seen, "locked")
     np.testing.assert_array_equal(locked(seen, "inverted"), ~kept)
     left = locked(seen, "unlocked")
@@ -47,7 +47,7 @@ def test_locks_are_turned_over_taken_off_by_ctrl_and_cleared(seen: Seen) -> None
     np.testing.assert_allclose(up(seen, "cleared"), up(seen, "erasing undone"), rtol=0, atol=1e-3)
 
 
-def test_a_stamp_stands_where_and_as_large_as_it_was_drawn_and_ctrl_presses_it_in(seen: Seen) -> None:
+def test_a_stamp_stands_where_and_as_large_as_it_was_drawn_and_ctrl_presses_it_in(seen):
     risen = up(seen, "stamped") - up(seen, "cleared")
     # In the row 18 mm behind the middle; the hand's place is good to a pixel or two.
     assert risen[18, 12] == pytest.approx(12.0, abs=0.8)
@@ -58,7 +58,7 @@ def test_a_stamp_stands_where_and_as_large_as_it_was_drawn_and_ctrl_presses_it_i
     assert sunk.max() < 0.01
 
 
-def test_a_placed_center_has_five_rays_about_it(seen: Seen) -> None:
+def test_a_placed_center_has_five_rays_about_it(seen):
     x, y, axis = seen["center"]
     assert (x, y) == (pytest.approx(CENTER[0], abs=0.7), pytest.approx(CENTER[1], abs=0.7))
     assert axis == pytest.approx(math.pi / 4.0, abs=0.1)

@@ -2,29 +2,25 @@
 
 import math
 import os
-from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
 from itertools import product
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
-from digiclay.core.base.arrays import Floats
-from digiclay.core.scene.schema import Scene
 from digiclay.recorded.pointer_strokes import PointerStroke
 from digiclay.sessions.sculpting import change_stroke, find_stroke, follow_finger, queue_stroke
 from digiclay.strokes.stroke import draw, lay_ring, start
 
 from tests.window.intended import THINGS, find_distance
-from tests.window.made import Played, begin, draw_made, make, make_bed, move, play
+from tests.window.made import begin, draw_made, make, make_bed, move, play
 
 TIMES = {"r_lowered": 6.0, "r_raised": 7.0, "spiral": 7.0, "ring": 5.0, "leaf": 12.0, "lines": 15.0}
 
 
 @pytest.mark.parametrize("name", THINGS)
-def test_a_thing_made_by_recorded_strokes_is_what_was_intended(name: str) -> None:
+def test_a_thing_made_by_recorded_strokes_is_what_was_intended(name):
     made = make(name)
     if pictures := os.environ.get("DIGICLAY_SCREENSHOTS"):
         Path(pictures).mkdir(parents=True, exist_ok=True)
@@ -49,19 +45,19 @@ AMOUNTS, HANDS = (2e-3, 4e-3, 8e-3, 15e-3), ((60.0, 1), (24.0, 5), (7.0, 1))
 #: How far from the path pins are whose heights count as those of the stroke, m.
 CORE = 1.5e-3
 #: What Raise and Lower do in the cases.
-KINDS: dict[str, dict[str, Any]] = {
+KINDS = {
     "lowered 6 mm": {"brush": "lower", "depth": 6e-3},
     "raised 8 mm": {"brush": "raise", "height": 8e-3},
 }
 
 
-def _bend(*places: Any) -> dict[str, Any]:
+def _bend(*places):
     """Return the moves of a hand through places, mm, within half a second."""
     times = np.linspace(0.0, 0.5, len(places))
     return {"moves": tuple((t, 1e-3 * x, 1e-3 * y) for t, (x, y) in zip(times.tolist(), places, strict=True))}
 
 
-PATHS: dict[str, dict[str, Any]] = {
+PATHS = {
     "line": {**_bend((-28.0, 0.0), (28.0, 0.0)), "path": "line"},
     "ring": {**_bend((0.0, 0.0), (26.0, 0.0)), "path": "ring"},
     "free": _bend(*((26.0 * u, 14.0 * math.sin(3.0 * u)) for u in np.linspace(-1.0, 1.0, 24).tolist())),
@@ -77,7 +73,7 @@ PATHS: dict[str, dict[str, Any]] = {
 PARTS = (3, 6)
 
 
-def measure_distances(made: Played) -> Floats:
+def measure_distances(made):
     """Return how far pins are from the path of the only stroke, (n,), m."""
     (stroke,), grid = made.strokes, made.session.system.grid
     path = np.array([move[1:] for move in stroke.moves])
@@ -86,7 +82,7 @@ def measure_distances(made: Played) -> Floats:
     return find_distance(path.tolist(), grid.x, grid.y)
 
 
-def measure_unevenness(made: Played) -> Floats:
+def measure_unevenness(made):
     """Return how far pins near the path, (k,), m, differ from the common section of those as far from it."""
     near, blister = measure_distances(made), made.session.scene.blister
     cells = near < blister.radius + made.session.scene.layout.pitch
@@ -103,14 +99,14 @@ def measure_unevenness(made: Played) -> Floats:
     return height - hats @ np.linalg.lstsq(hats, height, rcond=None)[0]
 
 
-def find_spikes(made: Played) -> Floats:
+def find_spikes(made):
     """Return how far pins are above, or below, all their neighbors, (n,), m."""
     beside = np.append(made.formed, np.nan)[made.session.scene.layout.find_neighbors(corners=True)]
     above = made.formed - np.fmax.reduce(beside, axis=1)
     return np.maximum(above, np.fmin.reduce(beside, axis=1) - made.formed).clip(0.0)
 
 
-def draw_by_hand(scene: Scene, stroke: PointerStroke, rate: float, moves: int) -> Floats:
+def draw_by_hand(scene, stroke, rate, moves):
     """Draw a stroke on a bed at rest, some moves a tick, ticks at a rate, 1/s; return heights, (n,), m."""
     session = begin(scene)
     session, number = queue_stroke(session, start(0, *stroke.moves[0][1:], stroke.amount, brush=stroke.kind))
@@ -124,7 +120,7 @@ def draw_by_hand(scene: Scene, stroke: PointerStroke, rate: float, moves: int) -
     return np.asarray(session.state.row(0) - scene.actuator.rest_height)
 
 
-def list_reliefs() -> Iterator[dict[str, Any]]:
+def list_reliefs():
     """Yield how even each kind of stroke is along each path, m, and its spikes, m."""
     for (kind, amount), (name, path) in product(KINDS.items(), PATHS.items()):
         for angle, shift in TURNS:
@@ -140,7 +136,7 @@ def list_reliefs() -> Iterator[dict[str, Any]]:
             }
 
 
-def list_differences() -> Iterator[dict[str, Any]]:
+def list_differences():
     """Yield how far apart strokes are that are to be alike, and from the depth or height asked for, m."""
     for kind, amount in KINDS.items():
         free = PointerStroke(**amount, **PATHS["free"])
@@ -163,12 +159,12 @@ def list_differences() -> Iterator[dict[str, Any]]:
         yield _differ(f"{brush} {1e3 * asked:g} mm", core - asked)
 
 
-def _differ(case: str, difference: Floats) -> dict[str, Any]:
+def _differ(case, difference):
     """Return the row of a case: the greatest difference, m."""
     return {"case": case, "difference": float(np.abs(difference).max())}
 
 
-def test_strokes_are_even_leave_no_spikes_and_come_out_alike_where_they_are_drawn_alike() -> None:
+def test_strokes_are_even_leave_no_spikes_and_come_out_alike_where_they_are_drawn_alike():
     for case in list_reliefs():
         assert case["rms"] <= 0.1e-3, case
         assert case["most"] <= 0.3e-3, case

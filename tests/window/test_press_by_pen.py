@@ -5,14 +5,14 @@ import pytest
 from digiclay.core.model.fingertip import LEVEL, make_matrices
 from digiclay.press.pointer import FULL_TILT
 
-from tests.window.blender_window import ON_DISPLAY, Seen, played
+from tests.window.blender_window import ON_DISPLAY, played
 from tests.window.tablet.screen import pen_screen
 
 pytestmark = pytest.mark.skipif(not ON_DISPLAY, reason="a screen with a pen needs DIGICLAY_BLENDER_DISPLAY")
 
 
 @pytest.fixture(scope="module")
-def seen(tmp_path_factory: pytest.TempPathFactory) -> Seen:
+def seen(tmp_path_factory):
     with pen_screen(tmp_path_factory.mktemp("screen")) as display:
         out = tmp_path_factory.mktemp("pen")
         return played("press_by_pen.py", out, size=(800, 560), by_hand=True, display=display)
@@ -22,8 +22,8 @@ def seen(tmp_path_factory: pytest.TempPathFactory) -> Seen:
     ("name", "depth", "angle"), [("firm", 4.0, 0.0), ("light", 2.0, 0.0), ("leaning", 4.0, 0.8 * FULL_TILT)]
 )
 def test_a_pen_presses_as_deep_as_its_pressure_and_the_fingertip_leans_with_it_meanwhile(
-    seen: Seen, name: str, depth: float, angle: float
-) -> None:
+    seen, name, depth, angle
+):
     # The surface is level to a hundredth of a millimeter where no stroke has been.
     assert 40.0 - seen[name]["formed"] == pytest.approx(depth, abs=0.05)
     # Where its top points, along x, y and z of the bed; the tablet's tilt has steps of a degree.

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.window.blender_window import FORMED, Seen, down
+from tests.window.blender_window import FORMED, down
 from tests.window.press_sizes import MIRRORED, RADIUS, WIDER
 
 PLAYED = {"script": "press_sizes.py", "size": (800, 560), "by_hand": True}
@@ -30,13 +30,13 @@ def test_the_session_goes_on_with_the_size_that_is_set(seen, name, size, toleran
     assert seen["deeper"]["period"] > seen[name]["period"]
 
 
-def test_depth_and_strength_have_keys_of_their_own(seen: Seen) -> None:
+def test_depth_and_strength_have_keys_of_their_own(seen):
     assert seen["begun"]["depth"] == pytest.approx(4.0)
     assert seen["deeper"]["depth"] == pytest.approx(6.0, abs=0.2)
     assert (seen["strength"]["depth"], seen["strength"]["strength"]) == pytest.approx((4.0, 0.5), abs=1e-6)
 
 
-def test_a_symmetric_stroke_forms_its_images_and_is_one_undo_step(seen: Seen) -> None:
+def test_a_symmetric_stroke_forms_its_images_and_is_one_undo_step(seen):
     (start, y), (end, _) = MIRRORED
     columns = np.arange(round(start / 3) + 12, round(end / 3) + 13)
     for row in (12 + round(y / 3), 12 - round(y / 3)):
@@ -62,13 +62,13 @@ def test_a_line_that_of_a_shift_click_a_stabilized_stroke_and_a_ring_cover_their
 
 
 @pytest.mark.parametrize("name", ["perspective", "orthographic", "camera"])
-def test_a_click_on_an_object_selects_it_and_one_beside_it_presses(seen: Seen, name: str) -> None:
+def test_a_click_on_an_object_selects_it_and_one_beside_it_presses(seen, name):
     before = seen[name]["covered"]
     assert seen[name]["covered selected"] == ["Cube"]
     assert seen[name]["bare"] == before + 1
 
 
-def test_pins_that_are_seen_are_pressed_through_xray_behind_an_object_and_in_each_quarter(seen: Seen) -> None:
+def test_pins_that_are_seen_are_pressed_through_xray_behind_an_object_and_in_each_quarter(seen):
     assert seen["xray"]["covered selected"] == []
     assert seen["xray"]["bare"] == seen["camera"]["bare"] + 2
     # 24 mm to either side of the middle, 3 mm a pin; the fingertip presses 4 mm deep.
@@ -78,7 +78,7 @@ def test_pins_that_are_seen_are_pressed_through_xray_behind_an_object_and_in_eac
     assert seen["reported"].count("Cube hides the bed here") == 3  # in three views
 
 
-def test_a_bed_that_is_added_in_a_cube_goes_on_top_of_it_or_beside_it_where_that_is_seen(seen: Seen) -> None:
+def test_a_bed_that_is_added_in_a_cube_goes_on_top_of_it_or_beside_it_where_that_is_seen(seen):
     # Its origin is the floor of the bed, a little above its underside; the cube is 2 units large.
     where = {axis: tuple(one > 1.0 for one in seen[axis]) for axis in ("TOP", "FRONT", "BOTTOM")}
     assert where == {"TOP": (False, True), "FRONT": (False, True), "BOTTOM": (True, False)}

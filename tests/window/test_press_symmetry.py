@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.window.blender_window import FORMED, Seen, down
+from tests.window.blender_window import FORMED, down
 
 PLAYED = {"script": "press_symmetry.py", "size": (800, 560), "by_hand": True}
 
@@ -17,7 +17,7 @@ PLAYED = {"script": "press_symmetry.py", "size": (800, 560), "by_hand": True}
         pytest.param("along", "along alone", 2, 1.05, id="on the axis one presses"),
     ],
 )
-def test_images_take_about_as_many_periods_as_one(seen: Seen, name, alone, fingers, longer):
+def test_images_take_about_as_many_periods_as_one(seen, name, alone, fingers, longer):
     # The hand does not draw exactly as before: some periods more or less.
     assert seen[name]["periods"] <= longer * seen[alone]["periods"] + 8
     assert (seen[name]["fingers"], seen[name]["left"]) == (fingers, 1)
@@ -33,14 +33,14 @@ def test_images_take_about_as_many_periods_as_one(seen: Seen, name, alone, finge
         ("two", []),
     ],
 )
-def test_images_are_alike_on_a_turned_bed(seen: Seen, name, turns):
+def test_images_are_alike_on_a_turned_bed(seen, name, turns):
     formed = down(seen, name)
     assert formed.max() > FORMED
     for turn in turns:  # the valves place pins to 1 µm; heights are noted to as much
         np.testing.assert_allclose(formed, turn(formed), rtol=0, atol=3e-3)
 
 
-def test_twelve_images_on_a_large_bed_take_the_periods_of_one(seen: Seen) -> None:
+def test_twelve_images_on_a_large_bed_take_the_periods_of_one(seen):
     print({name: f"{periods} periods, {seconds:.2f} s" for name, (periods, seconds) in seen["timed"].items()})
     # While the hand is slower than the fingertip, the session waits for it.
     for name, alone in (("2", "1"), ("6", "1"), ("12", "1"), ("2 beside", "1 beside")):
@@ -49,7 +49,7 @@ def test_twelve_images_on_a_large_bed_take_the_periods_of_one(seen: Seen) -> Non
     assert seen["timed"]["12 rays"][0] <= 1.6 * seen["timed"]["1 ray"][0]
 
 
-def test_strokes_of_other_symmetries_wait_in_a_queue_and_are_taken_back_one_by_one(seen: Seen) -> None:
+def test_strokes_of_other_symmetries_wait_in_a_queue_and_are_taken_back_one_by_one(seen):
     three, two = down(seen, "three"), down(seen, "two")
     # The last one alone has pins in the middle of a row beside the bed's edge.
     assert (three[22, [14, 16, 10, 8]] > FORMED).all()
@@ -59,7 +59,7 @@ def test_strokes_of_other_symmetries_wait_in_a_queue_and_are_taken_back_one_by_o
     np.testing.assert_allclose(down(seen, "escaped"), two, rtol=0, atol=3e-3)
 
 
-def test_what_is_recorded_is_replayed(seen: Seen) -> None:
+def test_what_is_recorded_is_replayed(seen):
     assert seen["at the end"] == [1, 7]
     assert seen["take"] == [4, 1]
     np.testing.assert_allclose(down(seen, "replayed"), down(seen, "escaped"), rtol=0, atol=1e-3)

@@ -3,18 +3,18 @@
 import numpy as np
 import pytest
 
-from tests.window.blender_window import REST, Seen, bed
+from tests.window.blender_window import REST, bed
 
 PLAYED = {"script": "press_tool.py", "size": (1100, 720)}
 #: Pins the valley is drawn over, 6 mm off the middle row of 25, and their columns.
 ROW, COLUMNS = 14, slice(8, 17)
 
 
-def finger(seen: Seen, name: str) -> np.ndarray:
+def finger(seen, name):
     return np.array(seen[name]["finger"])
 
 
-def test_a_press_starts_a_session_and_puts_the_finger_under_the_mouse(seen: Seen) -> None:
+def test_a_press_starts_a_session_and_puts_the_finger_under_the_mouse(seen):
     assert (seen["added"]["sessions"], seen["pressed"]["sessions"]) == (0, 1)
     # 18 mm, 6 mm to a pixel of the picture: the bed of 75 mm is 500 pixels wide. The fingertip waits within
     # 0.5 mm of the hand, the way of a control period.
@@ -23,21 +23,21 @@ def test_a_press_starts_a_session_and_puts_the_finger_under_the_mouse(seen: Seen
     assert -6.0 < finger(seen, "pressed")[2] - REST < -4.0
 
 
-def test_dragging_draws_a_valley_alone_and_let_go_the_fingertip_leaves_the_bed(seen: Seen) -> None:
+def test_dragging_draws_a_valley_alone_and_let_go_the_fingertip_leaves_the_bed(seen):
     drawn = bed(seen, "let go")
     assert drawn[ROW, COLUMNS].max() < REST - 1.0
     np.testing.assert_allclose(drawn[:4], REST, rtol=0, atol=1e-3)
     assert (finger(seen, "let go")[2] > REST, seen["let go"]["force"]) == (True, 0.0)
 
 
-def test_the_wheel_presses_deeper_and_ctrl_in_mid_stroke_draws_on_as_deep(seen: Seen) -> None:
+def test_the_wheel_presses_deeper_and_ctrl_in_mid_stroke_draws_on_as_deep(seen):
     before, along = (finger(seen, name) for name in ("before the wheel", "after Ctrl"))
     # The fingertip goes deeper where the hand goes on; until then the ghost does.
     assert along[2] == pytest.approx(before[2] - 2.0, abs=0.3)
     assert np.linalg.norm((along - before)[:2]) > 3.0
 
 
-def test_the_text_at_the_cursor_says_what_a_press_does_now_and_what_is_being_formed(seen: Seen) -> None:
+def test_the_text_at_the_cursor_says_what_a_press_does_now_and_what_is_being_formed(seen):
     lower, size = "Lower, depth 4 mm", "Size 16 mm   "
     assert seen["LEFT_CTRL held"] == f"{size}Raise, height 15 mm"
     assert seen["RIGHT_SHIFT held"] == f"{size}Smooth 100 %"
@@ -48,7 +48,7 @@ def test_the_text_at_the_cursor_says_what_a_press_does_now_and_what_is_being_for
     assert seen["while Raise forms"].startswith(f"{size}{lower}   Forming: Raise")
 
 
-def test_the_text_at_the_cursor_stays_beside_the_sidebar_and_above_the_edge(seen: Seen) -> None:
+def test_the_text_at_the_cursor_stays_beside_the_sidebar_and_above_the_edge(seen):
     left, bottom, right, top = seen["room"]
     width = seen["text"]["middle"][2] - seen["text"]["middle"][0]
     assert width > 150  # of all its letters
@@ -58,18 +58,18 @@ def test_the_text_at_the_cursor_stays_beside_the_sidebar_and_above_the_edge(seen
         assert to_x - x == pytest.approx(width, abs=3)  # smooth edges
 
 
-def test_clicks_pick_the_pins_under_the_mouse_and_forces_are_written_once_they_are_shown(seen: Seen) -> None:
+def test_clicks_pick_the_pins_under_the_mouse_and_forces_are_written_once_they_are_shown(seen):
     # Column 12 of row 12 is the middle; 3 mm a pin.
     assert seen["picked"]["picked"] == [3 * 25 + 8, 3 * 25 + 12, 3 * 25 + 16]
     assert [seen[name]["forces written"] for name in ("pressed", "forces shown")] == [False, True]
 
 
-def test_the_overlay_is_drawn_while_a_session_runs_and_it_is_wanted(seen: Seen) -> None:
+def test_the_overlay_is_drawn_while_a_session_runs_and_it_is_wanted(seen):
     wanted = {"added": False, "pressed": True, "overlay off": False, "overlay on": True, "ended": False}
     assert {name: seen[name]["overlay"] for name in wanted} == wanted
 
 
-def test_the_next_press_starts_the_session_anew_and_ends_with_its_bed(seen: Seen) -> None:
+def test_the_next_press_starts_the_session_anew_and_ends_with_its_bed(seen):
     assert [seen[name]["sessions"] for name in ("ended", "started anew", "bed deleted")] == [0, 1, 0]
     assert seen["bed deleted"]["beds"] == 0
     # Disabled: what the extension left behind to draw would fail with a traceback, which ends `played`.

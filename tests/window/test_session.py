@@ -1,11 +1,9 @@
 """A live session in a real Blender window, used by simulated key presses and mouse moves."""
 
-from typing import Any
-
 import numpy as np
 import pytest
 
-from tests.window.blender_window import Seen, played
+from tests.window.blender_window import played
 
 PLAYED = {"script": "sculpt_a_ridge.py", "size": (1000, 640)}
 #: Pins come to rest by hundredths of a millimeter for some time after the fingertip has left them.
@@ -13,20 +11,20 @@ SETTLING = 0.1e-3
 
 
 @pytest.fixture(scope="module")
-def interrupted(tmp_path_factory: pytest.TempPathFactory) -> Seen:
+def interrupted(tmp_path_factory):
     return played("interrupt_a_session.py", tmp_path_factory.mktemp("interrupt"), (800, 600))
 
 
 @pytest.fixture(scope="module")
-def tried(tmp_path_factory: pytest.TempPathFactory) -> Seen:
+def tried(tmp_path_factory):
     return played("random_events.py", tmp_path_factory.mktemp("random"), (800, 600))
 
 
-def lowest(look: dict[str, Any]) -> float:
+def lowest(look):
     return float(look["heights"][0])
 
 
-def test_dragging_moves_the_fingertip_of_a_bed_at_rest_and_nothing_else_without_a_session(seen: Seen) -> None:
+def test_dragging_moves_the_fingertip_of_a_bed_at_rest_and_nothing_else_without_a_session(seen):
     added, dragged = seen["added"], seen["dragged"]
     assert (added["beds"], added["modes"][0]) == (1, 625)
     moved = np.subtract(dragged["pose"][:3], added["pose"][:3])
@@ -36,7 +34,7 @@ def test_dragging_moves_the_fingertip_of_a_bed_at_rest_and_nothing_else_without_
     assert seen["drag undone"]["pose"] == added["pose"]
 
 
-def test_the_ridge_grows_and_the_fingertip_is_felt_during_the_move(seen: Seen) -> None:
+def test_the_ridge_grows_and_the_fingertip_is_felt_during_the_move(seen):
     pressing = [lowest(seen[f"pressing {step}"]) for step in range(1, 7)]
     assert pressing[-1] < pressing[0]
     # Cells that keep the height they were left at, and those the fingertip leaves behind: its trail.
@@ -61,7 +59,7 @@ def test_what_was_formed_stays_when_lifted_and_backspace_and_undo_take_it_back_a
     assert lowest(seen["rewinding undone"]) == pytest.approx(lowest(seen["resumed"]), abs=SETTLING)
 
 
-def test_undo_and_redo_take_one_gesture_after_the_other_and_the_session_goes_on(seen: Seen) -> None:
+def test_undo_and_redo_take_one_gesture_after_the_other_and_the_session_goes_on(seen):
     done = ("lift undone", "draw undone", "draw redone", "lift redone")
     assert [seen[name]["sessions"] for name in done] == [1] * 4
     same = ("drawn", "pressed", "drawn", "lifted")
@@ -73,7 +71,7 @@ def test_undo_and_redo_take_one_gesture_after_the_other_and_the_session_goes_on(
     assert lowest(seen["lift redone"]) == pytest.approx(lowest(seen["lifted"]), abs=SETTLING)
 
 
-def test_p_pauses_and_resumes_and_shift_p_does_one_period(seen: Seen) -> None:
+def test_p_pauses_and_resumes_and_shift_p_does_one_period(seen):
     paused = seen["paused"]
     assert (paused["paused"], seen["paused later"]["period"]) == (True, paused["period"])
     assert (seen["single step"]["paused"], seen["single step"]["period"]) == (True, paused["period"] + 1)
@@ -81,7 +79,7 @@ def test_p_pauses_and_resumes_and_shift_p_does_one_period(seen: Seen) -> None:
     assert seen["resumed"]["period"] > paused["period"] + 1
 
 
-def test_a_file_saved_in_mid_session_is_loaded_as_it_was_and_esc_keeps_what_is_formed(seen: Seen) -> None:
+def test_a_file_saved_in_mid_session_is_loaded_as_it_was_and_esc_keeps_what_is_formed(seen):
     saved, loaded, later, stopped = (seen[name] for name in ("saved", "loaded", "going on", "stopped"))
     assert [look["sessions"] for look in (loaded, later, stopped)] == [0, 1, 0]
     assert "another file was loaded" in loaded["said"]
@@ -123,11 +121,11 @@ def test_a_session_waits_with_the_reason_and_goes_on(interrupted, stopped, words
         pytest.param("before quitting", 1, id="Blender quits with a session on, well as `played` requires"),
     ],
 )
-def test_sessions_end_with_what_they_need(interrupted: Seen, name: str, sessions: int) -> None:
+def test_sessions_end_with_what_they_need(interrupted, name, sessions):
     assert interrupted[name]["sessions"] == sessions
 
 
-def test_whatever_ends_a_session_says_so_and_leaves_the_state_and_nothing_else(interrupted: Seen) -> None:
+def test_whatever_ends_a_session_says_so_and_leaves_the_state_and_nothing_else(interrupted):
     there, again, later = (
         interrupted[name] for name in ("in another workspace", "started again", "going on")
     )
@@ -141,15 +139,15 @@ def test_whatever_ends_a_session_says_so_and_leaves_the_state_and_nothing_else(i
 
 
 def test_esc_in_edit_mode_leaves_a_stroke_for_the_next_session_and_a_stretched_bed_is_not_adjusted(
-    interrupted: Seen,
-) -> None:
+    interrupted,
+):
     # That nothing failed meanwhile is seen to by `played`.
     assert interrupted["strokes"] == [[1], [], [1]]
     assert "the bed is being edited" in interrupted["edited"]["waits"]
     assert "DIGICLAY_OT_press_size" not in interrupted["adjusting"]
 
 
-def test_150_random_events_leave_no_traceback_and_a_bed_that_can_be_formed(tried: Seen) -> None:
+def test_150_random_events_leave_no_traceback_and_a_bed_that_can_be_formed(tried):
     assert len(tried["done"]) == 150
     # Most of them happened to a session, not to Blender alone.
     assert tried["live"] > 100
@@ -157,7 +155,7 @@ def test_150_random_events_leave_no_traceback_and_a_bed_that_can_be_formed(tried
     assert lowest(tried["formed"]) < 39.5e-3
 
 
-def test_the_shape_comes_up_and_a_session_goes_on_from_it_with_the_fingertip_above(seen: Seen) -> None:
+def test_the_shape_comes_up_and_a_session_goes_on_from_it_with_the_fingertip_above(seen):
     assert seen["flat"]["heights"] == pytest.approx([0.04, 0.04], abs=1e-7)
     # The dead band of the height control, 10 µm.
     assert seen["displayed"]["heights"] == pytest.approx([0.04, 0.052], abs=1.1e-5)
@@ -166,7 +164,7 @@ def test_the_shape_comes_up_and_a_session_goes_on_from_it_with_the_fingertip_abo
     assert seen["session on a shape"]["heights"] == pytest.approx(seen["displayed"]["heights"], abs=1e-7)
 
 
-def test_the_fingertip_forms_the_shape_which_is_made_a_mesh_and_kept_in_one_undo_step(seen: Seen) -> None:
+def test_the_fingertip_forms_the_shape_which_is_made_a_mesh_and_kept_in_one_undo_step(seen):
     assert max(seen[name]["force"] for name in seen if name.startswith("into the shape")) > 0.1
     assert seen["formed shape"]["sessions"] == 0
     assert seen["formed shape"]["heights"] != pytest.approx(seen["displayed"]["heights"], abs=1e-4)
@@ -178,7 +176,7 @@ def test_the_fingertip_forms_the_shape_which_is_made_a_mesh_and_kept_in_one_undo
 HAND = list(range(1, 8))
 
 
-def test_fingertips_come_and_go_while_the_session_goes_on(seen: Seen) -> None:
+def test_fingertips_come_and_go_while_the_session_goes_on(seen):
     found = {name: seen[name]["numbers"] for name in ("two", "hand", "deleted", "hand again", "copied")}
     assert found == {
         "two": [1, 2],
@@ -192,7 +190,7 @@ def test_fingertips_come_and_go_while_the_session_goes_on(seen: Seen) -> None:
     assert seen["hand"]["hidden"] == []
 
 
-def test_two_fingertips_press_each_with_its_force_and_a_hand_as_one(seen: Seen) -> None:
+def test_two_fingertips_press_each_with_its_force_and_a_hand_as_one(seen):
     assert min(seen["two pressed"]["forces"]) > 0.01
     moved = np.array(seen["hand pressed"]["poses"]) - seen["hand"]["poses"]
     # The mouse moves by pixels, of 0.7 mm in a view that has the bed beside the open overlay.

@@ -2,14 +2,12 @@
 
 import pytest
 
-from tests.window.blender_window import Seen
-
 PLAYED = {"script": "start_modal.py", "size": (800, 560)}
 #: Started by a script too: they become modal as the last step of what they do.
 OTHERS = {"digiclay.session", "digiclay.session_go_on"}
 
 
-def test_every_modal_operator_prepares_before_it_becomes_modal(seen: Seen) -> None:
+def test_every_modal_operator_prepares_before_it_becomes_modal(seen):
     started = {name: found for name, found in seen.items() if name.startswith("digiclay.")}
     assert {name for name, found in started.items() if not found["modal"]} == OTHERS
     failing = [found for found in started.values() if found["modal"]]
@@ -20,7 +18,7 @@ def test_every_modal_operator_prepares_before_it_becomes_modal(seen: Seen) -> No
 
 @pytest.mark.parametrize(("stamp", "modal", "sessions"), [("FILE", False, 0), ("heart", True, 1)])
 def test_a_stamp_of_a_file_that_is_not_there_is_refused_and_the_next_one_is_formed(
-    seen: Seen, stamp: str, modal: bool, sessions: int
-) -> None:
+    seen, stamp, modal, sessions
+):
     assert ("DIGICLAY_OT_press_shape" in seen[f"stamp {stamp}"]) == modal
     assert seen[f"stamp {stamp}, sessions"] == sessions

@@ -2,14 +2,14 @@
 
 import numpy as np
 
-from tests.window.blender_window import REST, Seen, bed
+from tests.window.blender_window import REST, bed
 
 PLAYED = {"script": "keep_takes.py", "size": (1000, 640)}
 #: Pins come to rest by hundredths of a millimeter for some time after the finger has left them; mm.
 SETTLING = 0.1
 
 
-def test_a_finger_that_is_lifted_slowly_raises_a_ridge_and_draws_it_along(seen: Seen) -> None:
+def test_a_finger_that_is_lifted_slowly_raises_a_ridge_and_draws_it_along(seen):
     assert bed(seen, "pressed").min() < REST - 1.0
     assert bed(seen, "raised").max() > REST + 1.0
     # Drawn along the middle row, 3 mm a pin: what has risen there is at least twice the blister's width.
@@ -17,7 +17,7 @@ def test_a_finger_that_is_lifted_slowly_raises_a_ridge_and_draws_it_along(seen: 
     assert risen >= 10
 
 
-def test_what_is_recorded_is_kept_and_exported_in_mid_session_and_replayed_after_it(seen: Seen) -> None:
+def test_what_is_recorded_is_kept_and_exported_in_mid_session_and_replayed_after_it(seen):
     assert (seen["kept"]["sessions"], [name for _, name, *_ in seen["kept"]["takes"]]) == (1, ["A press"])
     assert (seen["exported"], seen["exported in a session"]) == (["FINISHED"], True)
     assert [seen[name]["replay can be pressed"] for name in ("kept", "stopped")] == [False, True]
@@ -42,7 +42,7 @@ def test_esc_in_a_replay_leaves_bed_and_finger_as_they_were_and_a_replay_ends_wh
     assert "bit for bit" in seen["output"]
 
 
-def test_a_baked_take_plays_without_a_session_and_esc_and_free_give_bed_and_frame_back(seen: Seen) -> None:
+def test_a_baked_take_plays_without_a_session_and_esc_and_free_give_bed_and_frame_back(seen):
     names = ("bake stopped", "baked", "freed")
     assert [seen[name]["is baked"] for name in names] == [False, True, False]
     assert seen["bake stopped"]["frame"] == 7
@@ -51,7 +51,7 @@ def test_a_baked_take_plays_without_a_session_and_esc_and_free_give_bed_and_fram
     assert np.ptp(seen["played"]) > 10e-3  # the fingertip goes down by a centimeter of the device: 0.1
 
 
-def test_a_file_left_in_mid_recording_has_the_take(seen: Seen) -> None:
+def test_a_file_left_in_mid_recording_has_the_take(seen):
     for words in ("kept as Take 1", "File > Recover > Auto Save"):
         assert words in seen["loaded"]["said"]
     assert seen["kept when another was loaded"] == ["Take 1"]

@@ -1,8 +1,5 @@
 """A small bed, a clock, and a finger: what the tests of live sessions in Blender share."""
 
-from collections.abc import Callable, Iterable
-from typing import Any
-
 import bpy
 import numpy as np
 from digiclay import bridge
@@ -26,7 +23,7 @@ class Clock:
 
     now = 0.0
 
-    def until(self, holds: Callable[[], object]) -> list[tick.Note]:
+    def until(self, holds):
         """Tick until something holds; return what there is to tell."""
         notes = []
         for _ in range(MOST_TICKS):
@@ -35,7 +32,7 @@ class Clock:
             notes += self.tick()
         raise AssertionError("What was waited for did not come")
 
-    def tick(self, count: int = 1) -> list[tick.Note]:
+    def tick(self, count=1):
         """Tick some times; return what there is to tell."""
         notes = []
         for _ in range(count):
@@ -45,12 +42,12 @@ class Clock:
         return notes
 
 
-def started(bed: Any) -> None:
+def started(bed):
     """Start a session; there must be nothing to tell."""
     assert tick.start(bpy.context, bed) == []
 
 
-def move(bed: Any, clock: Clock, places: Iterable[tuple[float, float]]) -> list[tick.Note]:
+def move(bed, clock, places):
     """Move the fingertip through places x, z of its lowest point, in mm, tick by tick."""
     notes = []
     for x, z in places:
@@ -60,38 +57,38 @@ def move(bed: Any, clock: Clock, places: Iterable[tuple[float, float]]) -> list[
     return notes
 
 
-def press(bed: Any, clock: Clock, x: float = 0.0) -> None:
+def press(bed, clock, x=0.0):
     """Press at a place and lift off."""
     down = [(x, z) for z in np.linspace(46, 37, 8)]
     assert move(bed, clock, [*down, *[(x, 37.0)] * 8, *down[::-1], *[(x, 46.0)] * 20]) == []
 
 
-def exact(bed: Any) -> np.ndarray:
+def exact(bed):
     """Return the pin tops the bed keeps, exactly, m."""
     system = assemble(properties.scene_of(bed))
     kept = beds.read_snapshot(bed)
     return (begin(system) if kept is None else snapshot.load(system, kept)).row(0)
 
 
-def shown(bed: Any) -> np.ndarray:
+def shown(bed):
     """Return the pin tops drawn, m."""
     return bridge.read_cells(bed.data)["height"]
 
 
-def undone(clock: Clock, times: int = 1) -> None:
+def undone(clock, times=1):
     """Undo, and let the sessions take it up."""
     for _ in range(times):
         bpy.ops.ed.undo()
     clock.tick(handlers.STALE)
 
 
-def only_bed() -> Any:
+def only_bed():
     """Return the bed, fetched anew: undo invalidates all references."""
     (found,) = [thing for thing in bpy.context.scene.objects if is_bed(thing)]
     return found
 
 
-def waits(bed: Any, clock: Clock, *, words: str) -> None:
+def waits(bed, clock, *, words):
     """Check that the session waits, says why once, and stands still."""
     notes = clock.tick(3)
     assert [note.level for note in notes] == ["WARNING"]
@@ -103,7 +100,7 @@ def waits(bed: Any, clock: Clock, *, words: str) -> None:
     assert running.list_sessions()[0].state.period == period
 
 
-def goes_on(clock: Clock) -> None:
+def goes_on(clock):
     """Check that the session says that it goes on, and does."""
     period = running.list_sessions()[0].state.period
     notes = clock.tick(handlers.STALE + 3)

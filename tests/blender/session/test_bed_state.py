@@ -1,8 +1,5 @@
 """Undo, redo, files and copies carry the state of a session."""
 
-from pathlib import Path
-from typing import Any
-
 import bpy
 import numpy as np
 import pytest
@@ -10,10 +7,10 @@ from digiclay.core.session import snapshot
 from digiclay.live import beds, handlers, tick
 from digiclay.sessions import running, sculpting
 
-from tests.blender.session.live import FLOAT32, Clock, exact, move, only_bed, press, shown, started, undone
+from tests.blender.session.live import FLOAT32, exact, move, only_bed, press, shown, started, undone
 
 
-def test_undo_takes_back_one_gesture_exactly_and_the_session_goes_on(bed: Any, clock: Clock) -> None:
+def test_undo_takes_back_one_gesture_exactly_and_the_session_goes_on(bed, clock):
     started(bed)
     bpy.ops.ed.undo_push(message="Start")
     press(bed, clock, -6.0)
@@ -24,7 +21,6 @@ def test_undo_takes_back_one_gesture_exactly_and_the_session_goes_on(bed: Any, c
     second = beds.read_snapshot(bed)
     undone(clock)
     session = running.find(only_bed())
-    assert session is not None
     assert snapshot.dump(session.system, session.state) == first
     assert session.pose[0] == pytest.approx(-6e-3, abs=FLOAT32)  # the finger has not come from elsewhere
     np.testing.assert_allclose(shown(only_bed()), exact(only_bed()), rtol=0, atol=FLOAT32)
@@ -38,7 +34,7 @@ def test_undo_takes_back_one_gesture_exactly_and_the_session_goes_on(bed: Any, c
     assert exact(only_bed())[6 * 13 + 6] < 39e-3
 
 
-def test_undo_takes_back_what_was_formed_after_a_gesture_in_a_pause(bed: Any, clock: Clock) -> None:
+def test_undo_takes_back_what_was_formed_after_a_gesture_in_a_pause(bed, clock):
     # Both steps hold the same heights, and what has been formed since is in neither.
     started(bed)
     clock.tick(3)
@@ -55,7 +51,7 @@ def test_undo_takes_back_what_was_formed_after_a_gesture_in_a_pause(bed: Any, cl
     assert (exact(only_bed()) == 40e-3).all()
 
 
-def test_undo_to_before_the_bed_was_there_ends_the_session_with_a_message(clock: Clock) -> None:
+def test_undo_to_before_the_bed_was_there_ends_the_session_with_a_message(clock):
     bpy.ops.ed.undo_push(message="Nothing")
     bpy.ops.mesh.digital_clay_add(rows=13, columns=13)
     bpy.ops.ed.undo_push(message="Bed")
@@ -67,7 +63,7 @@ def test_undo_to_before_the_bed_was_there_ends_the_session_with_a_message(clock:
     assert running.list_sessions() == ()
 
 
-def test_a_message_is_of_its_bed_and_not_of_a_copy_or_of_a_new_one(bed: Any) -> None:
+def test_a_message_is_of_its_bed_and_not_of_a_copy_or_of_a_new_one(bed):
     started(bed)
     copy = bed.copy()
     copy.data = bed.data.copy()
@@ -99,7 +95,7 @@ def test_a_file_of_a_session_goes_on_bit_for_bit(bed, clock, tmp_path, recovered
 
 
 @pytest.mark.parametrize("linked", [False, True])
-def test_a_duplicate_carries_its_own_state_and_gets_a_fingertip(bed: Any, clock: Clock, linked: bool) -> None:
+def test_a_duplicate_carries_its_own_state_and_gets_a_fingertip(bed, clock, linked):
     started(bed)
     press(bed, clock)
     kept = beds.read_snapshot(bed)
@@ -120,7 +116,7 @@ def test_a_duplicate_carries_its_own_state_and_gets_a_fingertip(bed: Any, clock:
     np.testing.assert_allclose(shown(bed), exact(bed), rtol=0, atol=FLOAT32)
 
 
-def test_an_appended_bed_carries_its_state(bed: Any, clock: Clock, tmp_path: Path) -> None:
+def test_an_appended_bed_carries_its_state(bed, clock, tmp_path):
     started(bed)
     press(bed, clock)
     kept, name = beds.read_snapshot(bed), bed.name
@@ -138,7 +134,7 @@ def test_an_appended_bed_carries_its_state(bed: Any, clock: Clock, tmp_path: Pat
 
 
 @pytest.mark.parametrize("junk", [b"", b"nothing", "a text", 7, [1.0, 2.0]])
-def test_a_state_somebody_has_broken_begins_at_rest_with_a_message(bed: Any, junk: Any) -> None:
+def test_a_state_somebody_has_broken_begins_at_rest_with_a_message(bed, junk):
     bed[beds.STATE] = junk
     bed[beds.POSE] = junk
     bed[beds.TICK] = "x"
@@ -147,7 +143,7 @@ def test_a_state_somebody_has_broken_begins_at_rest_with_a_message(bed: Any, jun
     assert (exact(bed) == 40e-3).all()
 
 
-def test_a_recording_that_undo_has_left_ends_with_a_message(bed: Any, clock: Clock) -> None:
+def test_a_recording_that_undo_has_left_ends_with_a_message(bed, clock):
     started(bed)
     bpy.ops.ed.undo_push(message="Start")
     press(bed, clock)

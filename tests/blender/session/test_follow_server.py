@@ -5,9 +5,6 @@ import signal
 import socket
 import struct
 import time
-from collections.abc import Iterator
-from pathlib import Path
-from typing import Any
 
 import bpy
 import numpy as np
@@ -18,7 +15,7 @@ from digiclay.roles import fingertip_of, fingertips_of
 from digiclay.sessions import running
 
 from tests.blender.at_hand import select
-from tests.blender.session.live import FLOAT32, TICK, Clock, exact, started
+from tests.blender.session.live import FLOAT32, TICK, exact, started
 from tests.timeouts import TIMEOUT
 
 SERVES = pytest.mark.skipif(
@@ -31,7 +28,7 @@ READ_AGAIN = 1e-4
 
 
 @pytest.fixture
-def server() -> Iterator[socket.socket]:
+def server():
     """A socket of this machine that answers as a test has it."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as door:
         door.bind(("127.0.0.1", 0))
@@ -39,12 +36,12 @@ def server() -> Iterator[socket.socket]:
         yield door
 
 
-def state(*pose: float) -> bytes:
+def state(*pose):
     """Return a state as docs/serve.md describes it."""
     return b"/digiclay/state\0,hhddddddddd\0\0\0\0" + struct.pack(">qq9d", 1, 1, 0.5, 0.0, *pose)
 
 
-def followed(bed: Any, server: socket.socket, clock: Clock) -> Any:
+def followed(bed, server, clock):
     """Start to follow; return the address of the session's socket."""
     started(bed)
     bpy.ops.digiclay.follow_server(address=f"127.0.0.1:{server.getsockname()[1]}", token=TOKEN)
@@ -54,20 +51,19 @@ def followed(bed: Any, server: socket.socket, clock: Clock) -> Any:
     return address
 
 
-def arrived(server: socket.socket, address: Any, *datagrams: bytes) -> None:
+def arrived(server, address, *datagrams):
     """Send datagrams; on one machine they have arrived with the call."""
     for data in datagrams:
         server.sendto(data, address)
 
 
-def pose_of(bed: Any) -> list[float]:
+def pose_of(bed):
     """Return the pose of the session's fingertip."""
     session = running.find(bed)
-    assert session is not None
     return list(session.pose)
 
 
-def test_bed_and_fingertip_follow_the_poses(bed: Any, clock: Clock, server: socket.socket) -> None:
+def test_bed_and_fingertip_follow_the_poses(bed, clock, server):
     address = followed(bed, server, clock)
     for _ in range(10):
         arrived(server, address, state(0.0, 0.0, 0.045, 1.0, 0.0, 0.0, 0.0), state(*PRESS))
@@ -78,7 +74,7 @@ def test_bed_and_fingertip_follow_the_poses(bed: Any, clock: Clock, server: sock
     assert exact(bed).min() < 39.9e-3
 
 
-def named(*fingers: tuple[int, float]) -> list[bytes]:
+def named(*fingers):
     """Return a frame of a server with several fingertips: identities, and heights at 10 mm times each."""
     values = [value for one, z in fingers for value in (one, 0.1, 0.01 * one, 0.0, z, 1.0, 0.0, 0.0, 0.0)]
     tags = b",h" + len(fingers) * b"hdddddddd"
@@ -89,7 +85,7 @@ def named(*fingers: tuple[int, float]) -> list[bytes]:
     ]
 
 
-def followed_by_two(bed: Any, server: socket.socket, clock: Clock) -> Any:
+def followed_by_two(bed, server, clock):
     """Return the address of a bed with two fingertips that follows a server."""
     select(bed)
     bpy.ops.digiclay.add_fingertip()
@@ -143,7 +139,7 @@ def test_a_server_of_one_finger_after_one_of_several_moves_the_first_and_the_oth
     assert running.find(bed).poses[1, 2] == pytest.approx(follow.LIFTED, abs=READ_AGAIN)
 
 
-def test_garbage_and_poses_that_are_none_do_nothing(bed: Any, clock: Clock, server: socket.socket) -> None:
+def test_garbage_and_poses_that_are_none_do_nothing(bed, clock, server):
     address = followed(bed, server, clock)
     arrived(server, address, state(*PRESS))
     clock.tick()
@@ -156,7 +152,7 @@ def test_garbage_and_poses_that_are_none_do_nothing(bed: Any, clock: Clock, serv
     assert pose_of(bed) == list(PRESS)
 
 
-def test_what_others_send_is_not_taken(bed: Any, clock: Clock, server: socket.socket) -> None:
+def test_what_others_send_is_not_taken(bed, clock, server):
     address = followed(bed, server, clock)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
         other.sendto(state(*PRESS), address)
@@ -165,8 +161,8 @@ def test_what_others_send_is_not_taken(bed: Any, clock: Clock, server: socket.so
 
 
 def test_under_a_silent_server_the_fingertip_lifts_and_it_is_told_once_and_when_it_is_heard(
-    bed: Any, clock: Clock, server: socket.socket
-) -> None:
+    bed, clock, server
+):
     address = followed(bed, server, clock)
     arrived(server, address, state(*PRESS))
     clock.tick(3)
@@ -192,7 +188,7 @@ def test_the_subscription_is_renewed_and_ends(bed, clock, server, deleted):
     assert follow.find(uid) is None
 
 
-def test_the_fingertip_is_the_hands_again_afterwards(bed: Any, clock: Clock, server: socket.socket) -> None:
+def test_the_fingertip_is_the_hands_again_afterwards(bed, clock, server):
     address = followed(bed, server, clock)
     arrived(server, address, state(*PRESS))
     clock.tick(3)
@@ -202,14 +198,14 @@ def test_the_fingertip_is_the_hands_again_afterwards(bed: Any, clock: Clock, ser
     assert pose_of(bed)[2] == pytest.approx(0.052, abs=FLOAT32)
 
 
-def test_a_wrong_address_is_refused_in_one_line(bed: Any) -> None:
+def test_a_wrong_address_is_refused_in_one_line(bed):
     started(bed)
     for address in ("", "127.0.0.1", "example.org:80", "127.0.0.1:0", "127.0.0.1:99999", ":80"):
         with pytest.raises(RuntimeError, match="must be HOST:PORT"):
             bpy.ops.digiclay.follow_server(address=address, token=TOKEN)
 
 
-def test_another_machine_needs_online_access() -> None:
+def test_another_machine_needs_online_access():
     from digiclay.core.base.errors import DigiclayError
 
     with pytest.raises(DigiclayError, match="allow online access"):
@@ -220,7 +216,7 @@ def test_another_machine_needs_online_access() -> None:
 
 
 @SERVES
-def test_the_session_follows_digiclay_serve(bed: Any, clock: Clock, tmp_path: Path) -> None:
+def test_the_session_follows_digiclay_serve(bed, clock, tmp_path):
     from digiclay_serve.protocol import Pose, pack_pose
     from tests.served import serve
 

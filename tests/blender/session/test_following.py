@@ -1,7 +1,5 @@
 """A live session follows the fingertip, by whatever means it is moved."""
 
-from typing import Any
-
 import bpy
 import numpy as np
 import pytest
@@ -13,7 +11,7 @@ from digiclay.recorded import bake
 from digiclay.roles import fingertip_of
 from digiclay.sessions import running, sculpting
 
-from tests.blender.session.live import FLOAT32, TICK, Clock, exact, move, press, shown, started
+from tests.blender.session.live import FLOAT32, TICK, exact, move, press, shown, started
 
 
 def test_the_bed_forms_while_the_fingertip_moves_and_keeps_and_shows_what_the_session_is(bed, clock):
@@ -26,14 +24,13 @@ def test_the_bed_forms_while_the_fingertip_moves_and_keeps_and_shows_what_the_se
     assert (np.diff(lowest)[-2:] < 0).all()  # it touches at 40 mm, three ticks before the end
     clock.tick(8)
     session = running.find(bed)
-    assert session is not None
     assert beds.read_snapshot(bed) == snapshot.dump(session.system, session.state)
     assert np.array_equal(beds.read_poses(bed), session.poses)
     np.testing.assert_allclose(shown(bed), exact(bed), rtol=0, atol=FLOAT32)
     assert exact(bed).min() < 39e-3
 
 
-def drive(tip: Any, how: str) -> None:
+def drive(tip, how):
     """Have the fingertip pressed down between the frames 1 and 20, by other means than by hand."""
     low, high = 0.45, 0.54
     if how == "animation":
@@ -56,7 +53,7 @@ def drive(tip: Any, how: str) -> None:
 
 
 @pytest.mark.parametrize("how", ["animation", "driver", "constraint"])
-def test_the_bed_follows_a_fingertip_moved_by_other_means(bed: Any, clock: Clock, how: str) -> None:
+def test_the_bed_follows_a_fingertip_moved_by_other_means(bed, clock, how):
     tip = fingertip_of(bed)
     drive(tip, how)
     bpy.context.scene.frame_set(1)
@@ -85,7 +82,7 @@ PLAYBACKS = {
 
 
 @pytest.mark.parametrize("how", PLAYBACKS)
-def test_a_session_in_a_playback_has_the_path_that_a_bake_has(bed: Any, clock: Clock, how: str) -> None:
+def test_a_session_in_a_playback_has_the_path_that_a_bake_has(bed, clock, how):
     wall, ticks, frames, start, settings = PLAYBACKS[how]
     tip, scene = fingertip_of(bed), bpy.context.scene
     keys, heights = start + np.array([0, 12, 24, 48]), (46.0, 37.0, 37.0, 43.0)
@@ -141,7 +138,7 @@ def test_two_beds_go_on_at_once_and_one_turned_moved_and_scaled_forms_like_the_o
     assert len(running.list_sessions()) == 2
 
 
-def test_a_method_that_is_changed_in_mid_session_takes_over_with_the_heights(bed: Any, clock: Clock) -> None:
+def test_a_method_that_is_changed_in_mid_session_takes_over_with_the_heights(bed, clock):
     started(bed)
     press(bed, clock)
     before = exact(bed)
@@ -152,7 +149,7 @@ def test_a_method_that_is_changed_in_mid_session_takes_over_with_the_heights(bed
     assert running.find(bed).scene.method == "plastic"
 
 
-def test_a_bed_nothing_moves_on_is_not_drawn_anew(bed: Any, clock: Clock) -> None:
+def test_a_bed_nothing_moves_on_is_not_drawn_anew(bed, clock):
     started(bed)
     clock.tick(40)
     bed.data.vertices[0].co.z = 9.0

@@ -3,7 +3,6 @@
 from dataclasses import replace
 from functools import partial
 from types import SimpleNamespace
-from typing import Any
 
 import bpy
 import numpy as np
@@ -19,11 +18,11 @@ from digiclay.sessions import running
 from digiclay.sessions.sculpting import change_stroke, queue_stroke
 from digiclay.strokes.stroke import lay_path, start
 
-from tests.blender.session.live import FLOAT32, Clock, exact, move, press, shown, started
+from tests.blender.session.live import FLOAT32, exact, move, press, shown, started
 from tests.hand import let_go
 
 
-def test_rewinding_puts_bed_and_fingertip_back(bed: Any, clock: Clock) -> None:
+def test_rewinding_puts_bed_and_fingertip_back(bed, clock):
     started(bed)
     press(bed, clock, -6.0)
     formed = exact(bed)
@@ -37,7 +36,7 @@ def test_rewinding_puts_bed_and_fingertip_back(bed: Any, clock: Clock) -> None:
     assert not bpy.ops.digiclay.session_rewind.poll()
 
 
-def test_within_one_press_backspace_goes_back_gesture_by_gesture(bed: Any, clock: Clock) -> None:
+def test_within_one_press_backspace_goes_back_gesture_by_gesture(bed, clock):
     bed.location = (30.0, -70.0, 10.0)  # there 32 bits put the finger a little beside
     started(bed)
     move(bed, clock, [(-6.0, z) for z in np.linspace(46, 38, 10)] + [(-6.0, 38.0)] * 20)
@@ -50,7 +49,7 @@ def test_within_one_press_backspace_goes_back_gesture_by_gesture(bed: Any, clock
 
 
 @pytest.mark.parametrize("live", [True, False])
-def test_reset_brings_the_bed_to_rest_with_a_session_or_without(bed: Any, clock: Clock, live: bool) -> None:
+def test_reset_brings_the_bed_to_rest_with_a_session_or_without(bed, clock, live):
     assert not bpy.ops.digiclay.session_reset.poll()
     started(bed)
     move(bed, clock, [(0.0, 38.0)] * 20)
@@ -63,7 +62,7 @@ def test_reset_brings_the_bed_to_rest_with_a_session_or_without(bed: Any, clock:
     assert bridge.pose(fingertip_of(bed))[2] > 45e-3
 
 
-def test_a_single_step_pauses_and_is_one_control_period(bed: Any, clock: Clock) -> None:
+def test_a_single_step_pauses_and_is_one_control_period(bed, clock):
     started(bed)
     clock.tick(5)
     before = running.find(bed).state.period
@@ -72,21 +71,21 @@ def test_a_single_step_pauses_and_is_one_control_period(bed: Any, clock: Clock) 
     assert (running.find(bed).state.period, running.find(bed).paused) == (before + 1, True)
 
 
-def test_the_session_of_a_bed_that_is_not_active_is_found_while_it_is_the_only_one(bed: Any) -> None:
+def test_the_session_of_a_bed_that_is_not_active_is_found_while_it_is_the_only_one(bed):
     started(bed)
     bpy.context.view_layer.objects.active = bpy.data.objects["Cube"]
     assert bpy.ops.digiclay.session_pause() == {"FINISHED"}
     assert running.find(bed).paused
 
 
-def test_a_session_does_not_start_on_settings_that_do_not_fit(bed: Any) -> None:
+def test_a_session_does_not_start_on_settings_that_do_not_fit(bed):
     bed.digiclay.layout.columns = 14
     with pytest.raises(DigiclayError, match="169 pins"):
         tick.start(bpy.context, bed)
     assert running.list_sessions() == ()
 
 
-def test_a_bed_of_another_view_layer_is_left_alone(bed: Any) -> None:
+def test_a_bed_of_another_view_layer_is_left_alone(bed):
     for collection in bed.users_collection:
         collection.objects.unlink(bed)
     beds.deselect(bed)  # Blender raises an error for an object the view layer does not have
@@ -110,11 +109,11 @@ def test_after_the_session_the_active_bed_is_selected_as_before(bed, case, wante
     assert [thing.name for thing in bpy.context.selected_objects] == wanted
 
 
-def test_a_fault_in_the_modal_part_ends_the_sessions_in_order(bed: Any, monkeypatch: Any) -> None:
+def test_a_fault_in_the_modal_part_ends_the_sessions_in_order(bed, monkeypatch):
     class Drive(LoopMixin):
         token, newer, report = 0, frozenset(), staticmethod(lambda level, words: said.append(words))
 
-    said: list[str] = []
+    said = []
     started(bed)
     monkeypatch.setattr(tick, "tick", lambda context, now: {}["now"])
     assert Drive().modal(bpy.context, SimpleNamespace(type="TIMER", value="NOTHING")) == {"CANCELLED"}
@@ -123,14 +122,14 @@ def test_a_fault_in_the_modal_part_ends_the_sessions_in_order(bed: Any, monkeypa
     assert running.last_message() == f"The session of Digital Clay ended: {said[0]}"
 
 
-def test_without_a_session_nothing_goes_on_and_blender_lists_modal_operators() -> None:
+def test_without_a_session_nothing_goes_on_and_blender_lists_modal_operators():
     assert not bpy.ops.digiclay.session_go_on.poll()
     # The session looks them up in every version that is supported.
     assert "modal_operators" in bpy.types.Window.bl_rna.properties
 
 
 @pytest.mark.usefixtures("machine")
-def test_a_script_finishes_strokes_at_once_and_what_was_in_haste_is_shown(bed: Any, clock: Clock) -> None:
+def test_a_script_finishes_strokes_at_once_and_what_was_in_haste_is_shown(bed, clock):
     started(bed)
     across = [(-6e-3, 0.0), (6e-3, 0.0)]
     for number in (1, 2):
@@ -151,7 +150,7 @@ def test_a_script_finishes_strokes_at_once_and_what_was_in_haste_is_shown(bed: A
     np.testing.assert_allclose(shown(bed), exact(bed), rtol=0, atol=FLOAT32)
 
 
-def test_the_ghost_is_there_with_the_queue_and_goes_with_it(bed: Any, clock: Clock) -> None:
+def test_the_ghost_is_there_with_the_queue_and_goes_with_it(bed, clock):
     started(bed)
     assert ghost.find_surface(running.find(bed)) is None
     ghost.plan(bed.session_uid, start(0, 0.0, 0.0, 4e-3))
@@ -170,7 +169,7 @@ def test_the_ghost_is_there_with_the_queue_and_goes_with_it(bed: Any, clock: Clo
     assert ghost.find_surface(running.find(bed)) is None
 
 
-def test_words_in_the_status_bar_leave_what_else_is_drawn_there() -> None:
+def test_words_in_the_status_bar_leave_what_else_is_drawn_there():
     from bl_ui.space_statusbar import STATUSBAR_HT_header as bar
 
     before = bar.draw

@@ -1,14 +1,12 @@
 """A button that cannot be pressed says why: Blender shows it where the mouse rests on it."""
 
-from typing import Any
-
 import bpy
 import pytest
 from digiclay import operators
 from digiclay.live import tick
 from digiclay.roles import fingertip_of
 
-from tests.blender.session.live import Clock, press, started
+from tests.blender.session.live import press, started
 
 NAMES = sorted(kind.bl_idname for kind in operators.CLASSES if issubclass(kind, bpy.types.Operator))
 #: What Blender says of an operator that says nothing.
@@ -49,7 +47,7 @@ WITHOUT_A_BED = {
 IN_EDIT_MODE = {"digiclay.leave_mode"}
 
 
-def refused(name: str) -> str:
+def refused(name):
     """Return why an operator declines to be called, or an empty text when it does not."""
     area, _, own = name.partition(".")
     operator = getattr(getattr(bpy.ops, area), own)
@@ -61,22 +59,22 @@ def refused(name: str) -> str:
     return str(told.value).partition(".poll() ")[2]
 
 
-def declining() -> dict[str, str]:
+def declining():
     """Return what every operator that declines says."""
     return {name: words for name in NAMES if (words := refused(name))}
 
 
-def test_the_reasons_at_rest_name_what_is_missing(bed: Any) -> None:
+def test_the_reasons_at_rest_name_what_is_missing(bed):
     assert AT_REST.items() <= declining().items()
 
 
-def test_the_reasons_in_a_session_name_the_session(bed: Any, clock: Clock) -> None:
+def test_the_reasons_in_a_session_name_the_session(bed, clock):
     started(bed)
     press(bed, clock)
     assert IN_A_SESSION.items() <= declining().items()
 
 
-def test_in_edit_mode_and_without_a_bed_nothing_can_be_changed(bed: Any, clock: Clock) -> None:
+def test_in_edit_mode_and_without_a_bed_nothing_can_be_changed(bed, clock):
     started(bed)
     press(bed, clock)
     tick.stop(bed.session_uid)

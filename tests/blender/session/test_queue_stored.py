@@ -1,10 +1,7 @@
 """A bed stores the strokes still to be formed, whole: files, undo, redo and Backspace bring them back."""
 
 import json
-from collections.abc import Callable
 from functools import partial
-from pathlib import Path
-from typing import Any
 
 import bpy
 import numpy as np
@@ -16,13 +13,13 @@ from digiclay.sessions.sculpting import change_stroke, queue_stroke
 from digiclay.strokes.stamps import load_stamp
 from digiclay.strokes.stroke import Brush, lay_path, make_images, start
 
-from tests.blender.session.live import FLOAT32, Clock, exact, only_bed, shown, started, undone
+from tests.blender.session.live import FLOAT32, exact, only_bed, shown, started, undone
 
 #: Rows of the strokes, mm, and where they begin and end.
 ROWS, ENDS = (-12.0, 0.0, 12.0), (-9.0, 9.0)
 
 
-def draw(y: float, **how: Any) -> None:
+def draw(y, **how):
     """Draw a stroke along a row, as the Press tool does, with its undo step."""
     session = running.find(only_bed())
     path = [(1e-3 * x, 1e-3 * y) for x in ENDS]
@@ -31,34 +28,34 @@ def draw(y: float, **how: Any) -> None:
     bpy.ops.ed.undo_push(message="Press")
 
 
-def begin(bed: Any, method: str = "plastic") -> None:
+def begin(bed, method="plastic"):
     bed.digiclay.method = method
     started(bed)
     bpy.ops.ed.undo_push(message="Start Session")
 
 
-def form(clock: Clock) -> None:
+def form(clock):
     clock.until(lambda: not running.find(only_bed()).strokes)
     clock.tick()
 
 
-def rows() -> list[bool]:
+def rows():
     """Tell which strokes are formed, each wholly or not at all."""
     down = 40e-3 - exact(only_bed()).reshape(13, 13)[[round(6 + y / 3) for y in ROWS]][:, 4:9]
     assert all(row.min() > 1e-3 or row.max() < 0.7e-3 for row in down), down
     return [bool(row.min() > 1e-3) for row in down]
 
 
-def redone(clock: Clock) -> None:
+def redone(clock):
     bpy.ops.ed.redo()
     clock.tick(handlers.STALE)
 
 
-def half_formed() -> bool:
+def half_formed():
     return shown(only_bed()).min() < 39e-3
 
 
-WHEN: dict[str, Callable[[], object]] = {
+WHEN = {
     "queued": lambda: True,
     "begun": lambda: running.find(only_bed()).strokes[0].height is not None,
     "half-formed": half_formed,
@@ -66,10 +63,10 @@ WHEN: dict[str, Callable[[], object]] = {
 
 
 @pytest.fixture
-def slow(monkeypatch: pytest.MonkeyPatch) -> Callable[[Clock, Callable[[], object]], None]:
+def slow(monkeypatch):
     """Wait for something on a machine that simulates a period in a tick; then it takes whole strokes."""
 
-    def wait(clock: Clock, holds: Callable[[], object]) -> None:
+    def wait(clock, holds):
         monkeypatch.setattr(live_session, "find_spare", lambda *given: 0.0)
         clock.until(holds)
         monkeypatch.setattr(live_session, "find_spare", lambda *given: 1e9)
@@ -84,9 +81,7 @@ def slow(monkeypatch: pytest.MonkeyPatch) -> Callable[[Clock, Callable[[], objec
         ("half-formed", "a session"), ("half-formed", "at once"),
     ],
 )  # fmt: skip
-def test_a_file_has_every_stroke_that_was_drawn(
-    bed: Any, clock: Clock, tmp_path: Path, slow: Any, when: str, how: str
-) -> None:
+def test_a_file_has_every_stroke_that_was_drawn(bed, clock, tmp_path, slow, when, how):
     begin(bed)
     stamp = {"brush": Brush.STAMP, "stamp": load_stamp("heart")}
     for y, kind in zip(ROWS, ({}, {"images": make_images("X"), "accumulate": True}, stamp), strict=True):
@@ -111,9 +106,7 @@ def test_a_file_has_every_stroke_that_was_drawn(
 
 
 @pytest.mark.parametrize("when", [*WHEN, "all formed"])
-def test_undo_takes_back_one_stroke_and_redo_brings_it_back(
-    bed: Any, clock: Clock, slow: Any, when: str
-) -> None:
+def test_undo_takes_back_one_stroke_and_redo_brings_it_back(bed, clock, slow, when):
     begin(bed)
     for y in ROWS:
         draw(y)
@@ -141,7 +134,7 @@ def test_undo_takes_back_one_stroke_and_redo_brings_it_back(
         assert rows() == gestures
 
 
-def test_undo_of_backspace_and_of_a_reset_brings_the_gestures_back(bed: Any, clock: Clock) -> None:
+def test_undo_of_backspace_and_of_a_reset_brings_the_gestures_back(bed, clock):
     begin(bed)
     for y in ROWS[:2]:
         draw(y)
@@ -152,7 +145,7 @@ def test_undo_of_backspace_and_of_a_reset_brings_the_gestures_back(bed: Any, clo
         assert (rows(), len(running.find(only_bed()).gestures)) == ([True, True, False], 2)
 
 
-def test_without_a_session_undo_and_redo_leave_no_stroke_unformed(bed: Any, clock: Clock, slow: Any) -> None:
+def test_without_a_session_undo_and_redo_leave_no_stroke_unformed(bed, clock, slow):
     begin(bed)
     draw(ROWS[0])
     slow(clock, half_formed)
@@ -175,9 +168,7 @@ def test_without_a_session_undo_and_redo_leave_no_stroke_unformed(bed: Any, cloc
 
 
 @pytest.mark.parametrize("stopped", [False, True])
-def test_a_session_that_is_stopped_keeps_strokes_for_the_next_one(
-    bed: Any, clock: Clock, slow: Any, stopped: bool
-) -> None:
+def test_a_session_that_is_stopped_keeps_strokes_for_the_next_one(bed, clock, slow, stopped):
     begin(bed)
     draw(ROWS[0])
     draw(ROWS[2])
@@ -210,7 +201,7 @@ JUNK = {
 
 
 @pytest.mark.parametrize("junk", JUNK.values(), ids=JUNK)
-def test_a_stroke_somebody_has_broken_is_left_out_with_a_message(bed: Any, clock: Clock, junk: str) -> None:
+def test_a_stroke_somebody_has_broken_is_left_out_with_a_message(bed, clock, junk):
     bed[beds.QUEUE] = json.dumps([0, [], [GOOD, junk]])
     notes = tick.start(bpy.context, bed)
     assert [(note.level, "left out" in note.message) for note in notes] == [("WARNING", True)]
@@ -222,7 +213,7 @@ def test_a_stroke_somebody_has_broken_is_left_out_with_a_message(bed: Any, clock
 @pytest.mark.parametrize(
     "junk", ["nothing", "[]", '["a", [], []]', "[0, 7, 7]", "[1e999, [], []]", 7, b"x", [1.0]]
 )
-def test_a_queue_somebody_has_broken_is_none(bed: Any, junk: Any) -> None:
+def test_a_queue_somebody_has_broken_is_none(bed, junk):
     bed[beds.QUEUE] = junk
     started(bed)
     assert running.find(bed).strokes == ()

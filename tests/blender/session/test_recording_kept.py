@@ -2,8 +2,6 @@
 
 import shutil
 from dataclasses import replace
-from pathlib import Path
-from typing import Any
 
 import bpy
 import digiclay
@@ -14,21 +12,21 @@ from digiclay.live import handlers
 from digiclay.recorded import takes
 from digiclay.sessions import running
 
-from tests.blender.session.live import Clock, move, only_bed, started, undone
+from tests.blender.session.live import move, only_bed, started, undone
 
 #: Ticks that are recorded, and the time they take, s: ten periods of 5 ms in three ticks.
 TICKS, SECONDS = 15, 0.5
 
 
 @pytest.fixture(autouse=True)
-def own_folder(tmp_path: Path) -> None:
+def own_folder(tmp_path):
     """Have Blender keep what can be recovered in a folder of the test."""
     (tmp_path / "temporary").mkdir()
     bpy.context.preferences.filepaths.temporary_directory = str(tmp_path / "temporary")
 
 
 @pytest.fixture
-def recording(bed: Any, clock: Clock) -> Any:
+def recording(bed, clock):
     """A bed whose session records, with half a second in it."""
     started(bed)
     clock.tick()
@@ -37,28 +35,28 @@ def recording(bed: Any, clock: Clock) -> Any:
     return bed
 
 
-def recorded_on(bed: Any, clock: Clock) -> None:
+def recorded_on(bed, clock):
     """Press and record for half a second."""
     move(bed, clock, [(0.0, 38.0)] * TICKS)
 
 
-def seconds(bed: Any) -> list[float]:
+def seconds(bed):
     """Return how long the takes of a bed are, s."""
     return [round(entry.seconds, 1) for entry in takes.list_takes(bed)]
 
 
-def save(path: Path, **how: Any) -> None:
+def save(path, **how):
     """Save the open file."""
     bpy.ops.wm.save_as_mainfile(filepath=str(path), **how)
 
 
-def load(path: Path) -> Any:
+def load(path):
     """Open another file; return its bed."""
     bpy.ops.wm.open_mainfile(filepath=str(path))
     return only_bed()
 
 
-def test_disabling_the_extension_keeps_what_was_recorded_in_an_undo_step(recording: Any) -> None:
+def test_disabling_the_extension_keeps_what_was_recorded_in_an_undo_step(recording):
     digiclay.unregister()
     try:
         assert "kept as Take 1" in running.last_message()
@@ -70,7 +68,7 @@ def test_disabling_the_extension_keeps_what_was_recorded_in_an_undo_step(recordi
         digiclay.register()
 
 
-def test_stopping_one_of_two_sessions_keeps_its_recording_alone(recording: Any, clock: Clock) -> None:
+def test_stopping_one_of_two_sessions_keeps_its_recording_alone(recording, clock):
     name = recording.name
     bpy.ops.mesh.digital_clay_add(rows=5, columns=5)
     other = bpy.context.object
@@ -98,7 +96,7 @@ def test_a_saved_file_has_the_take_so_far_and_recording_goes_on(recording, clock
     assert bpy.ops.digiclay.take_replay() == {"FINISHED"}
 
 
-def test_a_recording_that_was_just_saved_is_not_left_once_more(recording: Any, tmp_path: Path) -> None:
+def test_a_recording_that_was_just_saved_is_not_left_once_more(recording, tmp_path):
     save(tmp_path / "saved.blend")
     started(load(tmp_path / "saved.blend"))  # and nothing where nothing is recorded
     bpy.ops.wm.read_homefile(use_empty=True)
@@ -118,7 +116,7 @@ def test_while_blender_may_save_by_itself_the_bed_has_the_take_and_never_twice(r
     assert [entry.name for entry in takes.list_takes(recording)] == kept
 
 
-def test_what_undo_has_taken_back_meanwhile_is_not_missed(recording: Any, clock: Clock) -> None:
+def test_what_undo_has_taken_back_meanwhile_is_not_missed(recording, clock):
     bpy.ops.ed.undo_push(message="Before")
     handlers.write_recovery()
     bpy.ops.ed.undo_push(message="After")
@@ -127,7 +125,7 @@ def test_what_undo_has_taken_back_meanwhile_is_not_missed(recording: Any, clock:
     assert seconds(only_bed()) == []
 
 
-def test_the_former_file_can_be_recovered_with_its_take(recording: Any, clock: Clock, tmp_path: Path) -> None:
+def test_the_former_file_can_be_recovered_with_its_take(recording, clock, tmp_path):
     save(tmp_path / "saved.blend")
     recorded_on(recording, clock)
     bpy.ops.wm.read_homefile(use_empty=True)
@@ -138,21 +136,20 @@ def test_the_former_file_can_be_recovered_with_its_take(recording: Any, clock: C
     assert seconds(only_bed()) == [2 * SECONDS]
 
 
-def test_what_is_recorded_anew_after_undo_is_not_what_was_saved() -> None:
+def test_what_is_recorded_anew_after_undo_is_not_what_was_saved():
     recorded = Recording.begin(b"", 0, np.zeros(7), 0).extend(np.zeros((9, 7)), 1)
     back = replace(recorded, saved=recorded.count).cut_at_period(5)
-    assert back is not None
     assert not back.unsaved
     assert back.extend(np.zeros((4, 7)), 2).unsaved
 
 
-def test_what_cannot_be_left_is_told(recording: Any, tmp_path: Path) -> None:
+def test_what_cannot_be_left_is_told(recording, tmp_path):
     shutil.rmtree(tmp_path / "temporary")
     bpy.ops.wm.read_homefile(use_empty=True)
     assert "It could not be left for recovery: " in running.last_message()
 
 
-def test_undoing_the_first_gesture_of_a_recording_leaves_it_recording(bed: Any, clock: Clock) -> None:
+def test_undoing_the_first_gesture_of_a_recording_leaves_it_recording(bed, clock):
     started(bed)
     bpy.ops.ed.undo_push(message="Start")
     clock.tick()

@@ -1,8 +1,6 @@
 """A live session makes a scene of its bed's settings when they have changed, in the very next tick."""
 
 import dataclasses
-from collections.abc import Iterator
-from typing import Any
 
 import bpy
 import numpy as np
@@ -13,19 +11,19 @@ from digiclay.live import handlers
 from digiclay.sessions import running
 from digiclay.settings import properties
 
-from tests.blender.session.live import TICK, Clock, exact, move, only_bed, press, started, undone, waits
+from tests.blender.session.live import TICK, exact, move, only_bed, press, started, undone, waits
 
 #: Set point of the force, N, and where it stands.
 DEFAULT, SET_POINT = 0.4, "digiclay.control.virtual_master.force_setpoint"
 
 
-def set_point() -> float:
+def set_point():
     """Return the set point that the only session simulates, N."""
     (session,) = running.list_sessions()
     return session.scene.control.force_setpoint
 
 
-def parameters() -> Iterator[tuple[str, str, str]]:
+def parameters():
     """Give method, section and name of every parameter; those of a method once a method."""
     for method in METHODS:
         for section in SECTIONS if method == "virtual_master" else ("control",):
@@ -33,11 +31,11 @@ def parameters() -> Iterator[tuple[str, str, str]]:
                 yield method, section, field.name
 
 
-def change(group: Any, name: str) -> None:
+def change(group, name):
     """Give a property another value."""
     known, value = group.bl_rna.properties[name], getattr(group, name)
     if known.type == "BOOLEAN":
-        other: Any = not value
+        other = not value
     elif known.type == "ENUM":
         other = next(item.identifier for item in known.enum_items if item.identifier != value)
     elif known.type == "STRING":
@@ -49,10 +47,10 @@ def change(group: Any, name: str) -> None:
 
 
 def test_settings_that_stay_are_not_read_again(bed, clock, monkeypatch):
-    made: list[str] = []
+    made = []
     scene_of = properties.scene_of
 
-    def counted(which: Any) -> Any:
+    def counted(which):
         made.append(which.name)
         return scene_of(which)
 
@@ -65,7 +63,7 @@ def test_settings_that_stay_are_not_read_again(bed, clock, monkeypatch):
     assert made == [bed.name]
 
 
-def test_every_parameter_and_choice_that_is_changed_changes_the_stored_settings(bed: Any) -> None:
+def test_every_parameter_and_choice_that_is_changed_changes_the_stored_settings(bed):
     settings = bed.digiclay
     for method, section, name in parameters():
         settings.method = method
@@ -99,7 +97,7 @@ def test_a_setting_that_blender_moves_is_simulated_from_the_next_tick(bed, clock
     assert found[0] < found[1] < found[2]
 
 
-def test_a_session_whose_settings_change_in_every_tick_keeps_up_with_time(bed: Any, clock: Clock) -> None:
+def test_a_session_whose_settings_change_in_every_tick_keeps_up_with_time(bed, clock):
     started(bed)
     clock.tick()
     before = running.list_sessions()[0].state.period
@@ -112,7 +110,7 @@ def test_a_session_whose_settings_change_in_every_tick_keeps_up_with_time(bed: A
     assert session.state.period - before >= 12 * TICK // session.system.period - 1
 
 
-def test_a_setting_that_undo_puts_back_is_simulated_with_its_state(bed: Any, clock: Clock) -> None:
+def test_a_setting_that_undo_puts_back_is_simulated_with_its_state(bed, clock):
     bpy.ops.ed.undo_push(message="Add")
     started(bed)
     bed.digiclay.control.virtual_master.force_setpoint = 0.8
@@ -127,13 +125,13 @@ def test_a_setting_that_undo_puts_back_is_simulated_with_its_state(bed: Any, clo
     assert set_point() == pytest.approx(0.8)
 
 
-def test_a_pin_that_was_moved_aside_stops_the_session_in_the_next_tick(bed: Any, clock: Clock) -> None:
+def test_a_pin_that_was_moved_aside_stops_the_session_in_the_next_tick(bed, clock):
     started(bed)
     bed.data.vertices[0].co.x += 0.01
     waits(bed, clock, words="differ from the parameters of Layout")
 
 
-def test_a_session_is_told_by_the_new_name_of_its_bed(bed: Any, clock: Clock) -> None:
+def test_a_session_is_told_by_the_new_name_of_its_bed(bed, clock):
     started(bed)
     bed.name = "Renamed"
     clock.tick()

@@ -1,9 +1,5 @@
 """Sessions with several fingertips, which come and go meanwhile: the session goes on with the others."""
 
-from collections.abc import Callable, Iterator
-from pathlib import Path
-from typing import Any
-
 import bpy
 import numpy as np
 import pytest
@@ -22,7 +18,7 @@ from digiclay.settings import properties
 from digiclay.strokes.stroke import make_images, start
 
 from tests.blender.at_hand import looked, select
-from tests.blender.session.live import Clock, exact, only_bed, shown, started, waits
+from tests.blender.session.live import exact, only_bed, shown, started, waits
 from tests.hand import let_go
 
 #: Where fingertips press, by number: x and y, mm.
@@ -30,14 +26,14 @@ PLACES = {1: (-10.0, -10.0), 2: (10.0, 10.0), 3: (10.0, -10.0)}
 
 
 @pytest.fixture(autouse=True)
-def watched() -> Iterator[None]:
+def watched():
     """Look after beds as in a window."""
     yield
     repair.unregister()
 
 
 @pytest.fixture
-def pair(bed: Any) -> Any:
+def pair(bed):
     """A bed with two fingertips above it."""
     repair.watch()
     select(bed)
@@ -49,7 +45,7 @@ def pair(bed: Any) -> Any:
     return bed
 
 
-def move(bed: Any, heights: dict[int, float]) -> None:
+def move(bed, heights):
     """Put the lowest points of fingertips to heights, mm, each at its place."""
     for number, z in heights.items():
         # The semi-axis upwards is 8 mm: the empty is the ellipsoid's center.
@@ -57,7 +53,7 @@ def move(bed: Any, heights: dict[int, float]) -> None:
         tip.location = np.array([*PLACES[number], z + 8.0]) * 1e-3 * bridge.SCALE
 
 
-def press(bed: Any, clock: Clock, *numbers: int, lift: bool = True) -> list[tick.Note]:
+def press(bed, clock, *numbers, lift=True):
     """Press fingertips 3 mm deep, and lift them; return the messages."""
     notes = []
     down = np.linspace(46.0, 37.0, 8)
@@ -67,14 +63,14 @@ def press(bed: Any, clock: Clock, *numbers: int, lift: bool = True) -> list[tick
     return notes
 
 
-def depth(bed: Any, number: int) -> float:
+def depth(bed, number):
     """Return how far the pins below the place of a fingertip are pressed, mm."""
     places = bridge.read_cells(bed.data)["position"]
     under = np.linalg.norm(places - 1e-3 * np.array(PLACES[number]), axis=1) < 4e-3
     return float(40.0 - 1e3 * exact(bed)[under].min())
 
 
-def test_each_fingertip_forms_and_is_recorded_and_told_with_its_own_force(pair: Any, clock: Clock) -> None:
+def test_each_fingertip_forms_and_is_recorded_and_told_with_its_own_force(pair, clock):
     started(pair)
     running.put(sculpting.set_recording(running.find(pair), True))
     move(pair, {1: 46.0, 2: 46.0})
@@ -96,7 +92,7 @@ def test_each_fingertip_forms_and_is_recorded_and_told_with_its_own_force(pair: 
     assert depth(pair, 1) > 1.0
 
 
-def test_a_fingertip_that_is_added_in_mid_session_forms_too(pair: Any, clock: Clock) -> None:
+def test_a_fingertip_that_is_added_in_mid_session_forms_too(pair, clock):
     started(pair)
     running.put(sculpting.set_recording(running.find(pair), True))
     assert press(pair, clock, 1, 2) == []
@@ -157,7 +153,7 @@ def test_the_session_goes_on_with_the_fingertips_that_are_left(pair, clock, gone
     assert press(bed, clock, 1, 2) == []
 
 
-def hang(part: Any, where: Any, bone: str = "") -> None:
+def hang(part, where, bone=""):
     """Parent an object to another one, or to a bone of it; it stays where it is."""
     place = part.matrix_world.copy()
     part.parent, part.parent_type, part.parent_bone = where, "BONE" if bone else "OBJECT", bone
@@ -223,8 +219,8 @@ def test_a_palm_that_is_scaled_spreads_or_mirrors_its_fingertips_which_keep_thei
 
 
 def test_fingertips_keep_their_numbers_where_one_between_is_deleted_or_comes_after_a_take(
-    pair: Any, clock: Clock, tmp_path: Path
-) -> None:
+    pair, clock, tmp_path
+):
     bpy.ops.digiclay.add_fingertip()
     bpy.data.objects.remove(fingertips_of(pair)[2])
     looked()
@@ -252,7 +248,7 @@ def test_fingertips_keep_their_numbers_where_one_between_is_deleted_or_comes_aft
     assert [number for number, tip in fingertips_of(pair).items() if tip.animation_data] == [1, 3]
 
 
-def test_the_size_and_the_pulp_of_one_fingertip_change_in_mid_session(pair: Any, clock: Clock) -> None:
+def test_the_size_and_the_pulp_of_one_fingertip_change_in_mid_session(pair, clock):
     started(pair)
     press(pair, clock, 1, 2)
     formed, own = exact(pair), fingertips_of(pair)[2].digiclay
@@ -266,7 +262,7 @@ def test_the_size_and_the_pulp_of_one_fingertip_change_in_mid_session(pair: Any,
     assert np.abs(exact(pair) - formed).max() < 1e-5  # what moves still moves on for a tick
 
 
-def test_a_session_waits_without_any_fingertip(pair: Any, clock: Clock) -> None:
+def test_a_session_waits_without_any_fingertip(pair, clock):
     started(pair)
     for tip in fingertips_of(pair).values():
         bpy.data.objects.remove(tip)
@@ -275,7 +271,7 @@ def test_a_session_waits_without_any_fingertip(pair: Any, clock: Clock) -> None:
 
 @pytest.mark.usefixtures("machine")
 @pytest.mark.parametrize("palm", [False, True])
-def test_a_press_stroke_moves_the_first_fingertip_alone(pair: Any, clock: Clock, palm: bool) -> None:
+def test_a_press_stroke_moves_the_first_fingertip_alone(pair, clock, palm):
     hand = parts.make_palm(pair) if palm else pair
     for tip in fingertips_of(pair).values():
         tip.parent = hand
@@ -295,7 +291,7 @@ def test_a_press_stroke_moves_the_first_fingertip_alone(pair: Any, clock: Clock,
     assert depth(pair, 1) == depth(pair, 2) == 0.0  # the bed stores no half of it
 
 
-def keyframe(pair: Any) -> None:
+def keyframe(pair):
     """Have both fingertips pressed down and lifted from frame 1 to 20, one after the other."""
     for number, frames in ((1, (1, 5, 10)), (2, (10, 15, 20))):
         for frame, z in zip(frames, (46.0, 37.0, 46.0), strict=True):
@@ -332,7 +328,7 @@ def test_animated_fingertips_are_baked_and_takes_of_several_replayed_and_exporte
 
 
 @pytest.mark.usefixtures("machine")
-def test_strokes_end_with_the_fingertip_that_goes_along_them_and_say_so(pair: Any, clock: Clock) -> None:
+def test_strokes_end_with_the_fingertip_that_goes_along_them_and_say_so(pair, clock):
     started(pair)
     running.put(sculpting.queue_stroke(running.find(pair), start(0, 0.0, 0.0, 4e-3))[0])
     clock.tick(2)
@@ -342,7 +338,7 @@ def test_strokes_end_with_the_fingertip_that_goes_along_them_and_say_so(pair: An
     assert running.find(pair).numbers == (2,)
 
 
-ODD: dict[str, Callable[[Any], object]] = {
+ODD = {
     "scaled to nothing": lambda tip: tip.scale.zero(),
     "at no finite place": lambda tip: setattr(tip, "location", (np.nan, 0.0, 0.0)),
 }
@@ -359,7 +355,7 @@ def test_an_odd_fingertip_has_the_session_wait_and_nothing_is_lost(pair, clock, 
     np.testing.assert_allclose(shown(pair), before, rtol=0, atol=1e-8)
 
 
-def test_the_state_of_two_is_continued_by_three_and_by_one(pair: Any, clock: Clock) -> None:
+def test_the_state_of_two_is_continued_by_three_and_by_one(pair, clock):
     started(pair)
     press(pair, clock, 1, 2)
     tick.stop(pair.session_uid)
@@ -386,7 +382,7 @@ def test_a_symmetric_stroke_survives_saving_undo_and_a_stop_in_its_middle(pair, 
     running.put(sculpting.set_recording(running.find(pair), True))
     images = make_images("RADIAL", 2)
 
-    def press_down() -> int:
+    def press_down():
         session, number = sculpting.queue_stroke(
             running.find(only_bed()), start(0, 14e-3, 8e-3, 3e-3, images)
         )

@@ -1,7 +1,5 @@
 """What is edited, deleted or switched in mid-session has it wait or end, with a message."""
 
-from typing import Any
-
 import bpy
 import digiclay
 import numpy as np
@@ -12,10 +10,10 @@ from digiclay.sessions import running
 from digiclay.sessions.sculpting import queue_stroke, withdraw_stroke
 from digiclay.strokes.stroke import start
 
-from tests.blender.session.live import FLOAT32, Clock, goes_on, press, shown, started, waits
+from tests.blender.session.live import FLOAT32, goes_on, press, shown, started, waits
 
 
-def test_a_session_waits_for_a_deleted_fingertip_and_goes_on_with_undo(bed: Any, clock: Clock) -> None:
+def test_a_session_waits_for_a_deleted_fingertip_and_goes_on_with_undo(bed, clock):
     started(bed)
     press(bed, clock)
     bpy.ops.ed.undo_push(message="Formed")
@@ -27,23 +25,23 @@ def test_a_session_waits_for_a_deleted_fingertip_and_goes_on_with_undo(bed: Any,
     goes_on(clock)
 
 
-def look_at(name: str) -> None:
+def look_at(name):
     bpy.context.window.scene = bpy.data.scenes.get(name) or bpy.data.scenes.new(name)
 
 
-def edit(mode: str = "EDIT") -> None:
+def edit(mode="EDIT"):
     bpy.ops.object.mode_set(mode=mode)
 
 
-def scale(bed: Any, y: float) -> None:
+def scale(bed, y):
     bed.scale.y = y
 
 
-def lay_out(bed: Any, rows: int) -> None:
+def lay_out(bed, rows):
     bed.digiclay.layout.rows = rows
 
 
-def edit_through_a_linked_duplicate(bed: Any) -> None:
+def edit_through_a_linked_duplicate(bed):
     bpy.ops.object.duplicate(linked=True)
     edit()
     assert bed.mode == "OBJECT"
@@ -72,7 +70,7 @@ def test_a_session_waits_while_it_is_hindered(bed, clock, hinder, words, free):
 
 
 @pytest.mark.usefixtures("machine")
-def test_a_stroke_taken_back_in_edit_mode_is_drawn_so_afterwards(bed: Any, clock: Clock) -> None:
+def test_a_stroke_taken_back_in_edit_mode_is_drawn_so_afterwards(bed, clock):
     started(bed)
     running.put(queue_stroke(running.find(bed), start(0, 0.0, 0.0, 4e-3))[0])
     clock.until(lambda: shown(bed).min() < 39e-3)
@@ -85,7 +83,7 @@ def test_a_stroke_taken_back_in_edit_mode_is_drawn_so_afterwards(bed: Any, clock
 
 
 @pytest.mark.parametrize("what", ["bed", "scene"])
-def test_a_deleted_bed_or_scene_ends_the_session_with_a_message(bed: Any, clock: Clock, what: str) -> None:
+def test_a_deleted_bed_or_scene_ends_the_session_with_a_message(bed, clock, what):
     started(bed)
     if what == "bed":
         bpy.ops.object.delete()
@@ -97,7 +95,7 @@ def test_a_deleted_bed_or_scene_ends_the_session_with_a_message(bed: Any, clock:
     assert running.list_sessions() == ()
 
 
-def test_disabling_the_extension_ends_the_session_and_leaves_the_state(bed: Any, clock: Clock) -> None:
+def test_disabling_the_extension_ends_the_session_and_leaves_the_state(bed, clock):
     started(bed)
     press(bed, clock)
     kept = beds.read_snapshot(bed)

@@ -30,7 +30,7 @@ class Device(ctypes.Structure):
 class Pen:
     """The pen of the display in the environment."""
 
-    def __init__(self) -> None:
+    def __init__(self):
         self.x11, self.xtest = ctypes.CDLL("libX11.so.6"), ctypes.CDLL("libXtst.so.6")
         xinput = ctypes.CDLL("libXi.so.6")
         self.x11.XOpenDisplay.restype = ctypes.c_void_p
@@ -43,20 +43,20 @@ class Pen:
         self.device = ctypes.c_void_p(xinput.XOpenDevice(self.display, ctypes.c_ulong(number)))
         self.axes = (ctypes.c_int * 5)()
 
-    def to(self, x: float, y: float, pressure: float, right: float, near: float) -> None:
+    def to(self, x, y, pressure, right, near):
         """Move it."""
         place = (x * FULL / SIZE[0], y * FULL / SIZE[1], pressure * FULL, right * TILT, near * TILT)
         self.axes = (ctypes.c_int * 5)(*(round(value) for value in place))
         self.xtest.XTestFakeDeviceMotionEvent(self.display, self.device, 0, 0, self.axes, 5, 0)
         self.x11.XSync(self.display, 0)
 
-    def touch(self, on: bool) -> None:
+    def touch(self, on):
         """Put it on the tablet, or take it off."""
         self.xtest.XTestFakeDeviceButtonEvent(self.display, self.device, 1, on, self.axes, 5, 0)
         self.x11.XSync(self.display, 0)
 
 
-def main(words: list[str]) -> None:
+def main(words):
     """Do what the words say."""
     pen = Pen()
     for word in words:

@@ -3,7 +3,6 @@
 import os
 import shutil
 import subprocess
-from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -15,12 +14,12 @@ MODULES = "/usr/lib/xorg/modules"
 HEADERS = "xorg-server"
 
 
-def find_server() -> str | None:
+def find_server():
     """Return the X server's program."""
     return next((name for name in SERVERS if Path(name).is_file()), None)
 
 
-def find_missing() -> str:
+def find_missing():
     """Return what is missing here for a screen with a pen, or an empty text."""
     missing = [name for name in ("gcc", "pkg-config") if shutil.which(name) is None]
     if find_server() is None or not (Path(MODULES) / "drivers" / "dummy_drv.so").is_file():
@@ -31,7 +30,7 @@ def find_missing() -> str:
 
 
 @contextmanager
-def pen_screen(folder: Path) -> Iterator[str]:
+def pen_screen(folder):
     """Start an X server whose only pointer is a pen; yield its display."""
     missing = find_missing()
     assert not missing, f"a screen with a pen needs {missing}"
@@ -44,7 +43,6 @@ def pen_screen(folder: Path) -> Iterator[str]:
     subprocess.run([*command, *flags], check=True, timeout=60)
     told, tell = os.pipe()
     server = find_server()
-    assert server is not None
     options = {
         "-displayfd": str(tell),
         "-nolisten": "tcp",
