@@ -68,7 +68,7 @@ def test_a_preset_of_the_user_s_own_is_taken_and_another_method_brings_its_own_g
     assert (scene.control, scene.blister, scene.valve.stroke) == (plain.control, None, 41e-6)
 
 
-@pytest.mark.parametrize(("rows", "columns"), [(1, 1), (2, 9), (6, 6)])
+@pytest.mark.parametrize("rows, columns", [(1, 1), (2, 9), (6, 6)])
 @pytest.mark.parametrize("method", ["virtual_master", "cell_states"])
 def test_a_bed_smaller_than_its_blister_gets_one_that_fits(rows, columns, method):
     bed = add(rows=rows, columns=columns, method="elastic")
@@ -270,7 +270,7 @@ def test_a_scene_file_opens_and_a_session_too_long_to_wait_for_is_left_to_the_co
 
 
 @pytest.mark.parametrize(
-    ("content", "said"),
+    "content, said",
     [
         (None, "cannot be read"),
         ("[valve\n", "line 1"),

@@ -137,7 +137,7 @@ TABLED = {"a bed", "edited", "hidden", "stretched", "mirrored"}
 
 
 @pytest.mark.parametrize(
-    ("odd", "live"), [(odd, live) for odd in ODD for live in (False, True) if live or odd not in TABLED]
+    "odd, live", [(odd, live) for odd in ODD for live in (False, True) if live or odd not in TABLED]
 )
 def test_no_operator_fails(file, odd, live, capfd):
     before, said = prepare(file, odd, live), []

@@ -15,6 +15,7 @@ from digiclay.exchange import formed_bed
 from digiclay.roles import fingertip_of
 from digiclay.settings import properties
 
+from tests.assemble import assert_near
 from tests.blender.at_hand import new_bed
 
 pytestmark = pytest.mark.usefixtures("extension")
@@ -98,7 +99,7 @@ def test_an_obj_stands_upright_after_its_import_with_the_same_axes(bed, tmp_path
 
 
 @pytest.mark.parametrize(
-    ("name", "file_format", "written"),
+    "name, file_format, written",
     [
         *(("bed.stl", kind, f"bed{find_suffix(kind)}") for kind in FORMATS),
         # The ending of another format is replaced by that of the one chosen.
@@ -130,7 +131,7 @@ def test_each_feature_can_have_a_file_of_its_own(bed, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("name", "options", "message"),
+    "name, options, message",
     [
         ("missing/bed.stl", {}, r"Cannot write .*bed\.stl: No such file or directory\."),
         ("bed.stl", {"kind": "features", "threshold": 50.0}, "no feature of at least 3 pins more than 50 mm"),
@@ -158,7 +159,7 @@ def test_the_mesh_is_the_surface_with_its_features_as_vertex_groups(bed, kind):
     made = bpy.context.object
     assert made != bed
     exact = 0.6e-7 if kind == "pins" else FLOAT32  # pins have steps of 0.1 µm
-    np.testing.assert_allclose(corners(made)[:168, 2] / bridge.SCALE, known["height"], rtol=0, atol=exact)
+    assert_near(corners(made)[:168, 2] / bridge.SCALE, known["height"], exact)
     assert [group.name for group in made.vertex_groups] == ["boss_1", "crease_1"]
     for index, x in ((0, -9e-3), (1, 9e-3)):
         mine = [v.co.x / bridge.SCALE for v in made.data.vertices if any(g.group == index for g in v.groups)]
@@ -190,7 +191,7 @@ def test_a_mesh_stands_where_its_surface_is_or_beside_the_one_before_in_a_place_
     bed.location, bed.rotation_euler = (1.0, 2.0, 3.0), (0.0, 0.0, 0.5)
     bpy.context.view_layer.update()
     bpy.ops.mesh.digital_clay_make(kind="surface", beside=False)
-    np.testing.assert_allclose(bpy.context.object.matrix_world, bed.matrix_world, rtol=0, atol=1e-6)
+    assert_near(bpy.context.object.matrix_world, bed.matrix_world, 1e-6)
     bpy.data.objects.remove(bpy.context.object)
     made = []
     for number in range(4):
@@ -220,7 +221,7 @@ def test_features_can_be_measured_from_a_surface_that_was_kept(bed):
 
 def test_the_heights_are_measured_from_the_rest_height_and_a_bed_without_attributes_or_rows_is_refused(bed):
     bed.digiclay.actuator.rest_height = 35.0
-    np.testing.assert_allclose(formed_bed.read_formed(bed).former, 0.035, rtol=0, atol=1e-12)
+    assert_near(formed_bed.read_formed(bed).former, 0.035, 1e-12)
     bed.data.attributes.remove(bed.data.attributes["force"])
     with pytest.raises(RuntimeError, match=r"no longer that of its pins: .* press Rebuild"):
         bpy.ops.mesh.digital_clay_make()

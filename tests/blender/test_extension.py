@@ -22,6 +22,7 @@ from digiclay.device.instant import Instant
 from digiclay.roles import ROLE
 from digiclay.settings import properties
 
+from tests.assemble import assert_near
 from tests.timeouts import TIMEOUT
 
 #: Positions are float32 and drawn ten times as large.
@@ -79,7 +80,7 @@ def test_an_imported_run_has_its_settings_and_shows_the_row_asked_for(tmp_path, 
     for row, wanted in ((0, heights[0]), (-1, heights[1])):
         assert bpy.ops.import_scene.digital_clay_run(filepath=path, row=row) == {"FINISHED"}
         cells = bridge.read_cells(bpy.context.object.data)
-        np.testing.assert_allclose(cells["height"], wanted, rtol=0, atol=FLOAT32)
+        assert_near(cells["height"], wanted, FLOAT32)
     assert properties.scene_of(bpy.context.object).valve.stroke == 41e-6
 
 
@@ -161,7 +162,7 @@ def test_a_palette_recolors_the_beds_of_the_file_and_a_second_bed_leaves_colors_
     palettes.set_palette("tol_muted")
     for mode, color in palettes.PALETTES["tol_muted"].items():
         # float32 numbers up to 1.
-        np.testing.assert_allclose(mode_color(mode), linear(color), rtol=0, atol=1e-6)
+        assert_near(mode_color(mode), linear(color), 1e-6)
     (material,) = (item for item in bpy.data.materials if item.get(ROLE) == "rest")
     material.diffuse_color = (1.0, 0.0, 0.0, 1.0)
     bpy.ops.mesh.digital_clay_add(rows=4, columns=4)
@@ -250,7 +251,7 @@ def test_the_tool_refuses_a_tag_blender_does_not_know(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("wanted", "words"),
+    "wanted, words",
     [
         ({"installed": ["FINISHED"], "enabled": True}, "the zip installs and enables"),
         ({"bundled": 1, "imported at once": []}, "trimesh comes along and is not imported at once"),
@@ -269,7 +270,7 @@ def test_in_a_blender_of_its_own(seen, wanted, words):
 
 
 @pytest.mark.parametrize(
-    ("command", "said"),
+    "command, said",
     [
         ("paper", "run 'pip install digiclay[plots]' first."),
         ("study", "run 'pip install digiclay[study]' first."),

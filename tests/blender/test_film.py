@@ -307,7 +307,7 @@ def test_a_batch_draws_what_is_asked_for_and_shows_it_on_its_page(capfd):
 
 
 @pytest.mark.parametrize(
-    ("arguments", "told"),
+    "arguments, told",
     [
         (["--film", "--size", "65x40"], "--size must be an even number"),
         (["--film", "--rate", "0"], "--rate must be at least 1"),

@@ -12,6 +12,7 @@ from digiclay.recorded import takes
 from digiclay.roles import BALL, PALM, ROLE, ellipsoid, fingertips_of, is_linked
 from digiclay.settings import own_presets, properties
 
+from tests.assemble import assert_near
 from tests.blender.at_hand import added, beds, done, looked, redone, select, undone
 
 pytestmark = pytest.mark.usefixtures("watched")
@@ -82,7 +83,7 @@ def test_a_left_hand_is_the_image_of_a_right_one_and_stands_so_on_a_bed_that_is_
         bpy.ops.object.delete()
         done("Empty")
     # 32 bits of a few tenths of a Blender unit.
-    np.testing.assert_allclose(hands["LEFT"], hands["RIGHT"] * [-1.0, 1.0, -1.0, 1.0], rtol=0, atol=1e-6)
+    assert_near(hands["LEFT"], hands["RIGHT"] * [-1.0, 1.0, -1.0, 1.0], 1e-6)
     assert (hands["RIGHT"][:, 3] > 0.0).all()  # all of them point away from the wrist
     bed = added()
     bed.location, bed.rotation_euler, bed.scale = (3.0, -2.0, 1.0), (0.2, -0.4, 0.9), (2.5, 2.5, 2.5)
@@ -90,13 +91,11 @@ def test_a_left_hand_is_the_image_of_a_right_one_and_stands_so_on_a_bed_that_is_
     bpy.ops.digiclay.add_hand()
     done("Add Hand")
     poses, palm = bridge.poses(bed)[1:], palms()[0]
-    np.testing.assert_allclose(
-        poses[:, :2] - np.array(palm.location)[:2] / bridge.SCALE, hands["RIGHT"][:, :2], rtol=0, atol=2e-6
-    )
+    assert_near(poses[:, :2] - np.array(palm.location)[:2] / bridge.SCALE, hands["RIGHT"][:, :2], 2e-6)
     wanted = bridge.poses(bed) + np.array([0.01, 0.02, 0.003, 0.0, 0.0, 0.0, 0.0])
     bridge.move_fingertips(bed, wanted, [bridge.finger_of(tip) for tip in fingertips_of(bed).values()])
     looked()
-    np.testing.assert_allclose(bridge.poses(bed), wanted, rtol=0, atol=2e-6)
+    assert_near(bridge.poses(bed), wanted, 2e-6)
 
 
 def test_two_hands_have_no_fingertip_between_those_of_the_other_one():
@@ -116,7 +115,7 @@ def test_a_fingertip_whose_own_size_is_set_stays_where_its_lowest_point_is():
     before = bridge.poses(bed)
     fingertips_of(bed)[4].digiclay.fingertip.whole_height *= 1.7
     looked()
-    np.testing.assert_allclose(bridge.poses(bed), before, rtol=0, atol=1e-6)  # Blender's 32 bits
+    assert_near(bridge.poses(bed), before, 1e-6)  # Blender's 32 bits
 
 
 @pytest.mark.parametrize("hand", [False, True], ids=["of the bed", "of a hand"])
@@ -190,7 +189,7 @@ def test_a_hand_moves_is_hidden_and_is_deleted_with_its_palm(where):
     palm.location.x += 0.1
     looked()
     moved = bridge.poses(bed) - before
-    np.testing.assert_allclose(moved[:, 0], [0.0] + [0.01] * 5, rtol=0, atol=1e-6)  # Blender's 32 bits
+    assert_near(moved[:, 0], [0.0] + [0.01] * 5, 1e-6)  # Blender's 32 bits
     whole = bed if where == "bed" else palm
     whole.hide_set(True)
     done("Hide")
@@ -241,7 +240,7 @@ def test_a_copy_of_a_bed_has_a_hand_of_its_own(what):
     assert sorted(palm.parent.name for palm in palms()) == sorted([bed.name, copy.name])
     assert len(bpy.context.scene.objects) == 2 * (1 + 2 * 6 + 1)
     for each in (bed, copy):
-        np.testing.assert_allclose(bridge.poses(each), before, rtol=0, atol=1e-6)  # Blender's 32 bits
+        assert_near(bridge.poses(each), before, 1e-6)  # Blender's 32 bits
         assert properties.read_scene(each).fingers == scene.fingers
     undone()
     assert len(beds()) == 1
@@ -257,7 +256,7 @@ def test_a_copy_of_a_palm_alone_is_another_hand():
     assert sound(bed, *range(1, 12))
     assert len(palms()) == 2
     poses = bridge.poses(bed)
-    np.testing.assert_allclose(poses[6:, :3] - poses[1:6, :3], [[0.0, 0.05, 0.0]] * 5, rtol=0, atol=1e-6)
+    assert_near(poses[6:, :3] - poses[1:6, :3], [[0.0, 0.05, 0.0]] * 5, 1e-6)
 
 
 def test_poses_are_given_to_a_hand_by_its_palm_where_it_moves_as_one_and_else_by_its_fingertips():
@@ -268,18 +267,18 @@ def test_poses_are_given_to_a_hand_by_its_palm_where_it_moves_as_one_and_else_by
     wanted[1:, :3] += [0.01, -0.02, 0.003]
     bridge.move_fingertips(bed, wanted, fingers)
     looked()
-    np.testing.assert_allclose(bridge.poses(bed), wanted, rtol=0, atol=1e-6)  # Blender's 32 bits
-    np.testing.assert_allclose([tuple(tip.location) for tip in palm.children], own, rtol=0, atol=1e-5)
+    assert_near(bridge.poses(bed), wanted, 1e-6)  # Blender's 32 bits
+    assert_near([tuple(tip.location) for tip in palm.children], own, 1e-5)
     stood = tuple(palm.location)
     wanted[1, 2] += 0.002
     bridge.move_fingertips(bed, wanted, fingers)
     looked()
-    np.testing.assert_allclose(bridge.poses(bed), wanted, rtol=0, atol=1e-6)
-    np.testing.assert_allclose(palm.location, stood, rtol=0, atol=1e-5)
+    assert_near(bridge.poses(bed), wanted, 1e-6)
+    assert_near(palm.location, stood, 1e-5)
     wanted[2, 1] += 0.002  # of one alone, as a press stroke moves the first one
     bridge.move_fingertips(bed, wanted[:3], fingers)
     looked()
-    np.testing.assert_allclose(bridge.poses(bed), wanted, rtol=0, atol=1e-6)
+    assert_near(bridge.poses(bed), wanted, 1e-6)
 
 
 def test_a_bed_has_at_most_32_fingertips():
@@ -328,7 +327,7 @@ def test_a_bed_of_another_file_comes_with_its_hand(tmp_path, how):
     done("Append")
     (bed,) = beds()
     assert sound(bed, *range(1, 7))
-    np.testing.assert_allclose(bridge.poses(bed), before, rtol=0, atol=1e-6)  # Blender's 32 bits
+    assert_near(bridge.poses(bed), before, 1e-6)  # Blender's 32 bits
     assert len(bpy.context.scene.objects) == 1 + 2 * 6 + 1
 
 
@@ -373,7 +372,7 @@ def test_a_scene_of_several_fingers_opens_with_them_and_a_preset_of_it_has_the_f
     assert parts[0] == parts[1]
     # 32 bits of a few tenths of a Blender unit.
     start = [[-8e-3, 0.0, 45e-3], [8e-3, 2e-3, 47e-3]]
-    np.testing.assert_allclose(bridge.poses(bed)[:, :3], start, rtol=0, atol=1e-7)
+    assert_near(bridge.poses(bed)[:, :3], start, 1e-7)
     assert [bridge.finger_of(tip) for tip in fingertips_of(bed).values()] == [one for one, *_ in parts[0]]
     assert takes.read(bed).poses.shape[1:] == (2, 7)
     bed.digiclay.layout.arrangement = "hexagonal"  # each finger's law has the share that goes with it
@@ -397,5 +396,5 @@ def test_a_run_of_several_fingers_is_imported_with_them(tmp_path):
     assert bpy.ops.import_scene.digital_clay_run(filepath=path, row=-1) == {"FINISHED"}
     bpy.context.view_layer.update()
     bed = bpy.context.object
-    np.testing.assert_allclose(bridge.poses(bed), run.history["fingertip"][-1], rtol=0, atol=1e-6)
+    assert_near(bridge.poses(bed), run.history["fingertip"][-1], 1e-6)
     assert len(properties.read_scene(bed).fingers) == 2

@@ -86,7 +86,7 @@ def test_a_blister_is_shown_where_the_method_forms_one(method, bed):
 
 
 @pytest.mark.parametrize(
-    ("switch", "grayed"),
+    "switch, grayed",
     [
         ("fingertip", {"fingertip", "contact", "relaxation"}),
         ("control", {"control", "blister"}),
@@ -152,7 +152,7 @@ def test_every_operator_and_setting_leads_to_a_section_that_exists():
 
 @pytest.mark.usefixtures("extension")
 @pytest.mark.parametrize(
-    ("button", "anchor"),
+    "button, anchor",
     [
         ("digiclay.take_record", "#takes"),
         ("DIGICLAY_OT_press.depth", "#brushes"),
@@ -177,7 +177,7 @@ def test_the_entries_come_with_the_extension_and_go_with_it():
 
 
 @pytest.mark.parametrize(
-    ("page", "address"),
+    "page, address",
     [
         (PureWindowsPath("D:/Eigene Dateien/Ton#1/g.html"), "file:///D:/Eigene%20Dateien/Ton%231/g.html"),
         (PureWindowsPath("//server/share/guide.html"), "file://server/share/guide.html"),
@@ -189,7 +189,7 @@ def test_the_address_is_right_whatever_the_folder_is_called(page, address):
 
 
 @pytest.mark.parametrize(
-    ("text", "german"),
+    "text, german",
     [
         ("Bore (mm)", "Bohrung (mm)"),
         (

@@ -18,6 +18,7 @@ from digiclay.roles import fingertip_of
 from digiclay.sessions import running
 from digiclay.settings import properties
 
+from tests.assemble import assert_near
 from tests.blender.session.live import FLOAT32, Clock, exact, press, shown
 
 pytestmark = pytest.mark.usefixtures("extension")
@@ -48,19 +49,19 @@ def go_on(name, x):
     tick.stop(found.session_uid)
 
 
-@pytest.mark.parametrize(("name", "stored"), [("Session", "session"), ("Settings", "settings")])
+@pytest.mark.parametrize("name, stored", [("Session", "session"), ("Settings", "settings")])
 def test_the_kept_state_has_the_stored_heights_and_is_what_is_drawn(name, stored):
     np.testing.assert_array_equal(exact(bed(name)), HEIGHTS[stored])
-    np.testing.assert_allclose(shown(bed(name)), HEIGHTS[stored], rtol=0, atol=FLOAT32)
+    assert_near(shown(bed(name)), HEIGHTS[stored], FLOAT32)
 
 
-@pytest.mark.parametrize(("name", "x"), [("Session", 4.0), ("Settings", 0.0)])
+@pytest.mark.parametrize("name, x", [("Session", 4.0), ("Settings", 0.0)])
 def test_the_session_goes_on_to_the_stored_heights(name, x):
     go_on(name, x)
     stored = HEIGHTS[f"{name.lower()}_later"]
     assert np.abs(stored - HEIGHTS[name.lower()]).max() > 1e-4  # the press forms something
     # The finger's place comes from Blender's 32 bits, which its versions round differently.
-    np.testing.assert_allclose(exact(bed(name)), stored, rtol=0, atol=FLOAT32)
+    assert_near(exact(bed(name)), stored, FLOAT32)
 
 
 def test_an_older_bed_is_colored_by_force_under_the_former_names():
@@ -81,13 +82,13 @@ def test_the_take_replays_to_the_stored_heights():
     np.testing.assert_array_equal(snapshot.load(system, take.start).row(0), HEIGHTS["take_start"])
     np.testing.assert_array_equal(snapshot.load(system, take.end).row(0), HEIGHTS["take_end"])
     assert bpy.ops.digiclay.take_replay(take=first.number) == {"FINISHED"}
-    np.testing.assert_allclose(exact(found), HEIGHTS["take_end"], rtol=0, atol=ROUNDING)
+    assert_near(exact(found), HEIGHTS["take_end"], ROUNDING)
 
 
 def test_a_session_resets_and_goes_back_from_the_older_state_with_its_fingertip():
     found = bed("Session")
     pose = bridge.pose(fingertip_of(found))
-    np.testing.assert_allclose(pose, beds.read_poses(found)[0], rtol=0, atol=1e-6)  # Blender's 32 bits
+    assert_near(pose, beds.read_poses(found)[0], 1e-6)  # Blender's 32 bits
     assert bpy.ops.digiclay.session_reset() == {"FINISHED"}
     assert beds.read_snapshot(found) is None
     assert (exact(found) == 40e-3).all()

@@ -21,6 +21,7 @@ from digiclay.sessions import running
 from digiclay.settings import devices, properties
 from digiclay.strokes.stroke import Brush
 
+from tests.assemble import assert_near
 from tests.blender.at_hand import in_the_view, new_bed
 
 #: How much larger the bed is than it is added: it then fills a good part of the factory file's view.
@@ -88,7 +89,7 @@ def test_a_pixel_on_the_top_of_a_pin_points_at_that_pin(bed, context):
     visible = np.array([found.pin for found in met]) == np.arange(cells.count)
     assert visible.sum() > 0.9 * cells.count
     # Blender's matrices are float32, at a distance of 2 m of the device.
-    np.testing.assert_allclose(near[visible], tops[visible], rtol=0, atol=2e-6)
+    assert_near(near[visible], tops[visible], 2e-6)
     closer = np.linalg.norm(near - eye, axis=1) <= np.linalg.norm(tops - eye, axis=1) + 2e-6
     assert closer.all()
 
@@ -101,7 +102,7 @@ def test_a_place_in_the_view_agrees_with_blenders_own_projection(bed, context):
     world = bed.matrix_world @ Vector(place[0] * bridge.SCALE)
     theirs = location_3d_to_region_2d(context.region, context.region_data, world)
     # A thousandth of a pixel: theirs is reckoned in float32.
-    np.testing.assert_allclose(bridge.project(context, bed, place)[0], theirs, rtol=0, atol=1e-2)
+    assert_near(bridge.project(context, bed, place)[0], theirs, 1e-2)
     # What lies behind the eye is nowhere on the screen.
     eye = np.array(bed.matrix_world.inverted() @ context.region_data.view_matrix.inverted().translation)
     assert np.isnan(bridge.project(context, bed, 1.5 * eye[None] / bridge.SCALE)).all()
@@ -139,7 +140,7 @@ def test_the_patch_lies_on_the_pins_about_the_mouse_as_wide_as_the_finger_presse
     # Pressed in by half its height of 8 mm, an ellipsoid is cut at sqrt(3)/2 of its width.
     across = np.ptp(rim, axis=0) / 2
     np.testing.assert_allclose(across, np.sqrt(0.75) * np.array([finger.length, finger.width]), rtol=1e-6)
-    np.testing.assert_allclose(rim.mean(axis=0), [0.002, 0.001], rtol=0, atol=1e-9)
+    assert_near(rim.mean(axis=0), [0.002, 0.001], 1e-9)
 
 
 def test_the_text_beside_the_cursor_names_brush_and_height_or_depth_with_its_unit():
@@ -170,7 +171,7 @@ def lengths(paper):
 
 
 @pytest.mark.parametrize(
-    ("follows", "size", "wanted"),
+    "follows, size, wanted",
     [
         (True, 8.0, (8.0, 7.5, 9.25, 3.0)), (False, 8.0, (8.0, 15.0, 18.5, 6.0)),
         (False, 60.0, (60.0, 15.0, 18.5, 6.0)),
@@ -187,10 +188,10 @@ def test_the_ellipsoid_follows_the_size_and_the_blister_unless_it_is_set_by_itse
     finger, half = bridge.finger_of(fingertip_of(paper)), size * 0.5e-3
     assert (finger.length, finger.width, finger.height) == pytest.approx((1.25 * half, half, half), rel=1e-6)
     # The lowest point stays: a larger finger does not press.
-    np.testing.assert_allclose(bridge.pose(fingertip_of(paper)), before, rtol=0, atol=1e-7)
+    assert_near(bridge.pose(fingertip_of(paper)), before, 1e-7)
 
 
-@pytest.mark.parametrize(("name", "usual"), [("length", 20.0), ("width", 16.0), ("height", 16.0)])
+@pytest.mark.parametrize("name, usual", [("length", 20.0), ("width", 16.0), ("height", 16.0)])
 def test_the_panel_shows_whole_widths_and_stores_semi_axes(paper, name, usual):
     group, lowest = paper.digiclay.fingertip, bridge.pose(fingertip_of(paper))
     assert getattr(group, f"whole_{name}") == usual
@@ -199,12 +200,12 @@ def test_the_panel_shows_whole_widths_and_stores_semi_axes(paper, name, usual):
     (finger,) = properties.scene_of(paper).fingers
     assert getattr(finger.fingertip, name) == 6.3e-3
     assert paper.digiclay.size == pytest.approx(12.6 if name == "width" else 16.0)
-    np.testing.assert_allclose(bridge.pose(fingertip_of(paper)), lowest, rtol=0, atol=1e-7)
+    assert_near(bridge.pose(fingertip_of(paper)), lowest, 1e-7)
     assert group.bl_rna.properties[f"whole_{name}"].description.endswith(f"by default {usual:g} mm")
 
 
 @pytest.mark.parametrize(
-    ("typed", "share"),
+    "typed, share",
     [("0.5", 0.5), (".25", 0.25), ("1", 1.0), ("50", 0.5), ("50 %", 0.5), ("0.5%", 5e-3), ("2*0.3", 0.6)],
 )
 def test_a_strength_is_typed_as_a_share_or_in_per_cent(typed, share):
@@ -221,7 +222,7 @@ def test_a_blister_that_the_bed_limits_is_the_same_again_with_the_size_before(pa
     assert lengths(paper) == pytest.approx((16.0, 15.0, 18.5, 6.0), rel=1e-5)
 
 
-@pytest.mark.parametrize(("asked", "got"), [(-5.0, 1.0), (0.0, 1.0), (1e9, 200.0)])
+@pytest.mark.parametrize("asked, got", [(-5.0, 1.0), (0.0, 1.0), (1e9, 200.0)])
 def test_a_size_stays_within_what_a_finger_can_have(paper, asked, got):
     devices.set_size(paper.digiclay, 1e-3 * asked)
     assert lengths(paper)[0] == pytest.approx(got, rel=1e-6)
@@ -341,7 +342,7 @@ def test_strokes_are_formed_and_kept_by_the_bed(small, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    "text, said",
     [
         ("[[stroke", "line 1"),
         (f"{PRESS}wide = 3", "known key"),

@@ -21,6 +21,7 @@ from digiclay.settings import properties
 from digiclay.settings.declared import read
 from digiclay.settings.shown_units import unit_of
 
+from tests.assemble import assert_near
 from tests.blender.at_hand import instances, new_bed
 
 pytestmark = pytest.mark.usefixtures("extension")
@@ -46,7 +47,7 @@ def told(bed, scene):
     return scene.with_sections(name=bed.name, description="", trajectory=path)
 
 
-@pytest.mark.parametrize(("section", "method"), EVERY)
+@pytest.mark.parametrize("section, method", EVERY)
 def test_every_parameter_has_a_property_with_its_unit_meaning_and_bounds(section, method):
     settings = thing().digiclay
     settings.method = method
@@ -107,7 +108,7 @@ def test_a_part_that_is_switched_off_is_left_out_and_each_method_keeps_parameter
 
 
 @pytest.mark.parametrize(
-    ("section", "name", "before", "value", "table"),
+    "section, name, before, value, table",
     [
         *(("", "preset", "viscous", name, {"preset": name}) for name in PRESETS),
         *(("", "method", "cell_states", name, {"control": {"method": name}}) for name in METHODS),
@@ -126,7 +127,7 @@ def test_a_choice_gives_the_scene_of_a_file(section, name, before, value, table)
 
 
 @pytest.mark.parametrize(
-    ("typed", "rule"),
+    "typed, rule",
     [
         *((typed, "be numbers separated by commas") for typed in ("", "4; 70", "4, , 70", "four")),
         *((typed, "be (a finite number|at least)") for typed in ("nan, 70", "4, inf, 5", "-4, 70", "0, 70")),
@@ -177,8 +178,8 @@ def test_a_rebuilt_bed_is_the_same_with_its_new_pins_at_rest_where_its_layout_sa
     assert bpy.ops.digiclay.rebuild() == {"FINISHED"}
     cells = bridge.read_cells(bed.data)
     wanted = make_grid(properties.scene_of(bed).layout)
-    np.testing.assert_allclose(cells["position"], wanted.positions, rtol=0, atol=FLOAT32)
-    np.testing.assert_allclose(cells["height"], 0.030, rtol=0, atol=FLOAT32)
+    assert_near(cells["position"], wanted.positions, FLOAT32)
+    assert_near(cells["height"], 0.030, FLOAT32)
     assert set(cells["mode"]) == {Mode.REST}
     assert (identity(bed), beds.read_snapshot(bed), len([*instances(bed)])) == (before, None, 180)
     # The housing is about all of them.
@@ -200,7 +201,7 @@ def test_settings_that_do_not_go_together_leave_the_bed_as_it_is(bed):
 
 
 @pytest.mark.parametrize(
-    ("field", "value"),
+    "field, value",
     [("rows", 8), ("pitch", 3.5), ("arrangement", "staggered"), ("arrangement", "hexagonal")],
 )
 def test_the_panel_says_when_a_bed_is_no_longer_as_its_layout(field, value, bed):

@@ -83,7 +83,7 @@ def test_a_still_leaves_the_users_file_as_it_was_and_a_failed_one_no_file(tmp_pa
 
 
 @pytest.mark.parametrize("arrangement", ["aligned", "hexagonal"])
-@pytest.mark.parametrize(("rows", "columns"), [(1, 1), (2, 40), (60, 60)])
+@pytest.mark.parametrize("rows, columns", [(1, 1), (2, 40), (60, 60)])
 def test_every_bed_is_inside_the_frame_and_at_its_margins(rows, columns, arrangement):
     scene = bpy.data.scenes.new("framing")
     scene.render.resolution_x, scene.render.resolution_y = WIDTH, HEIGHT
@@ -156,7 +156,7 @@ def extent(plane, part):
     return float(low[0]), float(high[0]), float(low[1]), float(high[1])
 
 
-@pytest.mark.parametrize(("size", "letters"), SIZES.items())
+@pytest.mark.parametrize("size, letters", SIZES.items())
 def test_letters_have_a_size_that_can_be_read_and_modes_are_explained_where_it_can(size, letters):
     plane = front(*size)
     write_mode_legend(plane, list(Mode))

@@ -14,6 +14,7 @@ from digiclay.roles import BALL, ROLE, fingertip_of
 from digiclay.sessions import running
 from digiclay.settings import properties
 
+from tests.assemble import assert_near
 from tests.blender.at_hand import (
     added,
     beds,
@@ -72,7 +73,7 @@ def test_a_bed_of_another_file_comes_with_its_fingertip_and_nothing_else(tmp_pat
     done("Append")
     (bed,) = beds()
     assert (whole(bed), housings()) == (True, 1)
-    np.testing.assert_allclose(bridge.pose(fingertip_of(bed)), at, rtol=0, atol=1e-7)
+    assert_near(bridge.pose(fingertip_of(bed)), at, 1e-7)
 
 
 @pytest.mark.parametrize("by_hand", [True, False])
@@ -144,10 +145,10 @@ def test_a_click_on_the_ball_takes_hold_of_its_fingertip_alone():
     bpy.ops.transform.translate(value=(0.1, 0.0, 0.0))
     done("Move")
     # A millimeter of the device is a centimeter in Blender; its matrices are of 32 bits.
-    np.testing.assert_allclose(bridge.pose(tip)[:3] - before[:3], (0.01, 0.0, 0.0), rtol=0, atol=1e-7)
+    assert_near(bridge.pose(tip)[:3] - before[:3], (0.01, 0.0, 0.0), 1e-7)
     undone()
     tip = fingertip_of(bed)
-    np.testing.assert_allclose(bridge.pose(tip), before, rtol=0, atol=1e-7)
+    assert_near(bridge.pose(tip), before, 1e-7)
     assert tip.select_get()
 
 
@@ -242,7 +243,7 @@ def test_what_the_user_has_hung_on_the_fingertip_stays_where_it_is():
     bpy.data.objects.remove(bed)
     done("Delete")
     assert list(bpy.context.scene.objects) == [camera]
-    np.testing.assert_allclose(camera.matrix_world, where, rtol=0, atol=1e-6)
+    assert_near(camera.matrix_world, where, 1e-6)
 
 
 @pytest.mark.parametrize("name", ["eye", "hide_viewport", "hide_render"])

@@ -165,7 +165,7 @@ def test_without_an_object_over_the_bed_the_button_says_what_to_do():
 
 
 @pytest.mark.parametrize(
-    ("vertices", "faces", "words"),
+    "vertices, faces, words",
     [
         ([], [], "must hold a surface made of faces"),
         ([(0, 0, 0), (1, 0, 0), (0, 1, 0)], [], "must hold a surface made of faces"),
@@ -202,7 +202,7 @@ def image(path, values, kind, depth):
 
 
 @pytest.mark.parametrize(
-    ("kind", "depth", "step"), [("PNG", "8", 1 / 255), ("PNG", "16", 1 / 65535), ("OPEN_EXR", "32", 1e-6)]
+    "kind, depth, step", [("PNG", "8", 1 / 255), ("PNG", "16", 1 / 65535), ("OPEN_EXR", "32", 1e-6)]
 )
 def test_blender_reads_a_picture_as_it_is(tmp_path, kind, depth, step):
     values = np.random.default_rng(5).uniform(0.0, 1.0, (7, 5))
@@ -239,7 +239,7 @@ def test_a_picture_stands_in_blender_as_its_exif_data_say(tmp_path, ending, orie
     assert np.abs(seen - pictures.UPRIGHT).max() < 0.2  # what a JPEG leaves
 
 
-@pytest.mark.parametrize(("kind", "absent"), pictures.NO_DATA)
+@pytest.mark.parametrize("kind, absent", pictures.NO_DATA)
 def test_blender_leaves_out_what_a_geotiff_has_no_data_of(tmp_path, kind, absent, monkeypatch):
     path = tmp_path / "dem.tif"
     known = pictures.write_geotiff(path, kind, absent)[::-1, 6:]

@@ -98,7 +98,7 @@ def test_blender_draws_the_skin_that_numpy_works_out(bed, kind):
 
 
 @pytest.mark.parametrize(
-    ("shown", "far", "pins", "skin"),
+    "shown, far, pins, skin",
     [
         ("pins", False, 72, False), ("skin", False, 0, True), ("both", False, 72, True),
         ("automatic", False, 72, False), ("automatic", True, 0, True),
@@ -262,7 +262,7 @@ def test_a_form_of_a_bed_without_a_skin_is_refused(bed):
 
 
 @pytest.mark.parametrize(
-    ("pitch", "before", "after"),
+    "pitch, before, after",
     [
         (7.9, False, True), (8.1, False, False), (9.9, True, True), (10.1, True, False), (0.0, True, False),
         (math.nan, True, False), (math.inf, True, False),

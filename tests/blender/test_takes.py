@@ -366,7 +366,7 @@ def test_an_animated_fingertip_is_read_once_a_control_period(bed):
     assert bpy.context.scene.frame_current == 3
 
 
-@pytest.mark.parametrize(("first", "last"), [(5, 5), (9, 2), (1, 300_000)])
+@pytest.mark.parametrize("first, last", [(5, 5), (9, 2), (1, 300_000)])
 def test_a_range_of_frames_that_cannot_be_is_refused(bed, first, last):
     with pytest.raises(DigiclayError, match="The frames to bake must have from 1 to"):
         next(bake.sample_path(bpy.context.scene, bed, first, last, 5e-3))

@@ -28,6 +28,7 @@ from digiclay.roles import ROLE, fingertip_of
 from digiclay.sessions import running, sculpting
 from digiclay.settings import properties
 
+from tests.assemble import assert_near
 from tests.blender.at_hand import instances, new_bed, open_bed
 
 #: Attributes are float32: 24 bits of at most 0.1 m, drawn ten times as large.
@@ -54,7 +55,7 @@ def test_the_pins_stand_where_the_arrays_say_in_the_material_of_their_mode(bed, 
         view.show(bed, instant)
         tops, materials = drawn_pins(bed)
         wanted = np.column_stack([instant.position, instant.height])
-        np.testing.assert_allclose(tops, wanted, rtol=0, atol=FLOAT32)
+        assert_near(tops, wanted, FLOAT32)
         assert not view.wants_force(bed)  # an instant's forces are there though nothing drawn tells them
         assert np.array_equal(bridge.read_cells(bed.data)["force"], instant.force.astype(np.float32))
         assert materials == [Mode(int(code)).name.lower() for code in instant.mode]
@@ -66,8 +67,8 @@ def test_the_modes_have_as_many_materials_each_in_its_color_which_a_second_bed_s
         wanted = bridge.linear(COLORS[mode])
         shader = next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
         # Both are stored as float32 numbers up to 1.
-        np.testing.assert_allclose(material.diffuse_color, wanted, rtol=0, atol=1e-6)
-        np.testing.assert_allclose(shader.inputs["Base Color"].default_value, wanted, rtol=0, atol=1e-6)
+        assert_near(material.diffuse_color, wanted, 1e-6)
+        assert_near(shader.inputs["Base Color"].default_value, wanted, 1e-6)
     materials = len(bpy.data.materials)
     other = view.build(formed, bpy.context.scene.collection)
     assert len(bpy.data.materials) == materials
@@ -101,7 +102,7 @@ def test_every_rod_reaches_down_to_the_deck_of_the_housing(bed, formed):
     housing = bed.evaluated_get(bpy.context.evaluated_depsgraph_get())
     deck = housing.data.vertices[-1].co.z  # the housing is drawn from its underside to the deck inside
     # float32 on lengths below one unit.
-    np.testing.assert_allclose(feet, deck, rtol=0, atol=1e-6)
+    assert_near(feet, deck, 1e-6)
     assert deck / bridge.SCALE < formed.height.min()
 
 
@@ -114,16 +115,16 @@ def test_the_pose_of_a_fingertip_is_read_back_however_things_are_scaled(bed, for
         bridge.place_fingertips(bed, pose[None], [finger])
         bpy.context.view_layer.update()
         # Blender's matrices are float32, and this one is inverted three units from the origin.
-        np.testing.assert_allclose(bridge.pose(fingertip), pose, rtol=0, atol=2e-6)
+        assert_near(bridge.pose(fingertip), pose, 2e-6)
     assert bridge.uniform(bed) == pytest.approx(2.5, rel=1e-6)
     bridge.place_fingertips(bed, formed.fingertips, formed.fingers)
     fingertip.scale = (3.0, 1.0, 0.5)  # by hand: what touches stays
     bpy.context.view_layer.update()
-    np.testing.assert_allclose(bridge.pose(fingertip), formed.fingertip, rtol=0, atol=2e-6)
+    assert_near(bridge.pose(fingertip), formed.fingertip, 2e-6)
 
 
 @pytest.mark.parametrize(
-    ("scale", "said"),
+    "scale, said",
     [
         ((1.0, 1.0, 1.1), r"the same along x, y and z \(got 1 x 1 x 1\.1\)"),
         ((0.0, 0.0, 0.0), r"above 0 along x, y and z \(got 0 x 0 x 0\)"),
@@ -200,7 +201,7 @@ def test_forces_of_a_session_are_written_only_while_something_drawn_tells_them(b
     tip.location.x += 1.0
     view.show_state(bed, system, state)
     tops, _ = drawn_pins(bed)  # pins move, and the fingertip is left to the user
-    np.testing.assert_allclose(tops[:, 2], system.cell.actuator.rest_height, rtol=0, atol=FLOAT32)
+    assert_near(tops[:, 2], system.cell.actuator.rest_height, FLOAT32)
     assert tip.location.x > 0.9
     np.testing.assert_array_equal(bridge.read_cells(bed.data)["force"], before)
     for switch_on in (lambda: view.show_arrows(bed, True), lambda: view.color_by(bed, "force")):
@@ -330,7 +331,7 @@ def test_picked_pins_are_kept_with_the_bed_in_the_order_they_were_picked(clay):
 
 
 @pytest.mark.parametrize(
-    ("pins", "said"),
+    "pins, said",
     [((1, 1), "6 different pins"), (range(7), "6 different pins"), ((400,), "0 to 399"), ((-1,), "0 to 399")],
 )
 def test_pins_that_cannot_be_picked_are_refused(clay, pins, said):

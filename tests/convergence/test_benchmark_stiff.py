@@ -12,7 +12,7 @@ from benchmarks.stiff import EASY
 
 
 @pytest.mark.parametrize(
-    ("height", "force", "message"),
+    "height, force, message",
     [
         ([0.0, 0.1], [0.0, 1.0], ""),
         ([-1e-9, 0.1], [0.0, 0.0], "height outside the stroke"),
@@ -27,7 +27,7 @@ def test_every_broken_invariant_is_seen(height, force, message):
 
 
 @pytest.mark.parametrize(
-    ("error", "estimate", "silent"),
+    "error, estimate, silent",
     [(2.0, 0.2, True), (2.0, 1.1, False), (2.0, math.nan, True), (1e-5, math.nan, False)],
 )
 def test_a_run_is_silent_when_it_is_wrong_and_its_estimate_does_not_show_it(error, estimate, *, silent):

@@ -63,7 +63,7 @@ def judged(name, stepper, step):
     return estimate, Errors(true.height / SHARE, true.force / SHARE, true.total_force / SHARE)
 
 
-@pytest.mark.parametrize(("name", "stepper", "step"), CASES)
+@pytest.mark.parametrize("name, stepper, step", CASES)
 def test_the_true_error_is_at_most_twice_the_estimate_and_that_no_more_than_twenty_times_it(
     name, stepper, step
 ):
@@ -74,7 +74,7 @@ def test_the_true_error_is_at_most_twice_the_estimate_and_that_no_more_than_twen
 
 
 @pytest.mark.parametrize(
-    ("stepper", "period", "step", "by", "finer"),
+    "stepper, period, step, by, finer",
     [
         ("bernoulli", 5e-3, 5e-3, "bernoulli", 1.25e-3),  # a quarter
         ("heun", 5e-3, 1e-3, "bernoulli", 0.25e-3),  # another method, not judged by itself

@@ -22,7 +22,7 @@ def test_a_figure_of_a_page_is_what_the_command_gives(figure):
     assert judged["stale"] == "", judged
 
 
-@pytest.mark.parametrize(("page", "stored"), STORED)
+@pytest.mark.parametrize("page, stored", STORED)
 def test_a_figure_of_a_page_is_that_of_its_stored_result(page, stored):
     judged = [figures.judge(one) for one in FIGURES if (one["page"], one["stored"]) == (page, stored)]
     assert [one for one in judged if one["stale"]] == []
@@ -52,7 +52,7 @@ def test_each_stored_result_has_a_row_with_its_command_date_and_commit():
 
 
 @pytest.mark.parametrize(
-    ("name", "page", "code", "said"),
+    "name, page, code, said",
     [
         ("README.md", README, 0, "0 of 1 figures are stale."),
         ("README.md", README.replace("26.5 s", "26.6 s"), 1, "1 of 1 figures are stale."),

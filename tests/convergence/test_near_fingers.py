@@ -9,7 +9,7 @@ from benchmarks.several_fingers import TURN, make_scene, measure_near
 
 
 @pytest.mark.parametrize(
-    ("method", "case", "turn", "most"),
+    "method, case, turn, most",
     [
         # From 15 mm on at most 1.1 of alone; nearer 1.5: both press a pin, or only one can have it.
         ("virtual_master", "crossing, 11", TURN, 1.1),

@@ -101,7 +101,7 @@ def order(found):
 
 
 @pytest.mark.parametrize(
-    ("stepper", "problem"),
+    "stepper, problem",
     [
         *product(STEPPERS, ("a moving finger", "no valve lag", "a turbulent valve")),
         # Near equilibrium, the two steppers that a session is likely to use: the others' errors change sign.

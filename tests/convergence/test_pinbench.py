@@ -83,7 +83,7 @@ def test_references_that_are_made_again_are_those_of_the_file():
 
 
 @pytest.mark.parametrize(
-    ("method", "setting", "height"), [("digiclay", 1e-3, 12e-6), ("digiclay adaptive", 1e-6, 0.3e-6)]
+    "method, setting, height", [("digiclay", 1e-3, 12e-6), ("digiclay adaptive", 1e-6, 0.3e-6)]
 )
 def test_turbulent_flow_under_a_load_is_on_its_chord_and_not_taken_for_a_free_one(method, setting, height):
     # With the conductance of mid step alone: 28 and 3.5 µm; two levels alone agree by accident, 0.6 µm off.

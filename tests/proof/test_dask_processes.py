@@ -192,7 +192,7 @@ def test_a_worker_of_another_version_is_named_at_once_and_when_it_joins(here, st
 
 
 @pytest.mark.parametrize(
-    ("place", "line"),
+    "place, line",
     [
         ("scheduler", "The scheduler {} lacks digiclay; here it is digiclay 0"),
         ("worker", "Worker tcp://127.0.0.1:"),

@@ -74,7 +74,7 @@ def test_a_step_whose_task_fails_stops_those_that_need_it(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("program", "name"),
+    "program, name",
     [
         ("", f"Python={sys.executable}"),
         (sys.executable, f"Python={sys.executable}"),

@@ -70,7 +70,7 @@ def test_admesh_has_nothing_to_repair(meshes, name):
     assert faults(meshes / name) == {}
 
 
-@pytest.mark.parametrize(("stem", "parts"), [("surface", 1), ("pins", 1), ("features", 3)])
+@pytest.mark.parametrize("stem, parts", [("surface", 1), ("pins", 1), ("features", 3)])
 def test_a_file_has_as_many_parts_as_bodies(meshes, stem, parts):
     said = told("admesh", meshes / "bilinear" / f"{stem}.stl")
     assert int(re.search(r"Number of parts\s*:\s*(\d+)", said)[1]) == parts

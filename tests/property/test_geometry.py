@@ -141,7 +141,7 @@ def test_the_bed_is_centered_on_the_origin(arrangement, shape):
 
 
 @pytest.mark.parametrize(
-    ("arrangement", "corners", "farthest"),
+    "arrangement, corners, farthest",
     [("aligned", True, 1.5), ("aligned", False, 1.1), ("staggered", True, 1.2), ("hexagonal", False, 1.1)],
 )
 def test_neighbors_are_the_nearest_cells_counter_clockwise(arrangement, corners, farthest):
@@ -158,7 +158,7 @@ SMALL, LARGE, ASIDE = (1e-3, 0.0, 2e-3), (0.0, 0.0, 3e-3), (2e-3, 0.0, 2e-3)
 
 
 @pytest.mark.parametrize(
-    ("outer", "inner", "holds"),
+    "outer, inner, holds",
     [
         (LARGE, SMALL, True),  # from inside it touches the rim
         (LARGE, ASIDE, False),

@@ -18,7 +18,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from benchmarks.stiff import strict
-from tests.assemble import Motion, make_system, one_cell, path, record, sample, scripted, under
+from tests.assemble import Motion, assert_near, make_system, one_cell, path, record, sample, scripted, under
 
 PERIODS = (1e-3, 5e-3, 20e-3, 50e-3)
 STEPPERS = st.sampled_from(["bernoulli", "richardson"])
@@ -230,7 +230,7 @@ def test_a_finger_that_passed_above_all_pins_presses_as_one_that_begins_there(x)
         np.testing.assert_allclose(after[-len(force) :], force, rtol=1e-9, atol=1e-12)
 
 
-@pytest.mark.parametrize(("opening", "swing"), [(-0.5, 0.2), (0.5, 0.2), (1.0, 0.2), (1.0, 1.0)])
+@pytest.mark.parametrize("opening, swing", [(-0.5, 0.2), (0.5, 0.2), (1.0, 0.2), (1.0, 1.0)])
 def test_a_pin_moves_beside_one_near_overflow_as_beside_one_that_is_not(opening, swing):
     # A step is a quarter of the finger's swing: its way bends. It meets and leaves the pin in each swing.
     contact, control = Contact(exponent=2e4), scripted(lambda t, x, y: opening)
@@ -239,4 +239,4 @@ def test_a_pin_moves_beside_one_near_overflow_as_beside_one_that_is_not(opening,
     states = begin(system), begin(system)
     states[1].rows[0, 1] = 95e-3  # 55 mm in the finger: an exponent of 1100
     alone, beside = (record(system, finger, 40, state).height[:, 0] for state in states)
-    np.testing.assert_allclose(beside, alone, rtol=0.0, atol=1e-12)  # rounding: solved another way
+    assert_near(beside, alone, 1e-12)  # rounding: solved another way

@@ -255,7 +255,7 @@ def evaluate_run(draw):
 
 
 @pytest.mark.parametrize(
-    ("use", "count"),
+    "use, count",
     [(begin_scene, 200), (go_on, 120), (replay_take, 80), (evaluate_run, 80)],
 )
 def test_what_is_odd_is_taken_or_refused_in_one_line(use, count):
@@ -278,7 +278,7 @@ def test_what_is_odd_is_taken_or_refused_in_one_line(use, count):
 
 
 @pytest.mark.parametrize(
-    ("key", "value", "said"),
+    "key, value, said",
     [
         ("layout.rows", "1" + 400 * "0", "rows must be a finite number (got a whole number of 401 digits)"),
         ("layout.rows", "1" + 300 * "0", "rows must be at most 10000 (got a whole number of 301 digits)"),
@@ -297,7 +297,7 @@ def test_a_number_beyond_all_devices_is_refused_with_its_bound(key, value, said)
 
 
 @pytest.mark.parametrize(
-    ("settings", "said"),
+    "settings, said",
     [
         # 1000 steps of the adaptive stepper, each cut into 128, would make a plan of terabytes.
         ("bernoulli 4e-6", "must be at least a 1000th of simulation.control_period, 0.005 s (got"),

@@ -162,7 +162,7 @@ def test_integrating_only_the_cells_that_move_gives_what_integrating_all_does(sp
 
 
 @pytest.mark.parametrize(
-    ("side", "way", "count", "least", "most"),
+    "side, way, count, least, most",
     [
         (9, [(0, 0, 0, 200), (1, 5, 5, 200)], 20, 0, 0),  # far above
         # At rest. The servo's flow goes with the error squared, so coming to rest takes some 20 s.
@@ -227,7 +227,7 @@ def formed(arrangement, shape, points, profile):
 
 
 @pytest.mark.parametrize(
-    ("case", "points", "profile"),
+    "case, points, profile",
     [
         *((case, WAYPOINTS, "cone") for case in CASES if case != "mirrored, odd"),
         ("mirrored", WAYPOINTS, "gaussian"),

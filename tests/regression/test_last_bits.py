@@ -31,7 +31,7 @@ from digiclay.strokes.nominal import Device, find_nominal
 from digiclay.strokes.stroke import Brush, Image, Sample, Stroke, make_images
 from digiclay.strokes.tracking import Tracking
 
-from tests.assemble import sample
+from tests.assemble import assert_near, sample
 from tests.scenes.test_hands import FINGER as PAPER_FINGER
 from tests.scenes.test_hands import PERIOD, REST, press, scene
 from tests.scenes.test_hands import follow as simulate
@@ -80,7 +80,7 @@ class Shaken:
 
 
 @pytest.mark.parametrize(
-    ("name", "method", "lasting", "seed"),
+    "name, method, lasting, seed",
     [
         pytest.param("plastic_press", "cell_states", 1.3, 0, id="II: cells one pitch behind the fingertip"),
         pytest.param("circle", "cell_states", 2.7, 0, id="II: cells as far as the radius of the flat top"),
@@ -112,7 +112,7 @@ def test_a_run_is_the_same_when_all_it_reads_is_shaken(name, method, lasting, se
 
 
 @pytest.mark.parametrize(
-    ("method", "apart", "depth"),
+    "method, apart, depth",
     [
         pytest.param("virtual_master", 15e-3, 2e-3, id="it presses later"),
         pytest.param("hybrid", 12e-3, 0.0, id="pins rise into it beside another fingertip"),
@@ -130,8 +130,8 @@ def test_a_fingertip_at_the_very_height_of_pins_is_as_one_a_rounding_error_above
         poses[:, :, 1, 2] = REST * (1.0 + error) - depth * np.clip(time / 0.2 - 1.0, 0.0, 1.0)
         ends.append(simulate(system, poses))
     for state, forces in ends[1:]:
-        np.testing.assert_allclose(state.row(0), ends[0][0].row(0), rtol=0.0, atol=HEIGHT)
-        np.testing.assert_allclose(forces, ends[0][1], rtol=0.0, atol=FORCE)
+        assert_near(state.row(0), ends[0][0].row(0), HEIGHT)
+        assert_near(forces, ends[0][1], FORCE)
 
 
 #: Heights off the bed, mm, at places x, y, mm: each with equal heights at places that are none's neighbor.
@@ -166,7 +166,7 @@ def test_features_and_triangles_are_the_same_when_heights_are_shaken(relief, arr
         ]
         for one, other in zip(found, known, strict=True):
             for line, own in zip(one.crests, other.crests, strict=True):
-                np.testing.assert_allclose(line, own, rtol=0.0, atol=1e-8)
+                assert_near(line, own, 1e-8)
 
 
 #: A bed of 40 mm, m, its device without and with a blister, and what a stroke keeps to that leads one.
@@ -262,9 +262,9 @@ def test_a_stroke_goes_the_same_way_when_all_it_reads_is_shaken(name):
     assert len(poses) > 3
     for seed in range(4):
         shaken_poses, shaken_nominal = STROKES[name].form(np.random.default_rng(seed))
-        np.testing.assert_allclose(shaken_nominal, nominal, rtol=0.0, atol=HEIGHT)
+        assert_near(shaken_nominal, nominal, HEIGHT)
         assert len(shaken_poses) == len(poses)
-        np.testing.assert_allclose(shaken_poses, poses, rtol=0.0, atol=HEIGHT)
+        assert_near(shaken_poses, poses, HEIGHT)
 
 
 @pytest.mark.parametrize("arrangement", ["aligned", "hexagonal"])
@@ -293,7 +293,7 @@ def test_a_fingertip_that_hovers_exactly_on_a_pin_changes_nothing_of_what_anothe
 
         forces.append(play(bed, at_times(bed, [rock(0), hover], 30))[1])
     # Rounding; 0.16 mN where one that presses by the last bit has the pin moved as under both.
-    np.testing.assert_allclose(forces[1:], forces[:1] * 5, rtol=0.0, atol=1e-9)
+    assert_near(forces[1:], forces[:1] * 5, 1e-9)
 
 
 @pytest.mark.parametrize("arrangement", ["aligned", "hexagonal"])

@@ -12,6 +12,7 @@ from digiclay.core.scene.toml_table import ABSENT, format_scene
 from digiclay.core.session import snapshot
 from digiclay.core.session.take import from_bytes
 
+from tests.assemble import assert_near
 from tests.renew import SAMPLES, go_on
 
 #: m and N: other processors and versions of numpy take sums in another order. On those of the samples' README
@@ -96,7 +97,7 @@ def test_a_kept_state_of_an_older_version_is_what_it_was_and_the_session_goes_on
     np.testing.assert_array_equal(state.mode(), known["mode"])
     np.testing.assert_array_equal(state.aged, known["aged"])
     found = go_on(path)
-    np.testing.assert_allclose(found["height"], known["height"], rtol=0.0, atol=ROUNDING)
+    assert_near(found["height"], known["height"], ROUNDING)
     np.testing.assert_allclose(found["force"], known["force"], rtol=RELATIVE, atol=ROUNDING)
     # Its heights are taken up by another session.
     state = snapshot.transfer_heights(system, path.read_bytes())
@@ -108,4 +109,4 @@ def test_a_kept_state_of_an_older_version_is_what_it_was_and_the_session_goes_on
 def test_a_take_of_an_older_version_is_played_as_it_was(path):
     take, known = from_bytes(path.read_bytes()), np.load(path.with_suffix(".npz"))
     np.testing.assert_array_equal(take.poses, known["poses"][:, None])
-    np.testing.assert_allclose(go_on(path)["height"], known["height"], rtol=0.0, atol=ROUNDING)
+    assert_near(go_on(path)["height"], known["height"], ROUNDING)

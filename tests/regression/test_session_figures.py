@@ -34,7 +34,7 @@ def between(session, start, end):
     return total, np.hypot(*(centroid - finger).T)
 
 
-@pytest.mark.parametrize(("start", "end"), [(5.5, 10.0), (18.5, 25.0)], ids=["ridge", "valley"])
+@pytest.mark.parametrize("start, end", [(5.5, 10.0), (18.5, 25.0)], ids=["ridge", "valley"])
 def test_the_force_stays_near_its_set_point_and_the_blister_under_the_finger_while_it_drags(
     session, start, end
 ):

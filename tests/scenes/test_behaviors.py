@@ -65,7 +65,7 @@ def test_a_plastic_bed_stays_at_the_deepest_press_and_as_it_is_under_a_shallower
     assert np.abs(heights(result)[-1] - before).max() <= DEAD_BAND
 
 
-@pytest.mark.parametrize(("time_constant", "diffusivity"), [(0.3, 10e-6), (1.0, 0.0)])
+@pytest.mark.parametrize("time_constant, diffusivity", [(0.3, 10e-6), (1.0, 0.0)])
 def test_a_viscous_dent_s_volume_recovers_with_its_time_constant(time_constant, diffusivity):
     result = run(scene("viscous", recovery_time=time_constant, diffusivity=diffusivity, side=17))
     first, last = at(result, 2.1), at(result, 2.1 + time_constant)
@@ -147,7 +147,7 @@ def displayed(refresh, shape="crater", **known):
 
 
 @pytest.mark.parametrize(
-    ("refresh", "shape"), [("one_time", "saddle"), ("gradual", "pyramid"), ("approximate_gradual", "file")]
+    "refresh, shape", [("one_time", "saddle"), ("gradual", "pyramid"), ("approximate_gradual", "file")]
 )
 def test_the_display_reaches_its_shape(refresh, shape, tmp_path):
     if shape == "file":

@@ -39,7 +39,7 @@ LIFT = [(0, 0, 0, 43), (0.8, 0, 0, 36), (1.2, 0, 0, 37), (3.2, 0, 0, 46)]
 
 
 @pytest.mark.parametrize(
-    ("method", "arrangement"), [*(("cell_states", name) for name in ("aligned", "staggered", "hexagonal"))]
+    "method, arrangement", [*(("cell_states", name) for name in ("aligned", "staggered", "hexagonal"))]
 )
 def test_a_slow_lift_pulls_the_clay_up_after_the_finger(method, arrangement):
     # The finger ends 6 mm above the surface; the pins under it press into it from below.
@@ -117,7 +117,7 @@ def test_noise_is_no_touch(method):
 
 
 @pytest.mark.parametrize(
-    ("method", "noise"),
+    "method, noise",
     [("virtual_master", 21.0), ("cell_states", 8.1), ("plastic", 6.1), ("force_display", 10.1)],
 )
 def test_noise_that_hides_what_is_asked_for_is_refused_in_one_line(method, noise):

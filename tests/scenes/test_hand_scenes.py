@@ -46,7 +46,7 @@ def sample(name):
 
 
 @pytest.mark.parametrize(
-    ("name", "fingers"), [("two_hands_bowl", 4), ("pinch_crease", 2), ("five_fingers_mound", 5)]
+    "name, fingers", [("two_hands_bowl", 4), ("pinch_crease", 2), ("five_fingers_mound", 5)]
 )
 def test_a_sample_of_hands_loses_no_finger_and_forms_what_it_is_called(name, fingers):
     done = sample(name)
@@ -70,7 +70,7 @@ def test_a_sample_of_hands_loses_no_finger_and_forms_what_it_is_called(name, fin
 
 
 @pytest.mark.parametrize(
-    ("command", "made"),
+    "command, made",
     [
         (["describe", "my.toml"], ()),
         (["describe", "my.toml", "--parameters"], ()),
@@ -89,7 +89,7 @@ def test_a_command_takes_a_scene_of_two_fingers(command, made, tmp_path, monkeyp
 
 
 @pytest.mark.parametrize(
-    ("command", "said"),
+    "command, said",
     [
         ([*SHAPED[:-2], "--finger", "press"], "formed by the first of 2 fingers alone"),
         (["compare", "my.toml", "--speed", "--out", "out"], "Followed, the first of the fingers alone, "),
@@ -166,7 +166,7 @@ def test_a_run_of_two_fingers_is_read_back_and_one_with_too_few_is_refused(broke
 
 
 @pytest.mark.parametrize(
-    ("code", "word", "like"),
+    "code, word, like",
     [
         (COPY, "one.py:MethodOne", "virtual_master"),
         (COPY_TWO, "two.py:MethodOne", "cell_states"),

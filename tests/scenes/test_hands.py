@@ -24,6 +24,8 @@ from digiclay.core.session.accuracy import Replay
 from digiclay.core.session.run_scene import run
 from scipy.integrate import solve_ivp
 
+from tests.assemble import assert_near
+
 PAPER = load(find("ridge_mound_valley"))
 (FINGER,) = PAPER.fingers
 PERIOD, REST = 5e-3, 40e-3
@@ -69,9 +71,9 @@ def test_fingers_far_from_each_other_form_what_each_forms_alone(method):
     single = [follow(alone, poses[:, :, [finger]]) for finger in range(3)]
     state, forces = follow(assemble(scene(method, *[FINGER] * 3)), poses)
     # Rounding alone: sums go over the cells in another order; viscous pins depend on the active set.
-    np.testing.assert_allclose(forces, np.hstack([own for _, own in single]), rtol=0, atol=1e-9)
+    assert_near(forces, np.hstack([own for _, own in single]), 1e-9)
     formed = sum(own.row(0) - REST for own, _ in single)
-    np.testing.assert_allclose(state.row(0) - REST, formed, rtol=0, atol=1e-10)
+    assert_near(state.row(0) - REST, formed, 1e-10)
 
 
 def pose_of(finger, apart):
@@ -137,7 +139,7 @@ LONG = replace(
 
 
 @pytest.mark.parametrize(
-    ("apart", "other"),
+    "apart, other",
     [(5e-3, FINGER), (7e-3, FINGER), (6e-3, SOFT), (7e-3, LONG), (6e-3, replace(FINGER, relaxation=None))],
     ids=["5 mm", "7 mm", "another exponent", "another size and relaxation", "one elastic"],
 )
@@ -156,8 +158,8 @@ def test_a_cell_that_two_fingers_press_moves_by_the_sum_of_their_forces(apart, o
     found, cell = np.array(rows), int(pressed.argmax())
     height, force, double = integrate(system, cell, commands, ways)
     # What issue 26 asks for: 3 µm and 3 mN.
-    np.testing.assert_allclose(found[:, 0, cell], height, rtol=0, atol=3e-6)
-    np.testing.assert_allclose(found[:, 1, cell], force, rtol=0, atol=3e-3)
+    assert_near(found[:, 0, cell], height, 3e-6)
+    assert_near(found[:, 1, cell], force, 3e-3)
     assert double > 10
 
 
@@ -169,11 +171,11 @@ def test_a_third_finger_that_hovers_over_two_that_meet_changes_nothing(method):
     (alone, forces), (state, all_forces) = follow(two, poses[:, :, :2]), follow(three, poses)
     assert not all_forces[:, 2].any()
     # Rounding alone: sums go over the cells in another order.
-    np.testing.assert_allclose(all_forces[:, :2], forces, rtol=0, atol=1e-9)
-    np.testing.assert_allclose(state.row(0), alone.row(0), rtol=0, atol=1e-12)
+    assert_near(all_forces[:, :2], forces, 1e-9)
+    assert_near(state.row(0), alone.row(0), 1e-12)
 
 
-@pytest.mark.parametrize(("below", "known"), [(0.1e-3, False), (0.3e-3, True)])
+@pytest.mark.parametrize("below, known", [(0.1e-3, False), (0.3e-3, True)])
 def test_nobody_knows_who_presses_a_pin_just_below_two_predicted_fingertips(below, known):
     system = assemble(scene("hybrid", FINGER, FINGER))
     hands = system.controller
@@ -206,7 +208,7 @@ def drag(system, apart, angle, turn):
 
 
 @pytest.mark.parametrize(
-    ("apart", "angle", "turn"),
+    "apart, angle, turn",
     [
         (10.5, 120, 90), (12.0, 0, 90), (12.0, 160, 90), (12.0, 160, 0), (13.7, 30, 90), (15.0, 15, 90),
     ],
@@ -259,8 +261,8 @@ def test_the_order_of_the_fingers_changes_nothing(method):
     second = assemble(scene(method, *(UNLIKE[finger] for finger in order)))
     state, swapped = follow(second, first.poses[:, :, order])
     # Rounding alone: forces and shares are added in another order.
-    np.testing.assert_allclose(swapped, first.forces[:, order], rtol=0, atol=1e-9)
-    np.testing.assert_allclose(state.row(0), first.last.row(0), rtol=0, atol=1e-11)
+    assert_near(swapped, first.forces[:, order], 1e-9)
+    assert_near(state.row(0), first.last.row(0), 1e-11)
 
 
 @pytest.mark.parametrize("method", [None, *METHODS])
@@ -282,7 +284,7 @@ def test_fingers_that_come_and_go_leave_the_others_what_they_have(method):
     after, force = follow(one, np.repeat(still[:, :, [1]], 5, axis=0), kept)
     _, forces = follow(three, np.repeat(still, 5, axis=0), state)
     # A set that is made anew adds up in another order.
-    np.testing.assert_allclose(force[:, 0], forces[:, 1], rtol=0, atol=1e-6)
+    assert_near(force[:, 0], forces[:, 1], 1e-6)
     more = snapshot.change_fingers(one, three, after, [None, 0, None])
     _, again = follow(three, np.repeat(still, 3, axis=0), more)
     assert np.isfinite(again).all()
@@ -352,7 +354,7 @@ def test_pins_that_a_display_raises_against_resting_fingers_press_each_as_alone(
         assert state.active.block[0].max() <= state.active.peak  # or pins that are touched may be left out
     alone = [follow(one, poses[:, :, [finger]])[1] for finger in range(2)]
     assert np.max(forces, axis=0).min() > 0.05
-    np.testing.assert_allclose(forces, np.hstack(alone), rtol=0, atol=1e-9)
+    assert_near(forces, np.hstack(alone), 1e-9)
 
 
 @pytest.mark.parametrize("method", [None, "virtual_master", "hybrid"])
@@ -384,9 +386,7 @@ def test_a_run_of_two_fingers_has_the_metrics_of_each_and_its_errors():
     both = scene("virtual_master", FINGER, replace(FINGER, trajectory=aside), simulation=short)
     result = run(replace(both, recorder=PAPER.recorder))
     assert result.history["fingertip"].shape[1:] == (2, 7)
-    np.testing.assert_allclose(
-        result.history["finger_force"].sum(axis=1), result.history["total_force"], rtol=0, atol=1e-12
-    )
+    assert_near(result.history["finger_force"].sum(axis=1), result.history["total_force"], 1e-12)
     first, second = result.metrics["fingers"]
     alone = run(replace(scene("virtual_master", FINGER, simulation=short), recorder=PAPER.recorder)).metrics
     assert first["rfd"] == pytest.approx(alone["rfd"], rel=1e-6)
@@ -405,4 +405,4 @@ def test_the_pulp_of_a_finger_that_went_forgets_while_another_one_hovers_where_i
     poses[40:80, :, 0, 0] += 60e-3
     _, alone = follow(one, poses[:, :, :1])
     _, forces = follow(two, poses)
-    np.testing.assert_allclose(forces[:, :1], alone, rtol=0, atol=1e-9)  # rounding; 40 mN if it does not
+    assert_near(forces[:, :1], alone, 1e-9)  # rounding; 40 mN if it does not

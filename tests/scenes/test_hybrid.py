@@ -59,7 +59,7 @@ def test_it_holds_the_force_better_than_method_i_turned_finger_or_not(turn):
     assert three < 0.55 * one
 
 
-@pytest.mark.parametrize(("turn", "pitch"), [(90.0, 0.0), (105.0, 30.0)], ids=["across", "across, tilted"])
+@pytest.mark.parametrize("turn, pitch", [(90.0, 0.0), (105.0, 30.0)], ids=["across", "across, tilted"])
 def test_a_finger_across_its_way_between_two_rows_of_pins_is_held_as_well(turn, pitch):
     poses = drag_row(np.radians(turn), np.radians(pitch))
     bed = {"columns": 25, "rows": 15}
@@ -73,7 +73,7 @@ def test_a_finger_across_its_way_between_two_rows_of_pins_is_held_as_well(turn, 
 
 
 @pytest.mark.parametrize(
-    ("way", "speed", "orifice", "deviation"),
+    "way, speed, orifice, deviation",
     [
         # Measured 0.009, 0.015 and 0.06 N; Method I loses all of them but the lift.
         (Drag(), 50e-3, 0.5e-3, 0.02),

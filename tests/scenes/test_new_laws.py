@@ -190,7 +190,7 @@ def test_new_laws_and_a_new_behavior_are_a_file_and_a_line_each(copy):
 
 
 @pytest.mark.parametrize(
-    ("base", "name", "said"),
+    "base, name, said",
     [
         (ExponentialLaw, "tension", "tension must be that of ExponentialLaw: the closed form"),
         (ExponentialLaw, "_numbers", "_numbers must be that of ExponentialLaw: the closed form"),
@@ -205,7 +205,7 @@ def test_a_class_that_the_steps_cannot_see_is_refused_in_a_line(base, name, said
 
 
 @pytest.mark.parametrize(
-    ("number", "old", "new", "said"),
+    "number, old, new, said",
     [
         (0, "def flow_law", "def flows", "EqualPercentage without flow_law"),
         (1, "Pad(ExponentialLaw, ", "Pad(", "contact.pad must derive from Parameters and ExponentialLaw"),

@@ -39,7 +39,7 @@ def imported(*settings):
 
 
 @pytest.mark.parametrize(
-    ("without", "with_", "modules"),
+    "without, with_, modules",
     [
         (("conduit=absent",), (), {"model.conduit"}),
         (("fingertip=absent",), (), {"model.relaxation"}),

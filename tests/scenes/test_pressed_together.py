@@ -11,6 +11,7 @@ from digiclay.core.model.touch import compute_force
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.session.accuracy import Replay
 
+from tests.assemble import assert_near
 from tests.scenes.test_hands import FINGER, LONG, PAPER, PERIOD, REST, SOFT, integrate, press, scene
 
 
@@ -77,7 +78,7 @@ SLACK = replace(FINGER, contact=replace(FINGER.contact, exponent=1000.0, stiffne
 STEEP = replace(FINGER, contact=replace(FINGER.contact, exponent=2e4))
 
 
-@pytest.mark.parametrize(("other", "most"), [(FINGER, 0.3e-3), (SOFT, 0.3e-3), (SLACK, 0.4e-3)])
+@pytest.mark.parametrize("other, most", [(FINGER, 0.3e-3), (SOFT, 0.3e-3), (SLACK, 0.4e-3)])
 def test_on_a_locked_pin_the_forces_of_fingers_that_rock_agree_with_scipy(other, most):
     system = replaying((FINGER, other), np.zeros((30, 1)), layout=Layout(rows=1, columns=1))
     ways = [rock(0), rock(1)]
@@ -87,12 +88,12 @@ def test_on_a_locked_pin_the_forces_of_fingers_that_rock_agree_with_scipy(other,
     assert pressed[0] >= 10
     # 0.17, 0.21 and 0.33 mN; 0.6 by the trapezoidal rule, 0.7 in one part, 1.1 without the bend of the way,
     # 0.35 if a finger may be pressed harder than alone, 1.7 where another m is not of equal slope.
-    np.testing.assert_allclose(force[:, 0], exact, rtol=0, atol=most)
+    assert_near(force[:, 0], exact, most)
 
 
 @pytest.mark.parametrize("fingers", [(FINGER, FINGER), (FINGER, SOFT, LONG)])
 @pytest.mark.parametrize(
-    ("parts", "height_error", "force_error"),
+    "parts, height_error, force_error",
     [({"actuator": NARROW}, 0.1e-3, 5e-3), ({"valve": WIDE}, 0.1e-3, 50e-3)],
     ids=["bore 0.2 mm", "orifice 2 mm"],
 )
@@ -104,8 +105,8 @@ def test_stiff_pins_under_several_fingers_agree_with_scipy(fingers, parts, heigh
     cell = int(pressed.argmax())
     height, force, _ = integrate(system, cell, commands, ways)
     # Measured 58 µm, and 2 and 35 mN; such cases are bounded, not accurate (docs/stability.md).
-    np.testing.assert_allclose(heights[:, cell], height, rtol=0, atol=height_error)
-    np.testing.assert_allclose(forces[:, cell], force, rtol=0, atol=force_error)
+    assert_near(heights[:, cell], height, height_error)
+    assert_near(forces[:, cell], force, force_error)
 
 
 @pytest.mark.parametrize("seed", [0, 3])

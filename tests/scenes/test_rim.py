@@ -78,7 +78,7 @@ TURNED = [
 ]
 
 
-@pytest.mark.parametrize(("way", "image"), TURNED)
+@pytest.mark.parametrize("way, image", TURNED)
 @pytest.mark.parametrize("method", METHODS)
 def test_a_finger_that_slides_off_raises_no_pin(method, way, image):
     # 8 to 36 mm with Method I, up to 3 with Method III without a rim. Method II raises flanks on a whole bed.
@@ -151,7 +151,7 @@ def deviation(method, beyond, image, outside=0.0):
 
 
 @pytest.mark.parametrize(
-    ("beyond", "image", "most"),
+    "beyond, image, most",
     [
         (-3.0, "as it is", 0.03), (0.0, "turned", 0.03), (1.0, "turned about", 0.05), (2.0, "mirrored", 0.11),
         (3.0, "turned again", 0.09), (5.0, "turned", 0.09),
@@ -165,7 +165,7 @@ def test_along_the_rim_method_three_is_no_worse_than_method_one(beyond, image, m
 
 
 @pytest.mark.parametrize(
-    ("beyond", "image", "most"),
+    "beyond, image, most",
     [(0.0, "as it is", 1.75), (1.5, "mirrored", 1.5), (5.0, "as it is", 1.1), (0.0, "turned", 0.7)],
 )
 def test_pressed_in_from_outside_method_three_is_as_much_worse_as_the_page_says(beyond, image, most):

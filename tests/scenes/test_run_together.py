@@ -136,7 +136,7 @@ def test_runs_with_parameters_of_their_own_come_to_what_they_come_to_alone(chang
 
 
 @pytest.mark.parametrize(
-    ("name", "keys", "settings", "errors"),
+    "name, keys, settings, errors",
     [
         ("elastic_press", {"stiffness": (10, 40), "settling_time": (20e-3, 40e-3)}, ("duration=0.5",), False),
         ("plastic_press", {"yield_force": (0.02, 0.05), "damping": (5, 8)}, ("duration=0.5",), False),
@@ -156,7 +156,7 @@ def test_behaviors_and_steppers_do_what_they_do_alone(name, keys, settings, *, e
 
 
 @pytest.mark.parametrize(
-    ("name", "key", "values", "settings"),
+    "name, key, values, settings",
     [
         ("tap", "control.force_gain", (3, 5), ("layout.arrangement=hexagonal",)),
         ("slow_press", "control.force_gain", (3, 5), ("recorder.every=7", "simulation.duration=0.503")),
@@ -195,7 +195,7 @@ def test_pins_on_end_stops_and_relaxed_pulp_come_to_what_they_come_to_alone():
 
 
 @pytest.mark.parametrize(
-    ("name", "settings", "lasting"),
+    "name, settings, lasting",
     [
         ("tap", ("control=absent", "fingertip=absent"), 0.1),
         ("dome_peaked", ("layout.rows=11", "layout.columns=11"), 1.4),
@@ -241,7 +241,7 @@ def test_a_stack_without_recorder_has_no_history_shares_its_time_and_can_be_stop
     assert list(run_together(scenes, stopped=lambda: True)) == []
 
 
-@pytest.mark.parametrize(("every", "errors"), [(1, False), (2, True)], ids=["not asked for", "no commands"])
+@pytest.mark.parametrize("every, errors", [(1, False), (2, True)], ids=["not asked for", "no commands"])
 def test_without_all_commands_or_unasked_a_run_is_judged_without_errors_or_history(every, errors):
     (only,) = judged([sample("tap", f"recorder.every={every}", "simulation.duration=0.05")], errors=errors)
     assert only.history == {}
@@ -294,7 +294,7 @@ def test_runs_with_noise_of_their_own_come_to_what_they_come_to_alone(method):
 
 
 @pytest.mark.parametrize(
-    ("method", "sensors", "noise"),
+    "method, sensors, noise",
     [
         ("virtual_master", ("height_step=20e-6", "force_step=1e-3"), True),
         ("cell_states", ("delay=2", "height_step=5e-6"), True),

@@ -164,7 +164,7 @@ def test_without_a_part_tracked_hands_are_no_fingers():
 
 
 @pytest.mark.parametrize(
-    ("coupling", "depth", "soft"), [(100.0, 10e-3, True), (100.0, 2e-3, True), (0.0, 2e-3, False)]
+    "coupling, depth, soft", [(100.0, 10e-3, True), (100.0, 2e-3, True), (0.0, 2e-3, False)]
 )
 def test_fingers_of_a_pad_that_have_their_whole_depth_at_once_need_the_coupling(coupling, depth, soft):
     scene = load(find("ridge_mound_valley"))

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from tests.assemble import assert_near
 from tests.window.blender_window import up
 from tests.window.hand_brushes import HALF, LONG, SPIKE
 
@@ -13,7 +14,7 @@ COLUMNS = np.abs(np.arange(-36, 37, 3)) <= LONG
 MIDDLE, ABOVE = (12, 12), (18, 12)
 
 
-@pytest.mark.parametrize(("name", "row"), [("raised", 12), ("inverted", 5)])
+@pytest.mark.parametrize("name, row", [("raised", 12), ("inverted", 5)])
 def test_a_quick_drag_of_60_mm_raises_all_its_columns_by_15_mm(seen, name, row):
     risen = up(seen, name)[row, COLUMNS]
     assert (np.abs(risen - 15.0) < 2.0).mean() >= 0.95
@@ -23,7 +24,7 @@ def test_ctrl_lowers_level_fills_a_valley_the_header_smooths_and_a_click_with_sh
     assert (up(seen, "lowered")[12, COLUMNS] < -1.0).mean() >= 0.95
     assert up(seen, "lowered")[12, 12] < -1.0
     # The pin in the middle of the crossing, and its neighbors along the stroke.
-    np.testing.assert_allclose(up(seen, "leveled")[10:15, 12], 0.0, rtol=0, atol=1.5)
+    assert_near(up(seen, "leveled")[10:15, 12], 0.0, 1.5)
     assert up(seen, "by brush")[ABOVE] < 0.4e3 * SPIKE
     assert up(seen, "line")[4, 3:22].max() < -1.0
 
@@ -42,7 +43,7 @@ def test_shift_and_a_drag_smooth_a_spike_in_one_stroke(seen):
 
 
 @pytest.mark.parametrize(
-    ("name", "before", "tolerance"),
+    "name, before, tolerance",
     [
         # The script's reset before it was no undo step: what it removed is there again, as it was when the
         # stroke ended; pins still settled then by some µm.
@@ -52,6 +53,6 @@ def test_shift_and_a_drag_smooth_a_spike_in_one_stroke(seen):
     ],
 )
 def test_what_is_taken_back_is_as_before(seen, name, before, tolerance):
-    np.testing.assert_allclose(up(seen, name), up(seen, before), rtol=0, atol=tolerance)
+    assert_near(up(seen, name), up(seen, before), tolerance)
     assert seen[name]["sessions"] == 1
     assert np.abs(up(seen, "inverted") - up(seen, "raised")).max() > 10.0

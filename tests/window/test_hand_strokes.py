@@ -25,7 +25,7 @@ def test_a_stroke_is_formed_in_all_its_columns_and_nowhere_else(seen, when):
 
 
 @pytest.mark.parametrize(
-    ("name", "formed"),
+    "name, formed",
     [
         ("before the taps", [False, False, False]),
         pytest.param("taps", [True, True, True], id="three presses within a second all form"),

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+from tests.assemble import assert_near
 from tests.window.blender_window import up
 from tests.window.hand_verbs import CENTER
 
@@ -28,11 +29,11 @@ def test_erasing_brings_a_groove_back_to_rest_but_for_locked_pins(seen):
 
 
 @pytest.mark.parametrize(
-    ("name", "before"),
+    "name, before",
     [("erasing undone", "locked"), ("inverting undone", "erasing undone"), ("stamping undone", "cleared")],
 )
 def test_each_is_one_undo_step(seen, name, before):
-    np.testing.assert_allclose(up(seen, name), up(seen, before), rtol=0, atol=1e-3)
+    assert_near(up(seen, name), up(seen, before), 1e-3)
     np.testing.assert_array_equal(locked(seen, name), locked(seen, before))
     assert seen[name]["sessions"] == 1
 
@@ -44,7 +45,7 @@ def test_locks_are_turned_over_taken_off_by_ctrl_and_cleared(seen):
     assert not left[6:12, 12].any()
     assert left[16:19, 12].all()
     assert not locked(seen, "cleared").any()
-    np.testing.assert_allclose(up(seen, "cleared"), up(seen, "erasing undone"), rtol=0, atol=1e-3)
+    assert_near(up(seen, "cleared"), up(seen, "erasing undone"), 1e-3)
 
 
 def test_a_stamp_stands_where_and_as_large_as_it_was_drawn_and_ctrl_presses_it_in(seen):

@@ -38,7 +38,7 @@ def test_a_session_waits_for_a_render_and_outlives_the_view_it_was_started_in(se
     assert "internal error" not in seen["output"]
 
 
-@pytest.mark.parametrize(("name", "place"), [("orthographic", (-15e-3, 9e-3)), ("quad view", (15e-3, -9e-3))])
+@pytest.mark.parametrize("name, place", [("orthographic", (-15e-3, 9e-3)), ("quad view", (15e-3, -9e-3))])
 def test_the_press_tool_presses_under_the_mouse_in_every_view(seen, name, place):
     # A pixel of the small views is up to 1 mm of the bed.
     np.testing.assert_allclose(seen[name]["pose"][:2], place, rtol=0, atol=1.5e-3)

@@ -5,6 +5,7 @@ import pytest
 from digiclay.core.model.fingertip import LEVEL, make_matrices
 from digiclay.press.pointer import FULL_TILT
 
+from tests.assemble import assert_near
 from tests.window.blender_window import ON_DISPLAY, played
 from tests.window.tablet.screen import pen_screen
 
@@ -19,7 +20,7 @@ def seen(tmp_path_factory):
 
 
 @pytest.mark.parametrize(
-    ("name", "depth", "angle"), [("firm", 4.0, 0.0), ("light", 2.0, 0.0), ("leaning", 4.0, 0.8 * FULL_TILT)]
+    "name, depth, angle", [("firm", 4.0, 0.0), ("light", 2.0, 0.0), ("leaning", 4.0, 0.8 * FULL_TILT)]
 )
 def test_a_pen_presses_as_deep_as_its_pressure_and_the_fingertip_leans_with_it_meanwhile(
     seen, name, depth, angle
@@ -29,5 +30,5 @@ def test_a_pen_presses_as_deep_as_its_pressure_and_the_fingertip_leans_with_it_m
     # Where its top points, along x, y and z of the bed; the tablet's tilt has steps of a degree.
     tops = make_matrices(np.array(seen[name]["inside"]))[:, :, 2]
     wanted = np.broadcast_to([np.sin(angle), 0.0, np.cos(angle)], tops.shape)
-    np.testing.assert_allclose(tops, wanted, rtol=0, atol=0.02 if angle else 1e-6)
-    np.testing.assert_allclose(seen[name]["outside"], LEVEL, rtol=0, atol=1e-6)
+    assert_near(tops, wanted, 0.02 if angle else 1e-6)
+    assert_near(seen[name]["outside"], LEVEL, 1e-6)

@@ -10,7 +10,7 @@ PLAYED = {"script": "press_sizes.py", "size": (800, 560), "by_hand": True}
 
 
 @pytest.mark.parametrize(
-    ("name", "size", "tolerance"),
+    "name, size, tolerance",
     [
         # A pixel is 0.3 mm of the bed.
         pytest.param("larger", 16.0 + 2.0 * WIDER, 1.2, id="the rim follows the mouse"),

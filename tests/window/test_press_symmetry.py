@@ -3,13 +3,14 @@
 import numpy as np
 import pytest
 
+from tests.assemble import assert_near
 from tests.window.blender_window import FORMED, down
 
 PLAYED = {"script": "press_symmetry.py", "size": (800, 560), "by_hand": True}
 
 
 @pytest.mark.parametrize(
-    ("name", "alone", "fingers", "longer"),
+    "name, alone, fingers, longer",
     [
         pytest.param("radial", "one", 4, 1.05, id="four turned images"),
         pytest.param("mirrored", "one", 2, 1.05, id="two mirrored ones"),
@@ -24,7 +25,7 @@ def test_images_take_about_as_many_periods_as_one(seen, name, alone, fingers, lo
 
 
 @pytest.mark.parametrize(
-    ("name", "turns"),
+    "name, turns",
     [
         ("radial", [np.rot90]),
         ("mirrored", [np.fliplr]),
@@ -37,7 +38,7 @@ def test_images_are_alike_on_a_turned_bed(seen, name, turns):
     formed = down(seen, name)
     assert formed.max() > FORMED
     for turn in turns:  # the valves place pins to 1 µm; heights are noted to as much
-        np.testing.assert_allclose(formed, turn(formed), rtol=0, atol=3e-3)
+        assert_near(formed, turn(formed), 3e-3)
 
 
 def test_twelve_images_on_a_large_bed_take_the_periods_of_one(seen):
@@ -56,10 +57,10 @@ def test_strokes_of_other_symmetries_wait_in_a_queue_and_are_taken_back_one_by_o
     assert (two[22, [14, 16, 10, 8]] < FORMED).any()
     for row, column in ((17, 5), (7, 5), (17, 21), (21, 7), (7, 3), (3, 17)):
         assert two[row, column] > FORMED, (row, column)
-    np.testing.assert_allclose(down(seen, "escaped"), two, rtol=0, atol=3e-3)
+    assert_near(down(seen, "escaped"), two, 3e-3)
 
 
 def test_what_is_recorded_is_replayed(seen):
     assert seen["at the end"] == [1, 7]
     assert seen["take"] == [4, 1]
-    np.testing.assert_allclose(down(seen, "replayed"), down(seen, "escaped"), rtol=0, atol=1e-3)
+    assert_near(down(seen, "replayed"), down(seen, "escaped"), 1e-3)

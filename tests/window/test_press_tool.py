@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from tests.assemble import assert_near
 from tests.window.blender_window import REST, bed
 
 PLAYED = {"script": "press_tool.py", "size": (1100, 720)}
@@ -18,7 +19,7 @@ def test_a_press_starts_a_session_and_puts_the_finger_under_the_mouse(seen):
     assert (seen["added"]["sessions"], seen["pressed"]["sessions"]) == (0, 1)
     # 18 mm, 6 mm to a pixel of the picture: the bed of 75 mm is 500 pixels wide. The fingertip waits within
     # 0.5 mm of the hand, the way of a control period.
-    np.testing.assert_allclose(finger(seen, "pressed")[:2], [18.0, 6.0], rtol=0, atol=0.8)
+    assert_near(finger(seen, "pressed")[:2], [18.0, 6.0], 0.8)
     # Its lowest point is below the tops of the pins that hold its force.
     assert -6.0 < finger(seen, "pressed")[2] - REST < -4.0
 
@@ -26,7 +27,7 @@ def test_a_press_starts_a_session_and_puts_the_finger_under_the_mouse(seen):
 def test_dragging_draws_a_valley_alone_and_let_go_the_fingertip_leaves_the_bed(seen):
     drawn = bed(seen, "let go")
     assert drawn[ROW, COLUMNS].max() < REST - 1.0
-    np.testing.assert_allclose(drawn[:4], REST, rtol=0, atol=1e-3)
+    assert_near(drawn[:4], REST, 1e-3)
     assert (finger(seen, "let go")[2] > REST, seen["let go"]["force"]) == (True, 0.0)
 
 

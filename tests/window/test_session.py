@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from tests.assemble import assert_near
 from tests.window.blender_window import played
 
 PLAYED = {"script": "sculpt_a_ridge.py", "size": (1000, 640)}
@@ -29,7 +30,7 @@ def test_dragging_moves_the_fingertip_of_a_bed_at_rest_and_nothing_else_without_
     assert (added["beds"], added["modes"][0]) == (1, 625)
     moved = np.subtract(dragged["pose"][:3], added["pose"][:3])
     # The mouse goes where 9 mm are seen, to a pixel: 0.2 mm.
-    np.testing.assert_allclose(moved, [9e-3, 0, 0], rtol=0, atol=0.5e-3)
+    assert_near(moved, [9e-3, 0, 0], 0.5e-3)
     assert dragged["heights"] == added["heights"]
     assert seen["drag undone"]["pose"] == added["pose"]
 
@@ -90,7 +91,7 @@ def test_a_file_saved_in_mid_session_is_loaded_as_it_was_and_esc_keeps_what_is_f
 
 
 @pytest.mark.parametrize(
-    ("stopped", "words", "again"),
+    "stopped, words, again",
     [
         ("fingertip deleted", "fingertip is deleted", "fingertip back"),
         ("in another scene", "no window shows its scene", "scene back"),
@@ -107,7 +108,7 @@ def test_a_session_waits_with_the_reason_and_goes_on(interrupted, stopped, words
 
 
 @pytest.mark.parametrize(
-    ("name", "sessions"),
+    "name, sessions",
     [
         pytest.param("in another workspace", 1, id="a session goes on in another workspace"),
         pytest.param("two beds", 2, id="each bed has a session of its own"),
@@ -194,6 +195,6 @@ def test_two_fingertips_press_each_with_its_force_and_a_hand_as_one(seen):
     assert min(seen["two pressed"]["forces"]) > 0.01
     moved = np.array(seen["hand pressed"]["poses"]) - seen["hand"]["poses"]
     # The mouse moves by pixels, of 0.7 mm in a view that has the bed beside the open overlay.
-    np.testing.assert_allclose(moved[2:], [[0.0, 0.0, -9.0]] * 5, rtol=0, atol=0.7)
-    np.testing.assert_allclose(moved[:2], 0.0, rtol=0, atol=1e-3)
+    assert_near(moved[2:], [[0.0, 0.0, -9.0]] * 5, 0.7)
+    assert_near(moved[:2], 0.0, 1e-3)
     assert min(seen["hand pressed"]["forces"]) > 0.01

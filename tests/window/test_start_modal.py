@@ -16,7 +16,7 @@ def test_every_modal_operator_prepares_before_it_becomes_modal(seen):
     assert all("Something fails." in found["said"][0] for found in failing)
 
 
-@pytest.mark.parametrize(("stamp", "modal", "sessions"), [("FILE", False, 0), ("heart", True, 1)])
+@pytest.mark.parametrize("stamp, modal, sessions", [("FILE", False, 0), ("heart", True, 1)])
 def test_a_stamp_of_a_file_that_is_not_there_is_refused_and_the_next_one_is_formed(
     seen, stamp, modal, sessions
 ):

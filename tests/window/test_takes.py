@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from tests.assemble import assert_near
 from tests.window.blender_window import REST, bed
 
 PLAYED = {"script": "keep_takes.py", "size": (1000, 640)}
@@ -37,8 +38,8 @@ def test_esc_in_a_replay_leaves_bed_and_finger_as_they_were_and_a_replay_ends_wh
     stopped, during, after = (seen[name] for name in ("stopped", "replaying", "replay stopped"))
     assert during["pose"] != stopped["pose"]
     assert (after["bed"], after["kept"]) == (stopped["bed"], stopped["kept"])
-    np.testing.assert_allclose(after["pose"], stopped["pose"], rtol=0, atol=1e-7)  # float32
-    np.testing.assert_allclose(bed(seen, "replayed"), bed(seen, "kept"), rtol=0, atol=SETTLING)
+    assert_near(after["pose"], stopped["pose"], 1e-7)  # float32
+    assert_near(bed(seen, "replayed"), bed(seen, "kept"), SETTLING)
     assert "bit for bit" in seen["output"]
 
 

@@ -7,6 +7,7 @@ from digiclay.core.session import snapshot
 from digiclay.live import beds, handlers, tick
 from digiclay.sessions import running, sculpting
 
+from tests.assemble import assert_near
 from tests.blender.session.live import FLOAT32, exact, move, only_bed, press, shown, started, undone
 
 
@@ -23,7 +24,7 @@ def test_undo_takes_back_one_gesture_exactly_and_the_session_goes_on(bed, clock)
     session = running.find(only_bed())
     assert snapshot.dump(session.system, session.state) == first
     assert session.pose[0] == pytest.approx(-6e-3, abs=FLOAT32)  # the finger has not come from elsewhere
-    np.testing.assert_allclose(shown(only_bed()), exact(only_bed()), rtol=0, atol=FLOAT32)
+    assert_near(shown(only_bed()), exact(only_bed()), FLOAT32)
     undone(clock)
     assert (exact(only_bed()) == 40e-3).all()
     bpy.ops.ed.redo()
@@ -110,10 +111,10 @@ def test_a_duplicate_carries_its_own_state_and_gets_a_fingertip(bed, clock, link
     before = exact(bed)
     press(copy, clock, 6.0)
     # Nobody presses the first one: its pins come to rest, 0.07 mm from where they are.
-    np.testing.assert_allclose(exact(bed), before, rtol=0, atol=0.1e-3)
+    assert_near(exact(bed), before, 0.1e-3)
     # Pressed 6 mm beside the first place: 0.9 mm.
     assert np.abs(exact(copy) - exact(bed)).max() > 0.5e-3
-    np.testing.assert_allclose(shown(bed), exact(bed), rtol=0, atol=FLOAT32)
+    assert_near(shown(bed), exact(bed), FLOAT32)
 
 
 def test_an_appended_bed_carries_its_state(bed, clock, tmp_path):

@@ -231,7 +231,7 @@ def test_the_session_follows_digiclay_serve(bed, clock, tmp_path):
 
 @SERVES
 @pytest.mark.parametrize(
-    ("number", "words"),
+    "number, words",
     [
         (signal.SIGKILL, "has ended"),
         (signal.SIGSTOP, "No pose from"),  # its port is open still

@@ -11,6 +11,7 @@ from digiclay.recorded import bake
 from digiclay.roles import fingertip_of
 from digiclay.sessions import running, sculpting
 
+from tests.assemble import assert_near
 from tests.blender.session.live import FLOAT32, TICK, exact, move, press, shown, started
 
 
@@ -26,7 +27,7 @@ def test_the_bed_forms_while_the_fingertip_moves_and_keeps_and_shows_what_the_se
     session = running.find(bed)
     assert beds.read_snapshot(bed) == snapshot.dump(session.system, session.state)
     assert np.array_equal(beds.read_poses(bed), session.poses)
-    np.testing.assert_allclose(shown(bed), exact(bed), rtol=0, atol=FLOAT32)
+    assert_near(shown(bed), exact(bed), FLOAT32)
     assert exact(bed).min() < 39e-3
 
 
@@ -104,7 +105,7 @@ def test_a_session_in_a_playback_has_the_path_that_a_bake_has(bed, clock, how):
     expected = np.interp(in_frames, frame_numbers, of_frames)
     if stretched == 1.0:
         *_, baked = bake.sample_path(scene, bed, start, start + 48, period)
-        np.testing.assert_allclose(baked[:, 0, 2], expected, rtol=0, atol=1e-7)
+        assert_near(baked[:, 0, 2], expected, 1e-7)
     clock.tick(3)
     bpy.ops.screen.animation_play()
     clock.tick()
@@ -117,7 +118,7 @@ def test_a_session_in_a_playback_has_the_path_that_a_bake_has(bed, clock, how):
     path = running.find(bed).recording.path
     assert len(path) == len(expected)
     # A frame lasts no whole number of periods: the way of one, at 0.75 mm a frame, may be gone early.
-    np.testing.assert_allclose(path[:, 0, 2], expected, rtol=0, atol=0.75e-3 / stretched * rate * period)
+    assert_near(path[:, 0, 2], expected, 0.75e-3 / stretched * rate * period)
     clock.tick(3)
     assert len(running.find(bed).recording.path) == len(path) + 20  # 0.1 s by the wall's clock
 
@@ -134,7 +135,7 @@ def test_two_beds_go_on_at_once_and_one_turned_moved_and_scaled_forms_like_the_o
     clock.tick()  # 45 ticks are whole periods: both beds see the path in the same phase
     press(bed, clock)
     # The matrices are float32: some 1e-7 of 3 units, at 0.1 m a unit.
-    np.testing.assert_allclose(turned, exact(bed), rtol=0, atol=2e-5)
+    assert_near(turned, exact(bed), 2e-5)
     assert len(running.list_sessions()) == 2
 
 
@@ -145,7 +146,7 @@ def test_a_method_that_is_changed_in_mid_session_takes_over_with_the_heights(bed
     bed.digiclay.method = "plastic"
     notes = clock.tick()
     assert ["heights were taken up" in note.message for note in notes] == [True]
-    np.testing.assert_allclose(exact(bed), before, rtol=0, atol=1e-5)  # pins were still coming to rest
+    assert_near(exact(bed), before, 1e-5)  # pins were still coming to rest
     assert running.find(bed).scene.method == "plastic"
 
 

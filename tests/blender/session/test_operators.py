@@ -18,6 +18,7 @@ from digiclay.sessions import running
 from digiclay.sessions.sculpting import change_stroke, queue_stroke
 from digiclay.strokes.stroke import lay_path, start
 
+from tests.assemble import assert_near
 from tests.blender.session.live import FLOAT32, exact, move, press, shown, started
 from tests.hand import let_go
 
@@ -28,8 +29,8 @@ def test_rewinding_puts_bed_and_fingertip_back(bed, clock):
     formed = exact(bed)
     press(bed, clock, 6.0)
     assert bpy.ops.digiclay.session_rewind() == {"FINISHED"}
-    np.testing.assert_allclose(exact(bed), formed, rtol=0, atol=1e-5)  # pins were still coming to rest
-    np.testing.assert_allclose(shown(bed), exact(bed), rtol=0, atol=FLOAT32)
+    assert_near(exact(bed), formed, 1e-5)  # pins were still coming to rest
+    assert_near(shown(bed), exact(bed), FLOAT32)
     assert bridge.pose(fingertip_of(bed))[2] > 45e-3
     assert bpy.ops.digiclay.session_rewind() == {"FINISHED"}
     assert (exact(bed) == 40e-3).all()
@@ -56,7 +57,7 @@ def test_reset_brings_the_bed_to_rest_with_a_session_or_without(bed, clock, live
     if not live:
         tick.stop(bed.session_uid)
     assert bpy.ops.digiclay.session_reset() == {"FINISHED"}
-    np.testing.assert_allclose(shown(bed), 40e-3, rtol=0, atol=FLOAT32)
+    assert_near(shown(bed), 40e-3, FLOAT32)
     assert (exact(bed) == 40e-3).all()
     bpy.context.view_layer.update()
     assert bridge.pose(fingertip_of(bed))[2] > 45e-3
@@ -93,7 +94,7 @@ def test_a_bed_of_another_view_layer_is_left_alone(bed):
 
 
 @pytest.mark.parametrize(
-    ("case", "wanted"),
+    "case, wanted",
     [("selected before", ["Digital Clay"]), ("not selected before", []), ("another is active", []),
      ("another was selected meanwhile", ["Cube"])],
 )  # fmt: skip
@@ -142,12 +143,12 @@ def test_a_script_finishes_strokes_at_once_and_what_was_in_haste_is_shown(bed, c
     clock.until(lambda: running.find(bed).state.row(0).min() < 37e-3)
     assert shown(bed).min() > 39.9e-3
     tick.end_haste(bpy.context)
-    np.testing.assert_allclose(shown(bed), running.find(bed).state.row(0), rtol=0, atol=FLOAT32)
+    assert_near(shown(bed), running.find(bed).state.row(0), FLOAT32)
     running.put(let_go(running.find(bed), 1))
     assert bpy.ops.digiclay.finish_strokes() == {"FINISHED"}
     assert running.find(bed).strokes == ()
     assert exact(bed).min() < 37e-3
-    np.testing.assert_allclose(shown(bed), exact(bed), rtol=0, atol=FLOAT32)
+    assert_near(shown(bed), exact(bed), FLOAT32)
 
 
 def test_the_ghost_is_there_with_the_queue_and_goes_with_it(bed, clock):

@@ -13,6 +13,7 @@ from digiclay.sessions.sculpting import change_stroke, queue_stroke
 from digiclay.strokes.stamps import load_stamp
 from digiclay.strokes.stroke import Brush, lay_path, make_images, start
 
+from tests.assemble import assert_near
 from tests.blender.session.live import FLOAT32, exact, only_bed, shown, started, undone
 
 #: Rows of the strokes, mm, and where they begin and end.
@@ -75,7 +76,7 @@ def slow(monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("when", "how"),
+    "when, how",
     [
         ("queued", "a session"), ("begun", "at once"),
         ("half-formed", "a session"), ("half-formed", "at once"),
@@ -101,7 +102,7 @@ def test_a_file_has_every_stroke_that_was_drawn(bed, clock, tmp_path, slow, when
         begin(only_bed())
         form(clock)
     np.testing.assert_array_equal(exact(only_bed()), formed)
-    np.testing.assert_allclose(shown(only_bed()), formed, rtol=0, atol=FLOAT32)
+    assert_near(shown(only_bed()), formed, FLOAT32)
     assert beds.read_queue(only_bed())[-1] == []
 
 
@@ -159,12 +160,12 @@ def test_without_a_session_undo_and_redo_leave_no_stroke_unformed(bed, clock, sl
         step()
         handlers.form_left()
         # Pins settle by hundredths of a millimeter when the fingertip has left.
-        np.testing.assert_allclose(exact(only_bed()), formed, rtol=0, atol=1e-4)
-        np.testing.assert_allclose(shown(only_bed()), exact(only_bed()), rtol=0, atol=FLOAT32)
+        assert_near(exact(only_bed()), formed, 1e-4)
+        assert_near(shown(only_bed()), exact(only_bed()), FLOAT32)
     for _ in range(3):
         bpy.ops.ed.undo()
     handlers.form_left()
-    np.testing.assert_allclose(shown(only_bed()), 40e-3, rtol=0, atol=FLOAT32)
+    assert_near(shown(only_bed()), 40e-3, FLOAT32)
 
 
 @pytest.mark.parametrize("stopped", [False, True])
@@ -175,7 +176,7 @@ def test_a_session_that_is_stopped_keeps_strokes_for_the_next_one(bed, clock, sl
     slow(clock, half_formed)
     if stopped:
         bpy.ops.digiclay.session_stop("EXEC_DEFAULT", True)
-        np.testing.assert_allclose(shown(bed), exact(bed), rtol=0, atol=FLOAT32)
+        assert_near(shown(bed), exact(bed), FLOAT32)
         begin(bed)
     form(clock)
     assert rows() == [True, False, True]

@@ -17,6 +17,7 @@ from digiclay.sessions import running, sculpting
 from digiclay.settings import properties
 from digiclay.strokes.stroke import make_images, start
 
+from tests.assemble import assert_near
 from tests.blender.at_hand import looked, select
 from tests.blender.session.live import exact, only_bed, shown, started, waits
 from tests.hand import let_go
@@ -118,7 +119,7 @@ def test_a_fingertip_that_is_added_in_mid_session_forms_too(pair, clock):
     assert clock.tick(3) == []
 
 
-@pytest.mark.parametrize(("how", "gone"), [("deleted", 1), ("removed", 2)])
+@pytest.mark.parametrize("how, gone", [("deleted", 1), ("removed", 2)])
 def test_the_session_goes_on_with_the_fingertips_that_are_left(pair, clock, gone, how):
     started(pair)
     press(pair, clock, 1, 2, lift=False)
@@ -186,7 +187,7 @@ def test_what_hangs_on_something_else_follows_that_and_is_still_the_bed_s(pair, 
     clock.tick()
     follows = ["nothing" not in what and part in (tip, tip.parent) for tip in own.values()]
     wanted = before + np.outer(follows, [0.0, 0.0, 0.01, 0.0, 0.0, 0.0, 0.0])
-    np.testing.assert_allclose(bridge.poses(pair), wanted, rtol=0, atol=2e-6)  # Blender's 32 bits
+    assert_near(bridge.poses(pair), wanted, 2e-6)  # Blender's 32 bits
     wanted = before + np.array([0.01, -0.02, 0.003, 0.0, 0.0, 0.0, 0.0])
     bridge.move_fingertips(pair, wanted, [bridge.finger_of(tip) for tip in own.values()])
     tick.stop(pair.session_uid)
@@ -198,7 +199,7 @@ def test_what_hangs_on_something_else_follows_that_and_is_still_the_bed_s(pair, 
     copy = next(thing for thing in bpy.context.scene.objects if roles.is_bed(thing) and thing != pair)
     assert len(fingertips_of(pair)) == 8
     for bed in (pair, copy):
-        np.testing.assert_allclose(bridge.poses(bed)[:7, :3], wanted[:, :3], rtol=0, atol=2e-6)
+        assert_near(bridge.poses(bed)[:7, :3], wanted[:, :3], 2e-6)
     hang(own[2], copy)  # from one bed to another
     assert (len(fingertips_of(pair)), len(fingertips_of(copy))) == (7, 8)
 
@@ -212,7 +213,7 @@ def test_a_palm_that_is_scaled_spreads_or_mirrors_its_fingertips_which_keep_thei
     looked()
     middle = np.array(bpy.context.object.location)[:2] / bridge.SCALE
     wanted = middle + (before - middle) * scale[:2]
-    np.testing.assert_allclose(bridge.poses(pair)[2:, :2], wanted, rtol=0, atol=1e-6)  # Blender's 32 bits
+    assert_near(bridge.poses(pair)[2:, :2], wanted, 1e-6)  # Blender's 32 bits
     for tip in fingertips_of(pair).values():
         size = np.abs(tip[roles.BALL].matrix_world.to_scale()) / bridge.SCALE
         np.testing.assert_allclose(size, tip[bridge.AXES], rtol=1e-5)
@@ -244,7 +245,7 @@ def test_fingertips_keep_their_numbers_where_one_between_is_deleted_or_comes_aft
     bpy.ops.digiclay.take_replay()
     assert (tuple(fingertips_of(pair)), beds.read_numbers(pair)) == ((1, 2, 3), (1, 3))
     bpy.ops.digiclay.bake(source="TAKE")
-    np.testing.assert_allclose(bridge.poses(pair)[1], before[1], rtol=0, atol=1e-6)
+    assert_near(bridge.poses(pair)[1], before[1], 1e-6)
     assert [number for number, tip in fingertips_of(pair).items() if tip.animation_data] == [1, 3]
 
 
@@ -283,7 +284,7 @@ def test_a_press_stroke_moves_the_first_fingertip_alone(pair, clock, palm):
     running.put(sculpting.queue_stroke(running.find(pair), start(0, -10e-3, -10e-3, 4e-3))[0])
     clock.until(lambda: shown(pair).min() < 39e-3)
     now = bridge.poses(pair)
-    np.testing.assert_allclose(now[1], before[1], rtol=0, atol=1e-6)  # Blender's 32 bits
+    assert_near(now[1], before[1], 1e-6)  # Blender's 32 bits
     assert np.abs(now[0] - before[0]).max() > 1e-3
     move(pair, {2: 43.0})  # it waits there for the end of the stroke
     clock.tick(2)
@@ -315,7 +316,7 @@ def test_animated_fingertips_are_baked_and_takes_of_several_replayed_and_exporte
     take = takes.read(pair)
     bpy.context.scene.frame_set(20)
     row = round(19 / 24 / take.scene.simulation.control_period)
-    np.testing.assert_allclose(bridge.poses(pair), take.poses[row], rtol=0, atol=1e-6)  # Blender's 32 bits
+    assert_near(bridge.poses(pair), take.poses[row], 1e-6)  # Blender's 32 bits
     bpy.ops.digiclay.bake_free()
     for tip in fingertips_of(pair).values():
         tip.animation_data_clear()
@@ -352,7 +353,7 @@ def test_an_odd_fingertip_has_the_session_wait_and_nothing_is_lost(pair, clock, 
     ODD[what](fingertips_of(pair)[2])
     waits(pair, clock, words=f"Digital Clay Fingertip 2 is {what}")
     np.testing.assert_array_equal(exact(pair), before)
-    np.testing.assert_allclose(shown(pair), before, rtol=0, atol=1e-8)
+    assert_near(shown(pair), before, 1e-8)
 
 
 def test_the_state_of_two_is_continued_by_three_and_by_one(pair, clock):
@@ -401,7 +402,7 @@ def test_a_symmetric_stroke_survives_saving_undo_and_a_stop_in_its_middle(pair, 
     assert (len(running.find(pair).poses), beds.read_numbers(pair)) == (2, (1, 2))
     assert clock.tick() == []
     table = running.find(pair).state.row(0).reshape(13, 13)
-    np.testing.assert_allclose(table, np.rot90(table, 2), rtol=0, atol=2e-6)
+    assert_near(table, np.rot90(table, 2), 2e-6)
     assert table.min() < 37.1e-3
     bpy.ops.ed.undo_push(message="Done")
     bpy.ops.ed.undo()
@@ -410,7 +411,7 @@ def test_a_symmetric_stroke_survives_saving_undo_and_a_stop_in_its_middle(pair, 
     bed = only_bed()
     session = running.find(bed)
     assert (session.numbers, len(session.poses), session.strokes) == ((1, 2), 2, ())
-    np.testing.assert_allclose(shown(bed), 40e-3, rtol=0, atol=1e-6)  # nothing half-formed
+    assert_near(shown(bed), 40e-3, 1e-6)  # nothing half-formed
     # It goes on from there, and stops in the middle of another one.
     press_down()
     handlers.end("was stopped")
@@ -425,4 +426,4 @@ def test_a_symmetric_stroke_survives_saving_undo_and_a_stop_in_its_middle(pair, 
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "middle.blend"))
     looked()
     started(only_bed())
-    np.testing.assert_allclose(shown(only_bed()), 40e-3, rtol=0, atol=1e-6)
+    assert_near(shown(only_bed()), 40e-3, 1e-6)

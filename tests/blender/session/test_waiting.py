@@ -48,7 +48,7 @@ def edit_through_a_linked_duplicate(bed):
 
 
 @pytest.mark.parametrize(
-    ("hinder", "words", "free"),
+    "hinder, words, free",
     [
         (lambda bed: look_at("Other"), "no window shows its scene", lambda bed: look_at("Scene")),
         (lambda bed: edit(), "back to Object Mode", lambda bed: edit("OBJECT")),
