@@ -17,6 +17,7 @@ from pathlib import Path
 
 from digiclay.cli import main as digiclay
 from digiclay.core.scene.scene_source import list_samples
+from law_figures import draw_laws
 from PIL import Image
 
 PICTURES = Path(__file__).resolve().parents[1] / "docs" / "pictures"
@@ -261,6 +262,7 @@ DRAWN: dict[str, Callable[[Path], None]] = {
     **{f"samples/{name}.jpg": partial(draw_sample, name=name) for name in list_samples()},
     "two_hands.webp": draw_hand_film,
     "hand_forces.png": draw_hand_forces,
+    "laws.svg": lambda folder: draw_laws(PICTURES / "laws.svg"),
 }
 
 

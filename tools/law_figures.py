@@ -1,98 +1,75 @@
 """Figure of the laws of a cell, by the package's own functions: a panel each, with its parameters marked."""
 
-from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import digiclay
 import numpy as np
-from digiclay.core.model.actuator import Actuator, Supply
-from digiclay.core.model.conduit import Conduit, OrificeAndConduit
 from digiclay.core.model.contact import Contact
 from digiclay.core.model.control_interface import NONE, Measurement
-from digiclay.core.model.delay import Delay, split_delay
-from digiclay.core.model.lag import ValveLag
-from digiclay.core.model.null_parts import PerfectSensors
-from digiclay.core.model.relaxation import Relaxation
-from digiclay.core.model.sensors import Noisy, Quantized, Sensing
-from digiclay.core.model.valve import Fluid, Valve
+from digiclay.core.model.delay import split_delay
+from digiclay.core.scene.assembly import assemble
 from digiclay.plots.figure import LINES, MM, STYLE, empty, save
 
-BAR, BLACK_DOTS, DASHED = 1e5, "ko", "k--"
-#: Horizontal and vertical values, the form of the line, its label.
-Curve = tuple[Any, Any, str, str]
-#: Title, labels of the axes, scale of the horizontal one, then its curves.
-Panel = tuple[str, str, str, str, list[Curve]]
-VALVE, HIGH = Valve().flow_law(Fluid()), Supply().high
-
-
-def compute_flows(opening: float, drops: Any) -> Any:
-    """Return flows through the valve, mm³/s, under drops, bar."""
-    return 1e9 * VALVE.flow(np.full(drops.shape, opening), BAR * drops)
-
-
-def compute_speeds(diameter: float, openings: Any) -> Any:
-    """Return speeds of a pin without load, mm/s, behind a conduit of a diameter, m."""
-    law = OrificeAndConduit(VALVE, Conduit(diameter=diameter).resistance(Fluid()))
-    return MM * law.flow(openings, np.full(openings.shape, HIGH)) / Actuator().area
-
-
-def read_sensors(sensing: Sensing, cells: Any) -> Any:
-    """Return readings of the force on cells that nothing touches, mN."""
-    none = np.zeros(cells.size)
-    seen = Measurement(none[None], none, none, none, none.astype(np.int8), NONE, cells)
-    noisy = Noisy(PerfectSensors(), sensing.force_noise, 0.0, sensing.seed)
-    return MM * Quantized(noisy, sensing.force_step, 0.0).measure(seen, 0)[0]
-
-
-def list_panels() -> Iterator[Panel]:
-    """Give the panels."""
-    drops, sizes = np.logspace(-2, 2.5), (1.0, 0.5, 0.25)
-    knees = VALVE.knee / BAR / np.square(sizes)
-    curves: list[Curve] = [(drops, compute_flows(size, drops), "-", f"h* = {size:g}") for size in sizes]
-    flows = [compute_flows(size, knee) for size, knee in zip(sizes, knees, strict=True)]
-    curves += [(knees, flows, BLACK_DOTS, "$ΔP_{crit}$")]
-    curves += [([HIGH / BAR] * 2, [0.1, 1e4], DASHED, "$P_{high}$")]
-    yield "a  Valve, eq. 3 to 7", "pressure drop ΔP (bar)", "flow Q (mm³/s)", "log", curves
-
-    openings, widths = np.linspace(0.0, 1.0), (0.8e-3, 0.25e-3, 0.2e-3)
-    curves = [(openings, compute_speeds(width, openings), "-", f"$D_c$ = {MM * width:g} mm") for width in widths]
-    yield "b  Valve and conduit, eq. 8", "opening h*", "speed without load (mm/s)", "linear", curves
-
-    lag, delay, times = ValveLag(), Delay(), np.linspace(0.0, 12e-3, 241)
-    reached = delay.dead_time + lag.time_constant
-    opened = lag.response(split_delay(delay, 1.0), [*times, delay.dead_time, reached])[:, -1]
-    curves = [(MM * times, opened[:-2], "-", "opening K"), (MM * times, times >= 0.0, DASHED, "command")]
-    marks = MM * np.array([delay.dead_time, reached])
-    curves += [(marks, opened[-2:], BLACK_DOTS, "$t_d$, and $τ_v$ later")]
-    yield "c  Dead time and lag, eq. 9", "time (ms)", "share of full opening", "linear", curves
-
-    depths = np.linspace(0.0, 2.5e-3)
-    laws = [Contact(exponent=exponent) for exponent in (2000.0, 1500.0, 1000.0)]
-    curves = [(MM * depths, law.tension(depths), "-", f"m = {law.exponent:g} 1/m") for law in laws]
-    curves += [(MM * depths, laws[0].stiffness * depths, DASHED, "slope b at $x_0$ = 0")]
-    yield "d  Contact, eq. 11", "indentation x (mm)", "tension T (N)", "linear", curves
-
-    law, times = Relaxation(), np.logspace(-4, 1.5)
-    curves = [(times, law.reduced(times), "-", "G(t)")]
-    curves += [(law.times, law.reduced(np.array(law.times)), BLACK_DOTS, "1/$ν_1$, 1/$ν_2$, 1/$ν_3$")]
-    curves += [(times[[0, -1]], [law.weights[0] / sum(law.weights)] * 2, DASHED, "$c_0$/Σc")]
-    yield "e  Relaxation, eq. 12", "time after a step of x (s)", "share of the tension", "log", curves
-
-    sensing, cells = Sensing(force_noise=2e-3, force_step=2e-3), np.arange(300)
-    curves = [(cells, read_sensors(sensing, cells), ".", "$σ_F$ = 2 mN, $q_F$ = 2 mN")]
-    curves += [(cells[[0, -1]], [MM * sensing.force_floor] * 2, DASHED, "noise floor $F_n$")]
-    yield "f  Force sensors", "cell, none touched", "force reading (mN)", "linear", curves
+#: Title and labels of the axes of each panel.
+PANELS = (
+    ("a  Valve, eq. 3 to 7", "pressure drop ΔP (bar)", "flow Q (mm³/s)"),
+    ("b  Valve and conduit, eq. 8", "opening h*", "speed without load (mm/s)"),
+    ("c  Dead time and lag, eq. 9", "time (ms)", "share of full opening"),
+    ("d  Contact, eq. 11", "indentation x (mm)", "tension T (N)"),
+    ("e  Relaxation, eq. 12", "time after a step of x (s)", "share of the tension"),
+    ("f  Force sensors", "cell, none touched", "force reading (mN)"),
+)
+#: Openings, diameters of conduits, m, and exponents of contact laws, 1/m.
+VARIED = ((1.0, 0.8e-3, 2000.0), (0.5, 0.25e-3, 1500.0), (0.25, 0.2e-3, 1000.0))
 
 
 def draw_laws(out: Path) -> None:
     """Write the figure: panels in two columns."""
     style = STYLE | {"axes.prop_cycle": f"cycler('color', {list(LINES)})", "legend.fontsize": 11}
     with empty(10.0, 11.6, style, layout="constrained") as figure:
-        panels = figure.subplots(3, 2).flat
-        for axes, (title, across, up, scale, curves) in zip(panels, list_panels(), strict=True):
-            for *values, label in curves:
-                axes.plot(*values, label=label)
-            axes.set(title=title, xlabel=across, ylabel=up, xscale=scale)
+        panels = figure.subplots(3, 2).ravel()
+        draw_curves(*panels)
+        for axes, (title, across, up) in zip(panels, PANELS, strict=True):
+            axes.set(title=title, xlabel=across, ylabel=up)
             axes.legend()
-        panels[0].set_yscale("log")
         save(figure, out)
+
+
+def draw_curves(valve: Any, conduit: Any, lag: Any, contact: Any, relaxation: Any, sensors: Any) -> None:
+    """Draw the curves of each law into its panel."""
+    scene = digiclay.scene({"sensors": {"force_noise": "2 mN", "force_step": "2 mN"}})
+    system, law, high = assemble(scene), scene.valve.flow_law(scene.fluid), scene.supply.high
+    drops, openings, depths = np.logspace(3, 7.5), np.linspace(0.0, 1.0), np.linspace(0.0, 2.5)
+    for opening, diameter, exponent in VARIED:
+        knee = law.knee / opening**2
+        flow = 1e9 * law.flow(np.array(opening), np.append(drops, knee))
+        valve.loglog(drops / 1e5, flow[:-1], label=f"h* = {opening:g}")
+        valve.plot(knee / 1e5, flow[-1], "ko")
+        narrow = replace(scene, conduit=replace(scene.conduit, diameter=diameter))
+        flow = assemble(narrow).cell.flow.flow(openings, np.full(openings.shape, high))
+        conduit.plot(openings, MM * flow / scene.actuator.area, label=f"$D_c$ = {MM * diameter:g} mm")
+        contact.plot(depths, Contact(exponent=exponent).tension(depths / MM), label=f"m = {exponent:g} 1/m")
+    valve.annotate("$ΔP_{crit}$", (6.0, 3e3))
+    valve.axvline(high / 1e5, color="k", linestyle="--", label="$P_{high}$")
+    contact.plot(depths, Contact().stiffness * depths / MM, "k--", label="slope b at $x_0$ = 0")
+
+    dead, slow, times = scene.delay.dead_time, scene.valve_lag.time_constant, np.linspace(0.0, 12.0, 241)
+    opened = system.cell.lag.response(split_delay(scene.delay, 1.0), times / MM)[:, -1]
+    lag.plot(times, opened, label="opening K")
+    lag.axhline(1.0, color="k", linestyle="--", label="command")
+    lag.axvspan(0.0, MM * dead, alpha=0.3, label="$t_d$")
+    lag.axvspan(MM * dead, MM * (dead + slow), color=LINES[4], alpha=0.3, label="$τ_v$")
+
+    pulp, times = system.cell.touch.pulp, np.logspace(-4, 1.5)
+    relaxation.semilogx(times, pulp.reduced(times), label="G(t)")
+    relaxation.plot(pulp.times, pulp.reduced(np.array(pulp.times)), "ko", label="1/$ν_1$, 1/$ν_2$, 1/$ν_3$")
+    relaxation.axhline(1.0 - pulp.shares.sum(), color="k", linestyle="--", label="$c_0$/Σc")
+
+    cells = np.arange(300)
+    none = np.zeros(cells.size)
+    seen = Measurement(none, none, none, none, none, NONE, cells)
+    sensors.plot(MM * system.sensors.measure(seen, 0)[0], ".", label="$σ_F$ = 2 mN, $q_F$ = 2 mN")
+    sensors.axhline(MM * scene.sensors.force_floor, color="k", linestyle="--", label="noise floor $F_n$")
+    sensors.set_ylim(-8.0, 18.0)

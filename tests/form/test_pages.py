@@ -1,4 +1,4 @@
-"""The pages: headings, measurements, links, names, commands and navigation."""
+"""The pages: measurements, links, names, commands and navigation."""
 
 import ast
 import functools
@@ -33,12 +33,6 @@ SOURCES = {
     for name in (*PACKAGES, "docs", "tests")
     for path in (ROOT / name).rglob("*.py")
 }
-SENTENCE = re.compile(
-    r"\?|^(what|how|why|where|when|who|which|whether)\b"
-    r"|\b(is|are|was|were|has|have|does|do|can|must|costs|brings|comes|goes|stays|knows|says|tells|ends|stands"
-    r"|changes|found|moved|moves|recovers|springs)\b",
-    re.IGNORECASE,
-)
 #: A program and its arguments; a number behind a name is a version.
 COMMAND = re.compile(r"^\$? *(?:blender --command )?(digiclay|python -m benchmarks) (?!\d)(.*)")
 #: End of a line of a command that goes on in the next.
@@ -48,7 +42,7 @@ USERS = ("mine.py", "method.py", "softer.py", "yielding.py")
 #: The parsers that the commands of the pages must pass; they only read, nothing is carried out.
 PARSERS = {"digiclay": parser, "python -m benchmarks": benchmarks_parser}
 #: Row of the table of pictures, and a picture that a page shows.
-ROW = re.compile(r"^\| (`[\w.*]+\.(?:jpg|png|webp)`.*?) \| (.*) \|$", re.MULTILINE)
+ROW = re.compile(r"^\| (`[\w.*]+\.(?:jpg|png|svg|webp)`.*?) \| (.*) \|$", re.MULTILINE)
 SHOWN = re.compile(r"!\[[^\]]*\]\(([^)\s]+)\)")
 #: Pages of the navigation that `tools/site_pages.py` makes at the build.
 MADE = {"benchmarks.md", "changes.md", "contributing.md"}
@@ -112,10 +106,6 @@ def _parameters() -> dict[tuple[str, str], Quantity]:
     }
 
 
-def find_sentences(page: Path, text: str) -> list[str]:
-    return [heading for heading in _headings(text) if SENTENCE.search(heading)]
-
-
 def find_undated(page: Path, text: str) -> list[str]:
     rows, measured = [], False
     for line, code in _lines(text):
@@ -152,7 +142,7 @@ def find_absent_modules(page: Path, text: str) -> list[str]:
 
 def find_absent_names(page: Path, text: str) -> list[str]:
     """Return ``module.name`` where a page names what the module does not define."""
-    endings = {"py", "md", "csv", "png", "jpg", "toml", "json", "npz", "stl", "obj", "html"}
+    endings = {"py", "md", "csv", "png", "jpg", "svg", "toml", "json", "npz", "stl", "obj", "html"}
     return [
         f"{module}.{name}"
         for module, name in re.findall(r"`(?!bpy)(?:[\w.]+\.)?([a-z_]+)\.([A-Za-z]\w*)", text)
@@ -166,7 +156,6 @@ def find_refused_commands(page: Path, text: str) -> list[str]:
 
 
 CHECKS = (
-    find_sentences,
     find_undated,
     find_dead_links,
     find_absent_modules,
@@ -175,7 +164,7 @@ CHECKS = (
 )
 #: A page with one fault of each kind, in the order of the checks.
 WRONG = """\
-# Why is it wet?
+# A page
 [there](nowhere.md), `core/absent.py`, `simulation.absent_name`, `digiclay run --absent tap`
 
 | commit | s |
