@@ -11,14 +11,13 @@ from ..core.mesh_io.export_model import KINDS, Model, find_features, make_bodies
 from ..core.mesh_io.mesh_writer import FORMATS, UNITS, find_suffix, write
 from ..core.mesh_io.obj_reader import AXES, UP, make_axes
 from ..core.scene.schema import Scene
-from ..core.session.finished_run import find_row, read_run
+from ..core.session.finished_run import find_row, read_run, require_surface
 from ..core.session.run_scene import History
 from ..core.surface.features import Finding, make_table, summarize
 from ..core.surface.formed import Body, Formed, make_formed
 from ..core.surface.skins import SKINS
 from .arguments import RUN, command, formats, millimeters, say, seconds, told_as_options, whole_number
 from .progress import table as aligned
-from .refusals import require_surface
 
 
 def list_choices(choices: Mapping[str, str], form: str = "{}: {}", separator: str = "; ") -> str:

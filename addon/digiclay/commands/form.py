@@ -16,10 +16,10 @@ from ..core.scene.assembly import assemble
 from ..core.scene.forming import GESTURES, make_forming_scene
 from ..core.scene.scene_source import Setting
 from ..core.scene.schema import Scene
+from ..core.session.finished_run import require_surface
 from ..core.session.run_scene import Result
 from ..core.shapes.fitting import Fitted, find_shape, fit_shape, import_reader, list_shapes, pack
 from .arguments import QUIET, add_scene, command, formats, say, scene_of
-from .refusals import require_surface
 from .run import NO_ERRORS, plan_meshes, simulate, write_run
 from .stop import Stop, allow_interrupt, defer_interrupt
 

@@ -16,7 +16,7 @@ from ..core.files import run_folder
 from ..core.files.tables import Record
 from ..core.scene.scene_source import load, load_recorded
 from ..core.scene.schema import Scene
-from ..core.session.finished_run import Run, has_files, is_whole, read_run
+from ..core.session.finished_run import Run, has_files, is_whole, read_run, require_surface
 from ..core.session.render_settings import format_range, list_missing, name_frame, read_range
 from ..core.session.run_scene import run, save
 from ..core.studies.job_table import JOB, MOVING, SCENE, Outputs, read_outputs
@@ -25,7 +25,7 @@ from ..plugins.method_loader import CODE, describe_origin
 from .arguments import formats
 from .export import exported
 from .gallery import of_heights, of_picture
-from .refusals import refuse_without_blender, require_surface
+from .refusals import refuse_without_blender
 from .render import ARRAYS, draw_moving, draw_still, stage_moving
 
 #: Where a series keeps its runs, beside its jobs; what each took; and in there, the size of each file.

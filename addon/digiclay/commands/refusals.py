@@ -6,21 +6,9 @@ import importlib
 import importlib.util
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from ..core.base.errors import OutputError
 from .stop import defer_interrupt
-
-if TYPE_CHECKING:
-    from ..core.scene.schema import Scene
-
-
-def require_surface(scene: Scene, option: str) -> None:
-    """Refuse to make a surface of a bed that has none. `option`: what asks for the surface."""
-    if min(scene.layout.rows, scene.layout.columns) < 2:
-        raise OutputError(
-            f"{option} needs at least 2 x 2 cells (got {scene.layout.rows} x {scene.layout.columns})."
-        )
 
 
 def refuse_without(option: str, extra: str, *modules: str) -> None:

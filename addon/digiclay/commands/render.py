@@ -15,12 +15,18 @@ from ..core.files.run_folder import claim_files
 from ..core.files.tables import Record
 from ..core.metrics.summary import compute_metrics, find_worst_finger
 from ..core.scene.schema import Scene
-from ..core.session.finished_run import HISTORY_ARRAYS, find_last_touch, find_row, read_run
+from ..core.session.finished_run import (
+    HISTORY_ARRAYS,
+    find_last_touch,
+    find_row,
+    read_run,
+    require_surface,
+)
 from ..core.session.render_settings import COLORS, ENGINES, Film, Still, Turntable
 from ..core.session.run_scene import History
 from .arguments import RUN, Options, command, one_of, say, seconds, size, told_as_options
 from .progress import Counted
-from .refusals import refuse_file, refuse_unwritable, refuse_without, refuse_without_blender, require_surface
+from .refusals import refuse_file, refuse_unwritable, refuse_without, refuse_without_blender
 from .stop import STOPPED, Stop
 
 if TYPE_CHECKING:

@@ -18,6 +18,7 @@ from ..core.base.errors import OutputError, ParameterError, SceneError
 from ..core.control.methods import list_added
 from ..core.files.run_folder import Claim, claim_folder, find_name
 from ..core.scene.schema import Scene
+from ..core.session.finished_run import require_surface
 from ..core.session.run_scene import History, Result, run, save
 from .arguments import (
     QUIET,
@@ -30,7 +31,7 @@ from .arguments import (
     told_as_options,
 )
 from .progress import Bar, Line, format_command, table
-from .refusals import refuse_without, refuse_without_blender, require_surface
+from .refusals import refuse_without, refuse_without_blender
 from .stop import STOPPED, Stop
 
 if TYPE_CHECKING:

@@ -10,6 +10,7 @@ import dataclasses
 import hashlib
 import importlib
 import importlib.util
+import marshal
 import re
 import sys
 from collections.abc import Callable, Mapping
@@ -18,13 +19,13 @@ from importlib.abc import ExecutionLoader
 from importlib.machinery import ModuleSpec
 from importlib.util import module_from_spec
 from pathlib import Path
-from types import ModuleType
+from types import FunctionType, ModuleType
 from typing import Any, NamedTuple, NoReturn
 
 from ..core.base.errors import MethodError, ParameterError
 from ..core.base.quantity import Quantity
 from ..core.control.blister import Blister
-from ..core.control.methods import METHODS, ControlParameters, Method, add_method, list_added
+from ..core.control.methods import METHODS, ControlParameters, Method, add_method, list_added, list_methods
 from ..core.control.own_method import MOST_ROWS, Guarded, OwnMethod, describe_failure, guard
 from ..core.files.run_folder import write_whole
 from ..core.files.tables import Record
@@ -45,7 +46,8 @@ class MethodSource(NamedTuple):
     """For messages, ``mine.py:Mine`` or the name of an installed method; as tracebacks have it."""
     attribute: str
     text: str
-    """Name of the class; the code, empty for that of an installed package, which is imported."""
+    """Name of the class; the code, empty for that of an installed package, which is imported, and of a class
+    that is in memory alone."""
     package: str
     module: str
     """Name and version of the installed package, and what to import; empty for a file."""
@@ -151,10 +153,7 @@ def check_class(label: str, kind: Any) -> None:
 
     if not isinstance(kind, type) or not issubclass(kind, ControlParameters):
         what = kind.__name__ if isinstance(kind, type) else type(kind).__name__
-        refuse("the class must derive from OwnMethod of digiclay.core.control.own_method", what)
-    params = vars(kind).get("__dataclass_params__")
-    if params is None or not params.frozen:
-        refuse("the class must be decorated with @dataclass(frozen=True)")
+        refuse("the class must derive from digiclay.Method", what)
     for field in dataclasses.fields(kind):
         _check_field(field, refuse)
     build, command = (getattr(kind, name, None) for name in ("build", "command"))
@@ -245,6 +244,45 @@ def load_method(word: str) -> str:
     return name
 
 
+def load_class(kind: type) -> str:
+    """Enter a class of this process, such as one of a notebook, into the table; return its method's name.
+
+    A later class replaces one of the same name, so that a cell of a notebook can be run again.
+    """
+    name = name_method(kind.__name__)
+    row = list_methods().get(name)
+    if name in METHODS and METHODS[name].import_parameters() is kind:
+        return name
+    if isinstance(row, OwnRow) and row.kind is kind:
+        return name
+    if row and not (isinstance(row, OwnRow) and is_in_memory(row.source)):
+        raise MethodError(
+            f"{kind.__name__}: the method's name {name} must be its own (another method has it)."
+        )
+    add_class(name, MethodSource(kind.__name__, "", kind.__name__, "", "", "", hash_class(kind)), kind)
+    return name
+
+
+def is_in_memory(source: MethodSource) -> bool:
+    """Return whether a method has neither a file nor a package, but its class alone."""
+    return not (source.text or source.module)
+
+
+def hash_class(kind: type) -> str:
+    """Return a number that identifies a class in memory by the code of its functions and its values."""
+    digest = hashlib.sha256()
+    owners = [owner for owner in kind.__mro__ if not owner.__module__.startswith(f"{PACKAGE}.")]
+    for name, value in (pair for owner in owners for pair in vars(owner).items()):
+        value = value.default if isinstance(value, dataclasses.Field) else value
+        if isinstance(value, FunctionType):
+            # Wherever it is written, and without references, whose number changes.
+            code = value.__code__.replace(co_filename="", co_firstlineno=1)
+            digest.update(name.encode() + marshal.dumps(code, 2))
+        elif isinstance(value, KINDS) or name == "blister":
+            digest.update(f"{name} {value!r}".encode())
+    return digest.hexdigest()
+
+
 def name_method(attribute: str) -> str:
     """Return the name of a method in scene files by that of its class: ``SoftPad`` is soft_pad."""
     return re.sub(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])", "_", attribute).lower()
@@ -265,6 +303,11 @@ def add_source(name: str, source: MethodSource) -> OwnRow:
 
 def add_class(name: str, source: MethodSource, kind: Any) -> OwnRow:
     """Check the class of a method, and put it into the table of methods."""
+    if isinstance(kind, type) and "__dataclass_params__" not in vars(kind):
+        try:
+            kind = dataclass(frozen=True, eq=False, repr=False)(kind)
+        except TypeError as error:
+            raise MethodError(f"{source.label}: {error}.") from None
     check_class(source.label, kind)
     blister = getattr(kind, "blister", None)
     row = OwnRow(
@@ -291,6 +334,9 @@ def restore_parameters(name: str, source: MethodSource, values: Record) -> Contr
     """Return parameters that another process has pickled, with their class: its code comes along."""
     row = list_added().get(name)
     if not isinstance(row, OwnRow) or row.source[1:] != source[1:]:
+        if is_in_memory(source):
+            rule = "must be in a file for other processes, by its name file.py:" + source.attribute
+            raise MethodError(f"{source.label}: the class {rule}.")
         if source.module:
             here = read_source(name)
             if here is None or here.digest != source.digest:
@@ -371,8 +417,14 @@ CODE = "method.py"
 
 
 def find_code(scene: Scene) -> MethodSource | None:
-    """Return the code of a scene's method; None for a built-in one, or without control."""
+    """Return the code of a scene's method; None for a built-in one, or without control.
+
+    Raises MethodError if another class has that name by now.
+    """
     row = list_added().get(scene.method) if scene.control is not None else None
+    if isinstance(row, OwnRow) and is_in_memory(row.source) and type(scene.control) is not row.kind:
+        rule = "must be made of the class of that name that was loaded last"
+        raise MethodError(f"The scene's method {scene.method} {rule}: make the scene again.")
     return row.source if isinstance(row, OwnRow) else None
 
 
@@ -387,7 +439,7 @@ def describe_origin(scene: Scene) -> dict[str, str]:
 def write_code(scene: Scene, folder: Path) -> None:
     """Write the code of a scene's method, where it is a file of one's own; else remove a former one."""
     source = find_code(scene)
-    if source is not None and not source.module:
+    if source is not None and source.text:
         write_whole(folder / CODE, source.text.encode())
     else:
         (folder / CODE).unlink(missing_ok=True)

@@ -1,10 +1,13 @@
 """TOML text, checked before parsing, and parts of its tables, with errors of one line."""
 
+import html
 import json
 import re
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TypeVar
+
+import numpy as np
 
 from ..base.errors import ParameterError
 from ..base.quantity import Parameters, find_nearest_name, list_quantities, parse
@@ -45,7 +48,12 @@ def parse_tables(text: str) -> Record:
 
 
 def format_value(value: object) -> str:
-    """Return a text, number, truth value, or a list of them, in TOML; a float is restored exactly."""
+    """Return a text, number, truth value, list or table of them in TOML; a float is restored exactly."""
+    if isinstance(value, (np.generic, np.ndarray)):
+        value = value.tolist()
+    if isinstance(value, Mapping):
+        pairs = (f"{format_value(str(key))} = {format_value(item)}" for key, item in value.items())
+        return f"{{{', '.join(pairs)}}}"
     if isinstance(value, (list, tuple)):
         return f"[{', '.join(map(format_value, value))}]"
     if isinstance(value, bool):
@@ -113,6 +121,19 @@ def _measured(section: str, key: str, value: Any, unit: str) -> Any:
         return parse(value, unit)
     except ValueError as error:
         raise ParameterError(section, key, str(error), show_value(value)) from None
+
+
+def format_lines(title: str, rows: Mapping[str, str]) -> str:
+    """Return named facts as lines under a title."""
+    return "\n".join([title, *(f"  {name}: {text}" for name, text in rows.items())])
+
+
+def format_html(title: str, rows: Mapping[str, str]) -> str:
+    """Return named facts as a small table of HTML under a title."""
+    lines = (
+        f"<tr><th>{html.escape(name)}</th><td>{html.escape(text)}</td></tr>" for name, text in rows.items()
+    )
+    return f"<table><caption>{html.escape(title)}</caption>{''.join(lines)}</table>"
 
 
 def show_value(value: object) -> str:

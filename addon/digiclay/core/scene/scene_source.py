@@ -2,7 +2,8 @@
 
 import os
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -10,9 +11,12 @@ from typing import Any, NamedTuple
 from ..base.errors import ParameterError, SceneError
 from ..control.methods import list_methods
 from ..files.run_folder import find_file, list_files
-from ..files.tables import LARGEST, ReadParts, Record, Table, parse_tables
+from ..files.tables import LARGEST, ReadParts, Record, Table, format_value, parse_tables
 from .schema import FINGER_SECTIONS, Scene
-from .toml_table import ABSENT, FINGERS, merge_one_finger, resolve
+from .toml_table import ABSENT, FINGERS, merge_one_finger, resolve, tabulate
+
+#: What a scene is made of: another one, tables as of a file, a file, the folder of a run, or a sample's name.
+Source = Scene | Table | str | os.PathLike[str]
 
 #: Folder of the sample scenes.
 SAMPLES = Path(__file__).parents[2] / "sample_shapes" / "sessions"
@@ -42,43 +46,73 @@ class Setting(NamedTuple):
     """Its name in messages."""
 
 
+def read_source(source: Source) -> tuple[Path | None, Table]:
+    """Return the file of a scene's source, or None, and its tables."""
+    if isinstance(source, Scene):
+        return None, tabulate(source)
+    if isinstance(source, Mapping):
+        return None, source
+    if not isinstance(source, (str, os.PathLike)):
+        raise SceneError(f"A scene must be tables, a file or a name (got {source!r:.60}).")
+    path = find(os.fspath(source))
+    return path, read_table(path)
+
+
+def list_changes(changes: Table, above: str = "") -> Iterator[tuple[str, Any]]:
+    """Yield keys and values of changes, in nested tables or by dotted keys."""
+    for key, value in changes.items():
+        if isinstance(value, Mapping) and value:
+            yield from list_changes(value, f"{above}{key}.")
+        else:
+            yield f"{above}{key}", value
+
+
+def write_word(value: object) -> str:
+    """Return a value as the word of a `Setting`; a text without quotes where these are not needed."""
+    return value if isinstance(value, str) and _read_value(value) == value else format_value(value)
+
+
 def load(path: Path, settings: Sequence[Setting] = ()) -> Scene:
     """Read a scene file with settings; SceneError in one line: file or option, key, rule and value."""
     return make_scene(path, read_table(path), settings)
 
 
 def load_recorded(path: Path) -> Scene:
-    """Read the scene of a finished run, without its control if its method is not loaded."""
+    """Read the scene of a finished run, without its control if its method is not loaded.
+
+    It keeps the method's name, by which it is refused where it would be simulated or written.
+    """
     table = read_table(path)
     control = table.get("control")
     method = control.get("method") if isinstance(control, dict) else None
     if isinstance(method, str) and method.isidentifier() and method not in list_methods():
         table.pop("blister", None)
         table["control"] = ABSENT
+        return replace(make_scene(path, table), method=method)
     return make_scene(path, table)
 
 
 def make_scene(
-    path: Path, table: Table, settings: Sequence[Setting] = (), cache: ReadParts | None = None
+    path: Path | None, table: Table, settings: Sequence[Setting] = (), cache: ReadParts | None = None
 ) -> Scene:
-    """Return a scene from the `read_table` of its file, overridden by settings; SceneError as `load`.
+    """Return a scene from the tables of its file, if any, overridden by settings; SceneError as `load`.
 
     A shape may be beside the file. `cache`: parts of scenes of the same file, which are not read again.
     """
     try:
-        merged = merge_one_finger(_find_beside(table, path.parent))
-        return resolve(_override(merged, settings), path.stem, cache)
+        merged = merge_one_finger(_find_beside(table, path.parent) if path else table)
+        return resolve(_override(merged, settings), path.stem if path else "", cache)
     except ParameterError as error:
         if settings:
             make_scene(path, table)  # reports an error of the file itself first
         key = split_key(f"{error.owner}.{error.field}")
-        origins = [path.name if path.parent == SAMPLES else str(path)]
+        origins = [path.name if path.parent == SAMPLES else str(path)] if path else []
         origins += [setting.option for setting in settings]
         for setting in settings:
             changed = split_key(setting.key)
             if key[-len(changed) :] == changed:
                 origins.append(setting.option)
-        raise SceneError(f"{origins[-1]}: {error}") from None
+        raise SceneError(": ".join([*origins[-1:], str(error)])) from None
 
 
 def read_table(path: Path) -> Record:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from ..base.errors import ParameterError
 from ..base.quantity import Parameters, quantity
 from ..control.methods import ControlParameters, find_method
+from ..files.tables import format_html, format_lines, refuse_unknown
 from ..model.control_interface import SetPoint
 from ..model.fingertip import require_one
 from ..model.laws import LAWS, import_part, law_parameters
@@ -154,7 +155,7 @@ class Finger:
     trajectory: Path
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Scene:
     """Complete definition of a session; equal scenes give equal sessions, bit for bit.
 
@@ -183,6 +184,7 @@ class Scene:
     shape: Shape | None = None
 
     def __post_init__(self) -> None:
+        self._refuse_wrong_parts()
         if self.layout.pitch < self.actuator.bore:
             rule = f"must be at least actuator.bore, {self.actuator.bore:g} m: cylinders would overlap"
             raise ParameterError("layout", "pitch", rule, f"{self.layout.pitch:g} m")
@@ -201,6 +203,59 @@ class Scene:
         if self.delay and self.delay.dead_time > longest:
             rule = f"must be at most {MOST_STEPS} control periods, {longest:g} s"
             raise ParameterError("delay", "dead_time", rule, f"{self.delay.dead_time:g} s")
+
+    def _refuse_wrong_parts(self) -> None:
+        """Refuse parts that are not those of their sections, or not of the control method."""
+
+        def require(holds: bool, section: str, rule: str, part: object, hint: str = "") -> None:
+            if not holds:
+                raise ParameterError(section, "", rule, type(part).__name__, hint)
+
+        require(isinstance(self.fingers, tuple), "fingers", "must be a tuple of Finger", self.fingers)
+        for finger in self.fingers:
+            require(isinstance(finger, Finger), "fingers", "must be a tuple of Finger", finger)
+            require(isinstance(finger.trajectory, Path), "trajectory", "must be a Path", finger.trajectory)
+        for section in SECTIONS:
+            kinds = (
+                {PARTS[section][1]}
+                if section in PARTS
+                else {name for _, name in LAWS.get(section, {}).values()}
+            )
+            for part in self.list_parts(section):
+                if part is None:
+                    needed = section in REQUIRED and section not in NEEDS
+                    require(not needed, section, "must not be omitted", part)
+                elif kinds:
+                    require(type(part).__name__ in kinds, section, f"must be a {' or a '.join(kinds)}", part)
+        if self.control is None:
+            return
+        row, kind = find_method(self.method), type(self.control)
+        rule = f"must be {row.parameters}, the parameters of the method {self.method}"
+        hint = "digiclay.scene(scene, {'control.method': ...}) changes both."
+        # By name: the file of a method of one's own may have been run again since.
+        is_its_own = kind.__name__ == row.parameters and kind.__module__.endswith(row.module)
+        require(is_its_own, "control", rule, self.control, hint)
+        formed = row.blister is not None
+        rule = f"must {'not ' if formed else ''}be omitted with the method {self.method}"
+        require((self.blister is not None) == formed, "blister", rule, self.blister, hint)
+
+    def describe(self) -> dict[str, str]:
+        """Return what matters most of it, by name."""
+        bed, time, control = self.layout, self.simulation, self.method if self.control else "absent"
+        absent = [name for name in OPTIONAL if name != "control" and None in self.list_parts(name)]
+        return {
+            "bed": f"{bed.rows} x {bed.columns} pins, {bed.pitch * 1e3:g} mm apart, {bed.arrangement}",
+            "method": control + (f", set point {self.set_point.force:g} N" if self.set_point else ""),
+            "fingers": str(len(self.fingers)),
+            "time": f"{time.duration:g} s, {self.periods} periods of {time.control_period * 1e3:g} ms",
+            "absent": ", ".join(absent) or "nothing",
+        }
+
+    def __repr__(self) -> str:
+        return format_lines(f"Scene {self.name}".rstrip(), self.describe())
+
+    def _repr_html_(self) -> str:
+        return format_html(f"Scene {self.name}".rstrip(), self.describe())
 
     @property
     def periods(self) -> int:
@@ -227,6 +282,7 @@ class Scene:
 
     def with_sections(self, **parts: Any) -> Scene:
         """Return the scene with other parts, by the names of sections; those of a finger in all fingers."""
+        refuse_unknown("", parts, [*vars(self), *FINGER_SECTIONS])
         of_finger = {name: parts.pop(name) for name in FINGER_SECTIONS if name in parts}
         fingers = tuple(replace(finger, **of_finger) for finger in self.fingers)
         return replace(self, fingers=fingers, **parts)

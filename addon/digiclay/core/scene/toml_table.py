@@ -16,7 +16,7 @@ from ..files.tables import (
     shorten,
     show_value,
 )
-from ..model.layout import ARRANGEMENTS
+from ..model.layout import ARRANGEMENTS, Layout
 from ..model.trajectory import Path, Waypoint
 from .schema import FINGER_SECTIONS, NEEDS, OPTIONAL, SECTIONS, UNASKED, Finger, Scene, import_parameters
 
@@ -62,14 +62,68 @@ def resolve(table: Table, name: str = "", cache: ReadParts | None = None) -> Sce
         if section not in FINGER_PARTS
     }
     method = (shared["control"] or {}).pop("method", "virtual_master")
-    defaults: dict[str, Table] = {**PRESETS[texts["preset"]], "blister": find_method(method).blister or {}}
+    defaults = _find_defaults(texts["preset"], method)
     parts = _read_parts(shared, defaults, cache, method)
-    share = ARRANGEMENTS[parts["layout"].arrangement].share
-    if share is not None:
-        defaults["contact"] = {**defaults.get("contact", {}), "share": share}
+    defaults = _add_share(defaults, parts["layout"])
     rest_height = parts["actuator"].rest_height
     fingers = tuple(_read_finger(owner, given, defaults, rest_height, cache) for owner, given in tables)
     return Scene(**parts, **texts, fingers=fingers, method=method)
+
+
+def _find_defaults(preset: str, method: str) -> dict[str, Table]:
+    """Return the defaults of sections that differ from those of their classes."""
+    return {**PRESETS[preset], "blister": find_method(method).blister or {}}
+
+
+def _add_share(defaults: dict[str, Table], layout: Layout) -> dict[str, Table]:
+    """Return the defaults with the contact's share that an arrangement of pins has."""
+    share = ARRANGEMENTS[layout.arrangement].share
+    return (
+        defaults
+        if share is None
+        else {**defaults, "contact": {**defaults.get("contact", {}), "share": share}}
+    )
+
+
+def tabulate(scene: Scene) -> Record:
+    """Return tables that resolve to an equal scene, without what is as its preset, method and bed have it.
+
+    So a change of one of these changes what follows from it, as in a scene file.
+    """
+    defaults = _add_share(_find_defaults(scene.preset, scene.method), scene.layout)
+    press = Path.press(scene.actuator.rest_height)
+
+    def list_changed(part: Parameters, usual: Parameters) -> Record:
+        values = {name: getattr(part, name) for name in list_quantities(part)}
+        return {name: value for name, value in values.items() if value != getattr(usual, name)}
+
+    def tabulate_parts(sections: Iterable[str], owner: Scene | Finger) -> Record:
+        tables: Record = {}
+        for section in sections:
+            part = getattr(owner, section)
+            if part is not None:
+                usual = import_parameters(section, scene.method)(**defaults.get(section, {}))
+                tables[section] = list_changed(part, usual)
+            elif section in OPTIONAL:
+                tables[section] = ABSENT
+        return tables
+
+    def tabulate_finger(finger: Finger) -> Record:
+        path, tables = finger.trajectory, tabulate_parts(FINGER_PARTS, finger)
+        if path != press:
+            points = [list_changed(point, Waypoint()) for point in path.waypoints]
+            points = [{"time": 0.0, "position": Waypoint().position, **point} for point in points]
+            tables["trajectory"] = {"interpolation": path.interpolation, "waypoints": points}
+        return tables
+
+    tables = tabulate_parts((name for name in SECTIONS if name not in FINGER_PARTS), scene)
+    tables |= {key: getattr(scene, key) for key in TEXTS}
+    if scene.control:
+        tables["control"]["method"] = scene.method
+    if scene.simulation.duration == max(path.duration for path in scene.trajectories()):
+        tables["simulation"].pop("duration", None)
+    fingers = [tabulate_finger(finger) for finger in scene.fingers]
+    return {**tables, **fingers[0]} if len(fingers) == 1 else {**tables, FINGERS: fingers}
 
 
 def _split_fingers(table: Table) -> list[tuple[str, Table]]:
@@ -195,7 +249,11 @@ def _read_waypoint(owner: str, row: Table) -> Waypoint:
 
 
 def format_scene(scene: Scene, write: Writer | None = None) -> str:
-    """Return a scene file, in SI units, that resolves to an equal scene; `write`: as `write_part`."""
+    """Return a scene file, in SI units, that resolves to an equal scene; `write`: as `write_part`.
+
+    Raises ParameterError for a scene whose method is not loaded: its parameters are unknown here.
+    """
+    find_method(scene.method)
     return "\n".join(_write_lines(scene, write or write_part)) + "\n"
 
 

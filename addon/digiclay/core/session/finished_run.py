@@ -17,6 +17,7 @@ from ..scene.recorder import Recorder
 from ..scene.scene_source import load_recorded
 from ..scene.schema import Scene
 from .memory_limit import measure_available_memory
+from .run_scene import Result
 
 #: The file of the arrays.
 HISTORY = "history.npz"
@@ -96,6 +97,21 @@ def read_run(folder: Path, *names: str) -> Run:
     return Run(scene, history)
 
 
+def read_result(folder: Path) -> Result:
+    """Read a run with its whole history and its metrics; OutputError if unsound."""
+    path = folder / "scene.toml"
+    scene = load_recorded(path) if path.is_file() else None
+    run = Run(scene, {}) if scene and scene.recorder is None else read_run(folder, *HISTORY_ARRAYS)
+    metrics = read_json(folder / MARK)
+    if metrics is None:
+        raise OutputError(f"{folder / MARK} must be a table of metrics in JSON.")
+    count, spent = metrics.get("control_periods"), metrics.get("run_time")
+    if not (isinstance(count, int) and isinstance(spent, (int, float)) and min(count, spent) > 0):
+        rule = "must have the numbers control_periods and run_time, above 0"
+        raise OutputError(f"{folder / MARK} {rule} (got {count!r:.40} and {spent!r:.40}).")
+    return Result(run.scene, run.history, count, spent, metrics)
+
+
 def _refuse(path: Path, scene: Scene, heads: Mapping[str, Head]) -> None:
     """Refuse arrays that no run of this scene writes, before they are unpacked."""
     rows = heads["time"].shape[0] if heads["time"].shape else 0
@@ -118,6 +134,14 @@ def _refuse(path: Path, scene: Scene, heads: Mapping[str, Head]) -> None:
     if size > free:
         rule = f"must fit into the {free / 1e9:.3g} GB of free memory"
         raise OutputError(f"{path} {rule} (got {size / 1e9:.3g} GB of {', '.join(heads)}).")
+
+
+def require_surface(scene: Scene, option: str) -> None:
+    """Refuse to make a surface of a bed that has none. `option`: what asks for the surface."""
+    if min(scene.layout.rows, scene.layout.columns) < 2:
+        raise OutputError(
+            f"{option} needs at least 2 x 2 cells (got {scene.layout.rows} x {scene.layout.columns})."
+        )
 
 
 def has_files(folder: Path, sizes: Mapping[str, int]) -> bool:

@@ -14,12 +14,19 @@ from typing import NamedTuple
 import numpy as np
 
 from ..base.arrays import Array, Floats
-from ..base.errors import explain_os_error
+from ..base.errors import OutputError, explain_os_error
 from ..engine.simulation import Progress, Stopped, begin, periods
 from ..engine.system import System
-from ..files.tables import Record, Table
+from ..files.tables import Record, Table, format_lines
 from ..metrics.metric_table import ERRORS, METRICS, RUN, describe_errors, describe_losses, describe_time
-from ..metrics.summary import compute_metrics, find_losses, split_fingers, take_worst
+from ..metrics.summary import (
+    compute_metrics,
+    compute_weights,
+    find_contact_rows,
+    find_losses,
+    split_fingers,
+    take_worst,
+)
 from ..model.control_interface import count_losses
 from ..model.touch import describe_excess, find_indentations, is_beyond
 from ..model.trajectory import sample_poses
@@ -37,7 +44,18 @@ History = dict[str, Array]
 RUN_METRICS = {**METRICS, **{name: RUN[name] for name in ("losses", "run_time", "real_time_factor")}}
 
 
-@dataclass(frozen=True, eq=False)
+class Contact(NamedTuple):
+    """Contact of a finger over a session."""
+
+    contact_time: float
+    """Time in which it touches, s."""
+    losses: int
+    """How often contact ended though the finger rose no faster than a pin can; 0 without a set point."""
+    lost_time: float
+    """Time until the next contact after these losses, s."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
 class Result:
     """Results of a session."""
 
@@ -61,19 +79,57 @@ class Result:
         """Whether the session was stopped before its end."""
         return self.periods < self.scene.periods
 
+    @property
+    def finger_force(self) -> Floats:
+        """Total force on each finger over time, (t, f), N."""
+        self.require_history("finger_force")
+        return self.history.get("finger_force", self.history["total_force"][:, None])
+
+    @property
+    def fingers(self) -> tuple[Contact, ...]:
+        """Contact of each finger: its time, losses, and the time these lasted."""
+        weights = compute_weights(self.history["time"]) if self.history else np.empty(0)
+        times = [float(weights[find_contact_rows(force)].sum()) for force in self.finger_force.T]
+        none = [{"losses": 0, "time": 0.0}] * len(times)
+        lost = self.metrics.get("lost") or none
+        return tuple(Contact(t, one["losses"], one["time"]) for t, one in zip(times, lost, strict=True))
+
+    def require_history(self, name: str) -> None:
+        """Refuse what needs a history, by its name, of a run without one."""
+        if not self.history:
+            raise OutputError(f"{name} needs a recorder, and the scene has recorder = 'absent'.")
+
+    def describe(self) -> dict[str, str]:
+        """Return what matters most of it, by name."""
+        rows, pins = len(self.history.get("time", ())), self.scene.cells
+        return {
+            "time": describe_time(self.metrics) + (", stopped before its end" if self.incomplete else ""),
+            "force": self._describe_force() or "no contact",
+            "errors": describe_errors(self.metrics),
+            "history": f"{rows} rows of {pins} pins: {', '.join(self.history)}" if rows else "none",
+            "metrics": f"{len(self.metrics)}, in SI units",
+        }
+
+    def __repr__(self) -> str:
+        return format_lines(f"Run of {self.scene.name or 'a scene'}", self.describe())
+
     def summary(self) -> str:
         """Return the session in one line."""
-        rfd, share = self.metrics.get("rfd"), self.metrics.get("contact_share")
-        felt = ", no contact" if share == 0.0 else ""
-        if rfd is not None:
-            felt = f", RFD {rfd:.2g} N{self._name_worst()}"
-        if self.metrics.get("rfd_jnd_least") is not None:
-            felt += f" ({self.metrics['rfd_jnd_least']:.2g} to {self.metrics['rfd_jnd_most']:.2g} JND)"
-        felt += f", {lost}" if (lost := describe_losses(self.metrics)) else ""
+        felt = f", {force}" if (force := self._describe_force()) else ""
         end = " (incomplete: stopped)" if self.incomplete else ""
         beyond = self.metrics.get("beyond_a_finger")
         warning = f"; {beyond}" if beyond else ""
         return f"{describe_time(self.metrics)}{felt}, {describe_errors(self.metrics)}{end}{warning}"
+
+    def _describe_force(self) -> str:
+        """Return the deviation of the force, and the losses, or ``""``."""
+        rfd, share = self.metrics.get("rfd"), self.metrics.get("contact_share")
+        felt = "no contact" if share == 0.0 else ""
+        if rfd is not None:
+            felt = f"RFD {rfd:.2g} N{self._name_worst()}"
+        if self.metrics.get("rfd_jnd_least") is not None:
+            felt += f" ({self.metrics['rfd_jnd_least']:.2g} to {self.metrics['rfd_jnd_most']:.2g} JND)"
+        return ", ".join(filter(None, (felt, describe_losses(self.metrics))))
 
     def _name_worst(self) -> str:
         """Return which of several fingers has the largest RFD."""

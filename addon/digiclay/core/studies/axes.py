@@ -2,9 +2,8 @@
 
 import itertools
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,8 +11,8 @@ import numpy as np
 from ..base.errors import ParameterError, SceneError
 from ..base.quantity import Parameters, Quantity, list_quantities, normalize
 from ..engine.simulation import Progress, Stopped
-from ..files.tables import ReadParts, Record
-from ..scene.scene_source import Setting, load, make_scene, read_table, split_key
+from ..files.tables import ReadParts, Record, shorten
+from ..scene.scene_source import Setting, Source, make_scene, read_source, split_key, write_word
 from ..scene.schema import Scene
 from ..scene.toml_table import FINGERS
 
@@ -150,21 +149,38 @@ def refuse_twice(keys: Sequence[str], settings: Sequence[Setting]) -> None:
                 raise ParameterError(f"--vary {key}", "", rule, key)
 
 
+def make_axis(key: str, values: Iterable[Any], write: Callable[[Any], str] = write_word) -> Axis:
+    """Return an axis of values, which `write` makes words; ParameterError for none, or equal ones."""
+    if isinstance(values, (str, Mapping)) or not isinstance(values, Iterable):
+        raise ParameterError(key, "", "must be varied over a list of values", shorten(repr(values)))
+    words = tuple(map(write, values))
+    if not words:
+        raise ParameterError(key, "", "must be varied over at least one value", "none")
+    if len(set(words)) < len(words):
+        raise ParameterError(key, "", "must not have a value twice", shorten(", ".join(words)))
+    return Axis(key, words)
+
+
 def make_points(
-    path: Path,
+    source: Source,
     settings: Sequence[Setting],
     axes: Sequence[Axis],
     progress: Progress = None,
+    *,
+    option: str = "--vary",
 ) -> list[Point]:
-    """Make the scenes of all points of a sweep; refuse a value for which no point has a scene."""
+    """Make the scenes of all points of a sweep; refuse a value for which no point has a scene.
+
+    `option`: the name of what varies in messages.
+    """
     keys = [axis.key for axis in axes]
     refuse_twice(keys, settings)
     count = math.prod(len(axis.words) for axis in axes)
     if count > MOST:
-        raise ParameterError("--vary", "", f"must come to {MOST} points at most", f"{count} points")
-    load(path, settings)  # reports an error of the file itself first
+        raise ParameterError(option, "", f"must come to {MOST} points at most", f"{count} points")
+    make_scene(*read_source(source), settings)  # reports an error of the file itself first
     rows = list(itertools.product(*(axis.words for axis in axes)))
-    points = place_points(path, settings, keys, rows, progress=progress)
+    points = place_points(source, settings, keys, rows, progress=progress, option=option)
     for number, axis in enumerate(axes):
         sound = {point.words[number] for point in points if point.scene}
         for word in axis.words:
@@ -174,18 +190,20 @@ def make_points(
 
 
 def place_points(
-    path: Path,
+    source: Source,
     settings: Sequence[Setting],
     keys: Sequence[str],
     rows: Sequence[tuple[str, ...]],
     *,
     first: int = 0,
     progress: Progress = None,
+    option: str = "--vary",
 ) -> list[Point]:
     """Make the scenes of given points; incompatible values make a point with an error."""
-    table, parts, points = read_table(path), ReadParts(), []
+    path, table = read_source(source)
+    parts, points = ReadParts(), list[Point]()
     for index, words in enumerate(rows, first):
-        varied = [Setting(key, word, "--vary") for key, word in zip(keys, words, strict=True)]
+        varied = [Setting(key, word, option) for key, word in zip(keys, words, strict=True)]
         try:
             points.append(Point(index, words, make_scene(path, table, [*settings, *varied], parts)))
         except SceneError as error:

@@ -42,14 +42,14 @@ ALONE = "alone"
 NOTED = ("errors_absent", "lost")
 
 
-def find_figure(word: str) -> str:
-    """Return the full name of a metric, such as ``lag``; ParameterError suggests the nearest."""
+def find_figure(word: str, owner: str = "--metric") -> str:
+    """Return the full name of a metric, such as ``lag``; ParameterError of `owner` suggests the nearest."""
     name = SHORT.get(word, word)
     if name in FIGURES:
         return name
     close = find_nearest_name(word, [*FIGURES, *SHORT])
     hint = f"Did you mean {close}?" if close else f"Known: {', '.join(FIGURES)}."
-    raise ParameterError("--metric", "", "must be a known metric", repr(word), hint)
+    raise ParameterError(owner, "", "must be a known metric", repr(word), hint)
 
 
 def read_metrics(text: str) -> tuple[str, ...]:
