@@ -33,15 +33,17 @@ scenes = ["ridge_mound_valley"]
 [film]
 """
 FRAME = 300
-#: Scenes of several fingers, and an instant of each at which all of them work, s.
-HANDS = {"two_hands_bowl": 9.0, "pinch_crease": 7.0, "five_fingers_mound": 7.0}
-#: Instants of the sample scenes that show more than their last touch, s.
+#: Scenes of several fingers.
+HANDS = ("two_hands_bowl", "pinch_crease", "five_fingers_mound")
+#: Instants at which a scene shows more than at its last touch, s.
 INSTANTS = {
-    **HANDS,
     "elastic_press": 1.4,
+    "five_fingers_mound": 7.0,
     "force_display": 3.0,
+    "pinch_crease": 7.0,
     "slow_press": 2.4,
     "tap": 0.2,
+    "two_hands_bowl": 9.0,
     "viscous_press": 2.7,
 }
 #: Area of a picture of 640 x 400 pixels beside its legend, and the size of a sample's picture, pixels.
@@ -124,21 +126,23 @@ def draw_film(folder: Path) -> None:
     save_jpeg(frame, "film.jpg")
 
 
+def draw_instant(folder: Path, name: str, size: str) -> Path:
+    """Draw a scene at its instant of `INSTANTS`, or at its last touch; return the picture."""
+    run, drawn = folder / "run", folder / "drawn.png"
+    carry_out("run", name, "--out", run, "--no-errors", "--quiet")
+    instant = ("--time", str(INSTANTS[name])) if name in INSTANTS else ()
+    carry_out("render", run, *instant, "--size", size, "--out", drawn, "--quiet")
+    return drawn
+
+
 def draw_hands(folder: Path, name: str) -> None:
     """Draw an instant of a scene of several fingers."""
-    carry_out("run", name, "--out", folder / "run", "--no-errors", "--quiet")
-    drawn, size = folder / "drawn.png", ("--size", "900x563")
-    carry_out("render", folder / "run", "--time", str(HANDS[name]), *size, "--out", drawn, "--quiet")
-    save_jpeg(drawn, f"{name}.jpg", 85)
+    save_jpeg(draw_instant(folder, name, "900x563"), f"{name}.jpg", 85)
 
 
 def draw_sample(folder: Path, name: str) -> None:
     """Draw a sample scene for the table of all."""
-    carry_out("run", name, "--out", folder / "run", "--no-errors", "--quiet")
-    drawn, instant = folder / "drawn.png", INSTANTS.get(name)
-    options = ["--time", str(instant)] if instant else []
-    carry_out("render", folder / "run", *options, "--size", "640x400", "--out", drawn, "--quiet")
-    with Image.open(drawn) as opened:
+    with Image.open(draw_instant(folder, name, "640x400")) as opened:
         small = opened.convert("RGB").crop(BESIDE).resize(SMALL, Image.Resampling.LANCZOS)
     small.save(PICTURES / "samples" / f"{name}.jpg", quality=85, optimize=True)
 

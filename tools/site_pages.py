@@ -4,12 +4,12 @@ The pages are the command line, the parameters, Python, and files from elsewhere
 """
 
 import argparse
-import ast
 import html
 import os
 import posixpath
 import re
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -18,9 +18,13 @@ sys.path[:0] = [str(ROOT), str(ROOT / "addon"), str(ROOT / "tools")]
 
 from digiclay.commands.describe import describe_meaning, write_range, write_value  # noqa: E402
 from digiclay.commands.parser import parser  # noqa: E402
+from digiclay.core.base.modes import MEANINGS  # noqa: E402
 from digiclay.core.base.quantity import EXTENTS, Parameters, list_quantities  # noqa: E402
 from digiclay.core.control.methods import METHODS  # noqa: E402
+from digiclay.core.scene.scene_source import find, list_samples, load  # noqa: E402
 from digiclay.core.scene.schema import SECTIONS, import_parameters  # noqa: E402
+from digiclay.core.session.finished_run import HISTORY_ARRAYS, KINDS  # noqa: E402
+from digiclay.core.studies.evaluation import FIGURES  # noqa: E402
 from manual import make_anchor  # noqa: E402
 from mkdocs.structure.files import File  # noqa: E402
 
@@ -53,21 +57,71 @@ section `[layout]`, is `--set "layout.pitch=2.5 mm"` on the command line. In Ble
 [reference](../nomenclature.md#references). A default in brackets is a sequence of values. A range is in the
 unit of the parameter. It does not contain rules that join several parameters. A range without an end has the
 limits of its unit:
-
-| Unit | Least above 0 | Most |
-|---|---|---|
 """
+#: The page of what `digiclay` offers in Python, by subject; its tables are made of the declarations.
 PYTHON = """\
 # Python
 
-Made from the docstrings of the code. [Architecture](../architecture.md) describes how the packages work
-together; [tasks](../tasks.md#python) has a first program.
+`import digiclay` needs numpy alone. All quantities are in SI units; a wrong value is refused with a
+`DigiclayError` of one line. [Tasks](../tasks.md#python) has a first program.
 
-| package | content |
-|---|---|
+## Scenes
+
+::: digiclay.scene
+    options:
+      heading_level: 3
+
+[Sample scenes](samples.md) and [parameters](parameters.md) have tables of their own.
+
+## Runs
+
+::: digiclay.run
+    options:
+      heading_level: 3
+
+::: digiclay.core.session.run_scene.Result
+    options:
+      heading: digiclay.Result
+      toc_label: Result
+      heading_level: 3
+
+### History
+
+`Result.history` and `history.npz` have the same arrays, by name, with t rows, n pins and f fingers; with a
+single finger the axis f is missing. Pin `i` is in row `i // columns` and column `i % columns`: the pins of a
+row follow each other along x, the rows along y, both upwards. The last row begins no control period: its
+commands are 0, its modes those of the period before.
+{arrays}
+Codes of `mode`:
+{modes}
+## Metrics
+
+[Metrics](../metrics.md) has the formulas.
+{metrics}
+## Extension of Blender
+
+::: digiclay.register
+    options:
+      heading_level: 3
+
+::: digiclay.unregister
+    options:
+      heading_level: 3
+
+## Packages
+
+[Architecture](../architecture.md) says what each is for. Their pages follow: those of the core first, then
+those beside the extension, last the extension's own.
 """
-#: Page that lists the packages of the code; their pages follow it in the navigation, *Reference > Python*.
-PACKAGES_PAGE = "reference/python.md"
+SAMPLES = """\
+---
+hide: [toc]
+---
+# Sample scenes
+
+`digiclay run NAME` simulates a sample, `digiclay.scene("NAME")` is its scene in Python, and *Add > Mesh >
+Digital Clay Samples* adds it in Blender. Each picture shows the last touch, or the middle of a press.
+"""
 #: Head of a page whose results of a search come after those of the pages for readers.
 BEHIND = "---\nsearch:\n  boost: 0.0005\n---\n"
 #: Head of a page whose results come before those of the others.
@@ -96,62 +150,74 @@ def make_commands_page() -> str:
     return "\n".join(lines) + "\n"
 
 
+def write_table(*rows: Sequence[str]) -> str:
+    """Return a table of cells; the first row is its head."""
+    head, *body = ("| " + " | ".join(row) + " |" for row in rows)
+    return "\n".join(("", head, "|---" * len(rows[0]) + "|", *body, ""))
+
+
 def _section(name: str, method: str) -> list[str]:
     """Return the heading and the table of one section of a scene file."""
     kind: type[Parameters] = import_parameters(name, method)
     title = f"## [{name}]" + (f' with method = "{method}"' if name == "control" else "")
-    lines = ["", title, "", write_cell((kind.__doc__ or "").split("\n\n")[0]), ""]
-    lines += [
-        "| Symbol | Name | Unit | Meaning | Range | Default | Source |",
-        "|---|---|---|---|---|---|---|",
-    ]
+    rows: list[Sequence[str]] = [("Symbol", "Name", "Unit", "Meaning", "Range", "Default", "Source")]
     for field, declared in list_quantities(kind).items():
         default, meaning = write_value(getattr(kind(), field)), describe_meaning(declared)
         cells = (f"`{name}.{field}`", declared.unit, meaning, write_range(declared), default, declared.source)
-        lines.append("| " + " | ".join((declared.symbol, *cells)) + " |")
-    return lines
+        rows.append((declared.symbol, *cells))
+    return ["", title, "", write_cell((kind.__doc__ or "").split("\n\n")[0]), write_table(*rows)]
 
 
 def make_parameters_page() -> str:
     """Return the page of all parameters of a scene, from their declarations."""
-    lines = [AHEAD + PARAMETERS.rstrip()]
-    lines += [f"| {unit or 1} | {least:g} | {most:g} |" for unit, (least, most) in EXTENTS.items()]
+    extents = [(unit or "1", f"{least:g}", f"{most:g}") for unit, (least, most) in EXTENTS.items()]
+    lines = [AHEAD + PARAMETERS, write_table(("Unit", "Least above 0", "Most"), *extents)]
     for name in SECTIONS:
         for method in METHODS if name == "control" else ("virtual_master",):
             lines += _section(name, method)
     return "\n".join(lines) + "\n"
 
 
+def make_samples_page() -> str:
+    """Return the page of all sample scenes."""
+    rows = [("", "Scene", "Control method", "Fingers", "Pins", "Duration")]
+    for name in list_samples():
+        scene = load(find(name))
+        picture = f'![{name}](../pictures/samples/{name}.jpg){{ style="min-width: 195px" }}'
+        words = f"`{name}`<br>{write_cell(scene.description)}"
+        pins = f"{scene.layout.rows}\u00a0×\u00a0{scene.layout.columns}"
+        duration = f"{scene.periods * scene.simulation.control_period:.3g}\u00a0s"
+        rows.append((picture, words, f"`{scene.method}`", str(len(scene.fingers)), pins, duration))
+    return SAMPLES + write_table(*rows)
+
+
 def list_packages() -> dict[str, list[str]]:
-    """Return the modules of each package of the code, by the dotted name of the package."""
+    """Return the modules of each package by its dotted name: the core's first, the extension's last."""
     packages: dict[str, list[str]] = {}
     for name, folder in CODE.items():
-        for path in sorted(folder.rglob("*.py")):
-            *parts, last = path.relative_to(folder).with_suffix("").parts
-            # A folder without this file holds data, such as Blender's presets.
-            if last not in ("__init__", "__main__") and (path.parent / "__init__.py").exists():
-                packages.setdefault(".".join((name, *parts)), []).append(last)
-    return dict(sorted(packages.items()))
+        for path in sorted(folder.rglob("__init__.py")):
+            package = ".".join((name, *path.parent.relative_to(folder).parts))
+            modules = [f"{package}.{module.stem}" for module in sorted(path.parent.glob("[!_]*.py"))]
+            # The names of the extension itself stand by subject on the page before.
+            packages[package] = modules if package == "digiclay" else [package, *modules]
+    return dict(
+        sorted(packages.items(), key=lambda row: (".core" not in row[0], "digiclay" in row[0].split(".")))
+    )
 
 
-def _first_line(package: str) -> str:
-    """Return the first line of a package's docstring."""
-    name, *parts = package.split(".")
-    text = CODE[name].joinpath(*parts, "__init__.py").read_text(encoding="utf-8")
-    return (ast.get_docstring(ast.parse(text)) or "").partition("\n")[0]
-
-
-def make_package_page(package: str, modules: list[str]) -> str:
-    """Return the page of a package: its modules by their docstrings. `package`: dotted name."""
-    lines = [BEHIND, f"# {package}", "", _first_line(package), ""]
-    for module in modules:
-        lines += [f"::: {package}.{module}", ""]
-    return "\n".join(lines)
-
-
-def make_packages_page(packages: dict[str, list[str]]) -> str:
-    """Return the page that lists the packages."""
-    return PYTHON + "".join(f"| [`{one}`](python/{one}.md) | {_first_line(one)} |\n" for one in packages)
+def make_python_page() -> str:
+    """Return the page of what `digiclay` offers in Python."""
+    arrays = [
+        (f"`{name}`", str(array.axes).replace("'", ""), KINDS[array.kinds], array.unit, array.meaning)
+        for name, array in HISTORY_ARRAYS.items()
+    ]
+    modes = [(str(int(mode)), mode.name.lower(), meaning) for mode, meaning in MEANINGS.items()]
+    metrics = [(f"`{name}`", metric.unit, metric.doc) for name, metric in FIGURES.items()]
+    return AHEAD + PYTHON.format(
+        arrays=write_table(("Name", "Shape", "Type", "Unit", "Meaning"), *arrays),
+        modes=write_table(("Code", "Mode", "Meaning"), *modes),
+        metrics=write_table(("Name", "Unit", "Meaning"), *metrics),
+    )
 
 
 def find_place(path: str) -> str:
@@ -192,14 +258,14 @@ def on_config(config: Any) -> None:
 
 def on_files(files: Any, config: Any) -> None:
     """Add the pages that are made from the code, those from outside docs/, and the measured results."""
-    packages = list_packages()
     made: dict[str, str | bytes] = {
         "reference/commands.md": make_commands_page(),
         "reference/parameters.md": make_parameters_page(),
-        PACKAGES_PAGE: make_packages_page(packages),
+        "reference/samples.md": make_samples_page(),
+        "reference/python.md": make_python_page(),
     }
-    for name, modules in packages.items():
-        made[f"reference/python/{name}.md"] = make_package_page(name, modules)
+    for name, modules in list_packages().items():
+        made[f"reference/python/{name}.md"] = BEHIND + "\n".join(f"::: {module}\n" for module in modules)
     for page, source in ELSEWHERE.items():
         made[page] = (ROOT / source).read_text(encoding="utf-8")
     for path in (ROOT / "benchmarks" / "results").iterdir():

@@ -15,6 +15,7 @@ import yaml
 from digiclay.commands.parser import parser
 from digiclay.core.base.quantity import Quantity, list_quantities
 from digiclay.core.control.methods import METHODS
+from digiclay.core.scene.scene_source import list_samples
 from digiclay.core.scene.schema import SECTIONS, import_parameters
 
 from benchmarks.kinds import parser as benchmarks_parser
@@ -42,7 +43,7 @@ USERS = ("mine.py", "method.py", "softer.py", "yielding.py")
 #: The parsers that the commands of the pages must pass; they only read, nothing is carried out.
 PARSERS = {"digiclay": parser, "python -m benchmarks": benchmarks_parser}
 #: Row of the table of pictures, and a picture that a page shows.
-ROW = re.compile(r"^\| (`[\w.*]+\.(?:jpg|png|svg|webp)`.*?) \| (.*) \|$", re.MULTILINE)
+ROW = re.compile(r"^\| (`[\w.*/]+\.(?:jpg|png|svg|webp)`.*?) \| (.*) \|$", re.MULTILINE)
 SHOWN = re.compile(r"!\[[^\]]*\]\(([^)\s]+)\)")
 #: Pages of the navigation that `tools/site_pages.py` makes at the build.
 MADE = {"benchmarks.md", "changes.md", "contributing.md"}
@@ -225,12 +226,18 @@ def test_the_navigation_names_each_page_once_and_none_that_is_missing() -> None:
 
 
 def test_every_picture_is_shown_and_has_a_row_of_the_table() -> None:
+    folder = ROOT / "docs" / "pictures"
     targets = [(page, found) for page in PAGES for found in SHOWN.findall(page.read_text(encoding="utf-8"))]
     shown = {(page.parent / target).resolve() for page, target in targets}
+    # The page of the sample scenes is made at the build.
+    shown |= {folder / "samples" / f"{name}.jpg" for name in list_samples()}
+    lacking = [path.stem for path in shown if not path.exists()]
+    assert lacking == [], "draw each by 'python tools/doc_pictures.py samples/NAME.jpg'"
     # The table in CONTRIBUTING.md has the command of each.
     table = ROW.findall((ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8"))
     patterns = [name for names, _ in table for name in re.findall(r"`([^`]+)`", names)]
-    rows = {path.name: [row for row in patterns if fnmatch(path.name, row)] for path in shown}
+    inside = (path.relative_to(folder).as_posix() if folder in path.parents else path.name for path in shown)
+    rows = {name: [row for row in patterns if fnmatch(name, row)] for name in inside}
     assert {name: found for name, found in rows.items() if len(found) != 1} == {}
     assert set(patterns) == {row for found in rows.values() for row in found}
-    assert sorted(set((ROOT / "docs" / "pictures").iterdir()) - shown) == []
+    assert sorted(set(folder.rglob("*.*")) - shown) == []

@@ -1,25 +1,29 @@
-"""The pages made at the build have every command, parameter and module."""
+"""The pages made at the build have every command, parameter, public name, sample, array and metric."""
 
 import argparse
-import ast
 import html
+import inspect
 import re
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
+import digiclay
+import griffe
+import pytest
 from digiclay.commands.parser import parser
 from digiclay.core.base.quantity import list_quantities
 from digiclay.core.control.methods import METHODS
+from digiclay.core.scene.scene_source import list_samples
 from digiclay.core.scene.schema import SECTIONS, import_parameters
+from digiclay.core.session.finished_run import HISTORY_ARRAYS
+from digiclay.core.studies.evaluation import FIGURES
 
 from benchmarks.kinds import parser as benchmarks_parser
 from tests.form.test_pages import COMMAND, is_refused
 
 ROOT = Path(__file__).parents[2]
-PACKAGES = {
-    "digiclay": ROOT / "addon" / "digiclay",
-    **{n: ROOT / n for n in ("digiclay_paper", "digiclay_study")},
-}
+PACKAGES = ("digiclay", "digiclay_paper", "digiclay_serve", "digiclay_study")
 
 
 def commands() -> Iterator[argparse.ArgumentParser]:
@@ -59,18 +63,53 @@ def test_every_parameter_is_on_its_page_with_its_unit(site: Path) -> None:
     assert lacking == []
 
 
-def test_every_module_of_the_code_is_on_the_page_of_its_package(site: Path) -> None:
-    lacking = []
-    for name, folder in PACKAGES.items():
-        for path in folder.rglob("*.py"):
-            parts = path.relative_to(folder).with_suffix("").parts
-            tree = ast.parse(path.read_text(encoding="utf-8"))
-            if parts[-1] in ("__init__", "__main__") or not (path.parent / "__init__.py").exists():
-                continue
-            page = site / "reference" / "python" / f"{'.'.join((name, *parts[:-1]))}.html"
-            text = page.read_text(encoding="utf-8") if page.exists() else ""
-            module = ".".join((name, *parts))
-            classes = [one.name for one in tree.body if isinstance(one, ast.ClassDef) and one.name[0] != "_"]
-            wanted = [module, *(f"{module}.{one}" for one in classes if "__all__" not in path.read_text())]
-            lacking += [one for one in wanted if f'id="{one}"' not in text]
+def test_every_name_that_python_offers_has_its_entry_by_subject(site: Path) -> None:
+    text = (site / "reference" / "python.html").read_text(encoding="utf-8")
+    entries = set(re.findall(r"doc-object-name[^>]*>digiclay\.(\w+)<", text))
+    functions = (name for name, value in vars(digiclay).items() if inspect.isfunction(value))
+    offered = {name for name in functions if name[0] != "_"} | {*getattr(digiclay, "__all__", ())}
+    assert offered - entries == set(), "PYTHON in tools/site_pages.py needs a ':::' entry of each"
+
+
+def list_public(module: griffe.Object) -> Iterator[str]:
+    for name, member in module.members.items():
+        if name[0] != "_" and not isinstance(member, griffe.Alias):
+            yield member.path
+            if isinstance(member, griffe.Module | griffe.Class):
+                yield from list_public(member)
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_everything_public_is_in_the_reference(site: Path, package: str) -> None:
+    pages = [page.read_text(encoding="utf-8") for page in (site / "reference").rglob("*.html")]
+    anchors = {anchor for text in pages for anchor in re.findall(r'id="([\w.]+)"', text)}
+    public = [*list_public(griffe.load(package, search_paths=[ROOT / "addon", ROOT]))]
+    assert len(public) > 100
+    assert [path for path in public if path not in anchors] == []
+
+
+def rows_of(page: Path) -> list[str]:
+    return re.findall(r"<tr>.*?</tr>", page.read_text(encoding="utf-8"), re.DOTALL)
+
+
+def test_every_sample_scene_has_its_row_with_a_picture(site: Path) -> None:
+    pictures = {
+        name: picture
+        for row in rows_of(site / "reference" / "samples.html")
+        for picture in re.findall(r'<img[^>]* src="([^"]+)"', row)
+        for name in re.findall(r"<code>(\w+)</code><br", row)
+    }
+    assert pictures.keys() == {*list_samples()}
+    lacking = [name for name, picture in pictures.items() if not (site / "reference" / picture).is_file()]
+    assert lacking == [], "draw each by 'python tools/doc_pictures.py samples/NAME.jpg'"
+
+
+@pytest.mark.parametrize("table", [HISTORY_ARRAYS, FIGURES], ids=["arrays of a history", "metrics"])
+def test_every_declared_name_has_its_row_with_its_unit(site: Path, table: dict[str, Any]) -> None:
+    rows = rows_of(site / "reference" / "python.html")
+    lacking = [
+        name
+        for name, declared in table.items()
+        if not any(f"<code>{name}</code>" in row and f"<td>{declared.unit}</td>" in row for row in rows)
+    ]
     assert lacking == []
