@@ -1,10 +1,10 @@
 """Benchmarks ``scale`` and ``export``: a control period and mesh files, from 625 pins to a million."""
 
-import argparse
 import statistics
 import tempfile
 import time
 import tracemalloc
+from argparse import Namespace
 from itertools import pairwise
 from pathlib import Path
 
@@ -98,7 +98,7 @@ def _time_bed(side: int, repeats: int) -> dict[str, float]:
     }
 
 
-def measure(arguments: argparse.Namespace, steps: Steps) -> Report:
+def measure(arguments: Namespace, steps: Steps) -> Report:
     """Measure a control period on every size of bed."""
     sides, repeats = (SIDES[:3], 1) if arguments.quick else (SIDES, 5)
     sizes = [_time_bed(side, repeats) for side in steps.through(sides, lambda side: f"{side * side} pins")]
@@ -152,7 +152,7 @@ def export(side: int, kind: str, file: str) -> Record:
         }
 
 
-def measure_export(arguments: argparse.Namespace, steps: Steps) -> Report:
+def measure_export(arguments: Namespace, steps: Steps) -> Report:
     """Export every size: the smallest and the largest bed in all kinds and formats."""
     sides = EXPORTED[:2] if arguments.quick else EXPORTED
     jobs = [

@@ -1,6 +1,5 @@
 """Benchmarks ``commits`` and ``serve``: work of other processes than this one."""
 
-import argparse
 import json
 import os
 import re
@@ -11,6 +10,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from argparse import Namespace
 from contextlib import suppress
 from pathlib import Path
 
@@ -61,7 +61,7 @@ print(json.dumps([measure(settings) for settings in json.loads(sys.argv[1])]))
 LONGEST = 7200.0
 
 
-def measure_commits(arguments: argparse.Namespace, steps: Steps) -> Report:
+def measure_commits(arguments: Namespace, steps: Steps) -> Report:
     """Time both commits by turns."""
     turns, count = (2, 200) if arguments.quick else (max(arguments.turns, 1), 1000)
     names = (arguments.old, arguments.new)
@@ -151,7 +151,7 @@ POSE, HEAD = struct.Struct("<2sBBI7d"), struct.Struct("<2sBBIQI")
 CAMERA, APART, SHARE = 60.0, (18e-3, 30e-3), 0.2
 
 
-def measure_serve(arguments: argparse.Namespace, steps: Steps) -> Report:
+def measure_serve(arguments: Namespace, steps: Steps) -> Report:
     """Serve for a while."""
     seconds, rate, fingers = QUICK if arguments.quick else FULL, arguments.rate, arguments.fingers
     figures, frames = _serve(seconds, rate, fingers)

@@ -1,9 +1,9 @@
 """Benchmarks ``session`` and ``terms``: time of a session by part, and without parts of the model."""
 
-import argparse
 import cProfile
 import statistics
 import sys
+from argparse import Namespace
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
@@ -225,7 +225,7 @@ EFFECTS = {
 }
 
 
-def measure(arguments: argparse.Namespace, steps: Steps) -> Report:
+def measure(arguments: Namespace, steps: Steps) -> Report:
     """Time the session, with the profiler and without."""
     scene, _ = scene_of(arguments)
     check_memory(scene, assemble(scene).rows)
@@ -300,7 +300,7 @@ def without(scene: Scene, term: str) -> Scene | None:
     return scene.with_sections(**{section: None}) if any(scene.list_parts(section)) else None
 
 
-def measure_terms(arguments: argparse.Namespace, steps: Steps) -> Report:
+def measure_terms(arguments: Namespace, steps: Steps) -> Report:
     """Leave out every term by itself, then all of them."""
     scene, _ = scene_of(arguments)
     if arguments.quick:

@@ -1,12 +1,12 @@
 """``digiclay hands``: fingers of tracked hands or of a touch pad, to a server of a session."""
 
-import argparse
 import asyncio
 import json
 import logging
 import math
 import os
 import time
+from argparse import Namespace
 from collections import deque
 from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
 from contextlib import AsyncExitStack, asynccontextmanager, suppress
@@ -66,7 +66,7 @@ def add(commands: Any) -> None:
     add_options(add_command(commands, "hands", purpose, EXAMPLES, carry_out=carry_out), options)
 
 
-def carry_out(arguments: argparse.Namespace) -> int:
+def carry_out(arguments: Namespace) -> int:
     """Pass fingers on until Ctrl-C, or the end of a recording."""
     refuse_without("digiclay hands", "serve", "websockets", "pythonosc")
     from .tuio import Pad
@@ -88,7 +88,7 @@ def carry_out(arguments: argparse.Namespace) -> int:
     return 0
 
 
-async def _pass_on(arguments: argparse.Namespace, source: Any, token: str, stop: Stop) -> None:
+async def _pass_on(arguments: Namespace, source: Any, token: str, stop: Stop) -> None:
     """Pass what comes on to the server; fingers that rest are named again and again."""
     packets = read_packets(arguments.play) if arguments.play else None
     came, told = asyncio.Event(), -math.inf
@@ -132,7 +132,7 @@ async def _pass_on(arguments: argparse.Namespace, source: Any, token: str, stop:
             await send(source.fingers(time.monotonic()))
 
 
-async def _listen(stack: AsyncExitStack, arguments: argparse.Namespace, take: Callable[[bytes], None]) -> str:
+async def _listen(stack: AsyncExitStack, arguments: Namespace, take: Callable[[bytes], None]) -> str:
     """Listen at a port by UDP and, to lines, by TCP; return it in words."""
     host, port = arguments.host, arguments.port or PORTS[arguments.source]
 

@@ -10,8 +10,7 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from digiclay.core.base.arrays import Floats
-from numpy.typing import NDArray
+from digiclay.core.base.arrays import Flags, Floats, Indices
 
 #: Height of a fingertip that is not there, m; whatever is as high is simulated at next to no cost.
 PARKED = 1.0
@@ -75,7 +74,7 @@ class Tracks:
     """Identities of the fingertips, and what was tracked of each."""
 
     #: (f,): -1 for none.
-    identities: NDArray[np.int64]
+    identities: Indices
     #: (f,): time since each was named, s.
     unnamed: Floats
     #: (f, 7): tracked, before that, and filtered; (f, 3): speed, m/s.
@@ -86,7 +85,7 @@ class Tracks:
     #: (f,): what the clutch has slipped, m.
     slip: Floats
     #: (f,): whether the fingertip has come to where its identity is; else it is on its way up.
-    there: NDArray[np.bool_]
+    there: Flags
 
 
 def begin_tracks(poses: Floats) -> Tracks:
@@ -143,9 +142,7 @@ def name_fingers(tracks: Tracks, named: Sequence[tuple[int, Sequence[float]]]) -
     )
 
 
-def _put_back_exchanged(
-    ids: NDArray[np.int64], tracked: Floats, rows: Mapping[int, int], given: Floats
-) -> None:
+def _put_back_exchanged(ids: Indices, tracked: Floats, rows: Mapping[int, int], given: Floats) -> None:
     """Put back identities (f,) that have changed places in a message: their rows in what is given."""
     known = np.array([slot for slot, identity in enumerate(ids.tolist()) if identity in rows], np.intp)
     now = given[[rows[identity] for identity in ids[known].tolist()], :3]
@@ -162,9 +159,7 @@ def _put_back_exchanged(
     ids[known[place[ring]]] = ids[known[ring]]
 
 
-def _hand_over(
-    ids: NDArray[np.int64], tracked: Floats, rows: Mapping[int, int], given: Floats, most: Floats
-) -> None:
+def _hand_over(ids: Indices, tracked: Floats, rows: Mapping[int, int], given: Floats, most: Floats) -> None:
     """Give identities (f,) that are not named to new ones that are nearest to them, `most` (f,) m away."""
     held = np.flatnonzero(ids >= 0)
     named = set(ids.tolist())

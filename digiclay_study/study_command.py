@@ -1,7 +1,7 @@
 """``digiclay study``: Sobol indices of a scene's metrics over ranges of its parameters, and their page."""
 
-import argparse
 import sys
+from argparse import ArgumentTypeError, Namespace
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -71,11 +71,11 @@ def _read_samples(text: str) -> int:
     number = int(text) if text.isdecimal() and len(text) < 10 else 0
     if not 4 <= number <= MOST_SAMPLES or number & (number - 1):
         rule = f"must be a power of two from 4 to {MOST_SAMPLES}, such as 64 or 128"
-        raise argparse.ArgumentTypeError(f"{rule} (got {text!r})")
+        raise ArgumentTypeError(f"{rule} (got {text!r})")
     return number
 
 
-def carry_out(arguments: argparse.Namespace) -> int:
+def carry_out(arguments: Namespace) -> int:
     """Run what is not done yet, and write tables, page and plot."""
     refuse_without("digiclay study", "study", "SALib", "matplotlib")
     subject = read_subject(arguments)
@@ -108,7 +108,7 @@ def carry_out(arguments: argparse.Namespace) -> int:
 
 
 def _write(
-    arguments: argparse.Namespace, subject: Subject, points: Sequence[Point], records: dict[int, Record]
+    arguments: Namespace, subject: Subject, points: Sequence[Point], records: dict[int, Record]
 ) -> list[str]:
     """Write the files; return lines for a person."""
     from digiclay.plots.figure import save
@@ -140,7 +140,7 @@ def _write(
     return [*_summarize(findings), *notes, findings.effort]
 
 
-def _format_call(arguments: argparse.Namespace, subject: Subject) -> str:
+def _format_call(arguments: Namespace, subject: Subject) -> str:
     """Return the command that repeats the study."""
     words = ["study", arguments.scene]
     words += [word for varied in arguments.vary for word in ("--vary", varied)]
@@ -153,7 +153,7 @@ def _format_call(arguments: argparse.Namespace, subject: Subject) -> str:
 class Findings(NamedTuple):
     """Results of a study."""
 
-    arguments: argparse.Namespace
+    arguments: Namespace
     subject: Subject
     #: What `evaluation.describe_effort` says.
     effort: str

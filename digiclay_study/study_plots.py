@@ -7,12 +7,11 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from digiclay.core.base.arrays import Floats
+from digiclay.core.base.arrays import Cells, Flags, Floats
 from digiclay.core.metrics.summary import find_weber_fractions
 from digiclay.core.studies.evaluation import FIGURES
 from digiclay.plots.figure import INK, LINES, SHADE, STYLE, empty
 from digiclay.plots.sweep import read_unit
-from numpy.typing import NDArray
 
 from .indices import CONFIDENCE, Indices
 from .league import MEASURES, find_interval, list_values, show_digits
@@ -55,8 +54,8 @@ SHOWN = 0.85
 def draw_front(
     names: Sequence[str],
     values: Floats,
-    sound: NDArray[np.bool_],
-    front: NDArray[np.intp],
+    sound: Flags,
+    front: Cells,
     chosen: int,
     title: str,
 ) -> Figure:
@@ -88,7 +87,7 @@ def draw_front(
     return figure
 
 
-def _frame(axes: Any, shown: Floats, inside: NDArray[np.intp], trials: NDArray[np.intp]) -> int:
+def _frame(axes: Any, shown: Floats, inside: Cells, trials: Cells) -> int:
     """Set the ends of the axes around front, unchanged scene and most trials; return how many are outside."""
     out = np.zeros(len(shown), dtype=bool)
     for column, name in ((0, "y"), (1, "x")):

@@ -1,6 +1,6 @@
 """``digiclay compare --suite``: control methods over many trajectories with noise, and their league."""
 
-import argparse
+from argparse import ArgumentParser, Namespace
 from collections.abc import Sequence
 from datetime import UTC, datetime
 from pathlib import Path
@@ -32,7 +32,7 @@ KEYS = ("method", "trajectory", "seed")
 PICTURES = ("rfd.svg", "measures.svg")
 
 
-def add_suite(parser: argparse.ArgumentParser) -> None:
+def add_suite(parser: ArgumentParser) -> None:
     """Add the options of a suite."""
     add_options(
         parser.add_argument_group("benchmark of methods (--suite)"),
@@ -54,7 +54,7 @@ def list_suite_methods() -> tuple[str, ...]:
     return tuple(name for name, method in METHODS.items() if method.blister is not None)
 
 
-def run_suite(arguments: argparse.Namespace, methods: Sequence[str], words: Sequence[str]) -> int:
+def run_suite(arguments: Namespace, methods: Sequence[str], words: Sequence[str]) -> int:
     """Run what is not done yet, and write tables, page and plots."""
     if arguments.overwrite:
         raise OutputError("--overwrite is not for --suite, which continues its folder: choose another --out.")
@@ -86,7 +86,7 @@ def run_suite(arguments: argparse.Namespace, methods: Sequence[str], words: Sequ
     )
 
 
-def make_plan(arguments: argparse.Namespace, methods: Sequence[str]) -> Plan:
+def make_plan(arguments: Namespace, methods: Sequence[str]) -> Plan:
     """Return the plan of a suite; ParameterError, SceneError in one line where it cannot be run."""
     quick, words = arguments.quick, arguments.trajectories
     asked = QUICK if quick else GROUPS
@@ -127,7 +127,7 @@ def make_plan(arguments: argparse.Namespace, methods: Sequence[str]) -> Plan:
     return Plan(tuple(methods), groups, seeds, tuple(points), strength, title, hash_points(points))
 
 
-def _count_drags(arguments: argparse.Namespace) -> int:
+def _count_drags(arguments: Namespace) -> int:
     """Return the number of random drags."""
     return arguments.drags or (2 if arguments.quick else 20)
 
@@ -156,7 +156,7 @@ def _write(out: Path, plan: Plan, records: dict[int, tables.Record], command: st
     return [*lines, f"written to {out}: start with {out / 'index.html'}"]
 
 
-def _format_own_command(arguments: argparse.Namespace, plan: Plan, methods: Sequence[str]) -> str:
+def _format_own_command(arguments: Namespace, plan: Plan, methods: Sequence[str]) -> str:
     """Return the command that repeats a suite, with what was left to defaults."""
     words = ["compare", arguments.scene or SCENE, "--suite", "--methods", ",".join(methods)]
     words += ["--trajectories", ",".join(plan.groups), "--repeats", str(len(plan.seeds))]

@@ -1,7 +1,7 @@
 """``digiclay tune``: Pareto front of two metrics over ranges of parameters, searched by optuna's NSGA-II."""
 
-import argparse
 import warnings
+from argparse import Namespace
 from collections.abc import Generator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
@@ -12,7 +12,7 @@ import numpy as np
 from digiclay.commands.arguments import add_command, add_options, whole_number
 from digiclay.commands.evaluation_pool import Evaluation, run_series
 from digiclay.commands.refusals import refuse_without
-from digiclay.core.base.arrays import Floats
+from digiclay.core.base.arrays import Cells, Flags, Floats
 from digiclay.core.base.errors import OutputError, ParameterError
 from digiclay.core.files.run_folder import write_whole
 from digiclay.core.files.tables import Record
@@ -20,7 +20,6 @@ from digiclay.core.scene.toml_table import format_scene
 from digiclay.core.studies.axes import Point, find_ends
 from digiclay.core.studies.evaluation import FIGURES, describe_effort, find_figure, make_bundles
 from digiclay.plots.sweep import read_unit
-from numpy.typing import NDArray
 
 from .indices import find_excess_losses, get_figure
 from .point_series import UNCHANGED, Subject, add_subject, read_subject, refuse_too_many
@@ -56,7 +55,7 @@ def add(commands: Any) -> None:
     )
 
 
-def carry_out(arguments: argparse.Namespace) -> int:
+def carry_out(arguments: Namespace) -> int:
     """Run what is not done yet, and write tables, plot and the chosen scene."""
     refuse_without("digiclay tune", "study", "optuna", "matplotlib")
     subject = read_subject(arguments)
@@ -91,9 +90,7 @@ def _read_choice(word: str, names: Sequence[str]) -> str:
     raise ParameterError("--choose", "", f"must be {KNEE}, {' or '.join(names)}", repr(word))
 
 
-def _evolve(
-    arguments: argparse.Namespace, subject: Subject, evaluation: Evaluation, done: list[Point]
-) -> None:
+def _evolve(arguments: Namespace, subject: Subject, evaluation: Evaluation, done: list[Point]) -> None:
     """Evaluate all generations, or those before a stop, and add their points to those that are done."""
     generations = propose_generations(len(subject.ranges), arguments.population, arguments.seed)
     unchanged = subject.evaluate_unchanged(evaluation, quiet=arguments.quiet)
@@ -129,7 +126,7 @@ def _refuse_others(
 
 
 def _write(
-    arguments: argparse.Namespace,
+    arguments: Namespace,
     subject: Subject,
     points: Sequence[Point],
     records: Mapping[int, Record],
@@ -178,7 +175,7 @@ def _describe(names: Sequence[str], values: Any) -> str:
     return ", ".join(parts)
 
 
-def find_front(values: Floats) -> NDArray[np.intp]:
+def find_front(values: Floats) -> Cells:
     """Return the points that no other dominates, ordered by the first output.
 
     A point dominates another if it is at most as large in both outputs, and less in one. Of equal points the
@@ -219,12 +216,12 @@ class Trials(NamedTuple):
     violation: Floats
 
     @property
-    def sound(self) -> NDArray[np.bool_]:
+    def sound(self) -> Flags:
         """Which runs keep the fingertip, shape (points,)."""
-        kept: NDArray[np.bool_] = self.violation <= 0.0
+        kept: Flags = self.violation <= 0.0
         return kept
 
-    def find_front(self) -> NDArray[np.intp]:
+    def find_front(self) -> Cells:
         """Return the runs on the front, ordered by the first output."""
         front = find_front(np.where(self.sound[:, None], self.values, np.nan))
         if not front.size:
@@ -237,7 +234,7 @@ class Outcome(NamedTuple):
 
     every: Sequence[Point]
     trials: Trials
-    front: NDArray[np.intp]
+    front: Cells
     chosen: int
 
 

@@ -34,6 +34,7 @@ try:
     from bpy.types import Region as Region
     from bpy.types import RegionView3D as RegionView3D
     from bpy.types import RenderSettings as RenderSettings
+    from bpy.types import Scene as Scene
     from bpy.types import Screen as Screen
     from bpy.types import Timer as Timer
     from bpy.types import UILayout as UILayout

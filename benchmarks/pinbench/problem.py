@@ -10,9 +10,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from digiclay.core.base.arrays import Floats
+from digiclay.core.base.arrays import Cells, Floats
 from digiclay.core.files.tables import Record
-from numpy.typing import NDArray
 
 FOLDER = Path(__file__).parent / "problems"
 #: Squared reduced radius at which the paraboloid continues the ellipsoid.
@@ -41,7 +40,7 @@ class Problem:
         return periods
 
     @cached_property
-    def pins(self) -> NDArray[np.intp]:
+    def pins(self) -> Cells:
         """Judged pins, (p,)."""
         return np.array(self.file["judged"]["pins"])
 

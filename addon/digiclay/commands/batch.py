@@ -3,11 +3,11 @@
 No network is contacted: what --submit prints in the end is how the files are handed to the farm.
 """
 
-import argparse
 import os
 import subprocess
 import sys
 import time
+from argparse import Namespace
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path, PureWindowsPath
@@ -94,7 +94,7 @@ class JobProcess(Process):
     "run a job series in the background: scenes, exports, pictures and films", EXAMPLES,
     OPTIONS, one_of(INSTEAD), FARM_OPTIONS,
 )  # fmt: skip
-def carry_out(arguments: argparse.Namespace) -> int:
+def carry_out(arguments: Namespace) -> int:
     """Do the jobs that are not done yet, and write the page about all."""
     for name in ("program", "chunk"):
         if getattr(arguments, name) is not None and arguments.submit is None:
@@ -122,7 +122,7 @@ def carry_out(arguments: argparse.Namespace) -> int:
     return FAILED
 
 
-def _finish(arguments: argparse.Namespace, folder: Folder, failed: dict[str, str]) -> bool:
+def _finish(arguments: Namespace, folder: Folder, failed: dict[str, str]) -> bool:
     """Run the jobs, add to `failed` why some failed, and report; return False after a stop."""
     made, started = folder.batch, time.monotonic()
     todo = [job for job in made.jobs if not job.error and not folder.is_done(job)]

@@ -1,7 +1,7 @@
 """``digiclay compare``: metrics of several control methods on the same input."""
 
-import argparse
 import sys
+from argparse import Action, ArgumentParser, ArgumentTypeError, Namespace
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import replace
@@ -70,7 +70,7 @@ SUITE_ONLY = (
 )
 
 
-def _add_suite(parser: argparse.ArgumentParser) -> None:
+def _add_suite(parser: ArgumentParser) -> None:
     """Add the options of a suite, where its package is installed."""
     if suite := find_beside(*SUITE):
         suite.add_suite(parser)
@@ -79,7 +79,7 @@ def _add_suite(parser: argparse.ArgumentParser) -> None:
         parser.set_defaults(suite=None, **dict.fromkeys(SUITE_ONLY))
 
 
-class _AbsentSuite(argparse.Action):
+class _AbsentSuite(Action):
     """Refusal of --suite where its package is not installed."""
 
     def __call__(self, *given: Any) -> NoReturn:
@@ -90,13 +90,13 @@ def _methods(text: str) -> tuple[str, ...]:
     """Read a list of methods."""
     names = tuple(dict.fromkeys(name.strip() for name in text.split(",") if name.strip()))
     if not names:
-        raise argparse.ArgumentTypeError(f"must name at least one method (got {text!r})")
+        raise ArgumentTypeError(f"must name at least one method (got {text!r})")
     for name in names:
         methods = list_methods()
         if name not in methods and not is_file_word(name) and find_installed(name) is None:
             close = find_nearest_name(name, list(methods))
             asked = f"; did you mean {close}" if close else ""
-            raise argparse.ArgumentTypeError(f"must be among {', '.join(methods)} (got {name!r}{asked})")
+            raise ArgumentTypeError(f"must be among {', '.join(methods)} (got {name!r}{asked})")
     return names
 
 
@@ -116,7 +116,7 @@ OPTIONS = {
     "compare control methods on the same input", EXAMPLES, partial(add_scene, optional=True), OPTIONS,
     _add_suite, description="Run control methods on the same input, and compare their metrics.",
 )  # fmt: skip
-def carry_out(arguments: argparse.Namespace) -> int:
+def carry_out(arguments: Namespace) -> int:
     """Run every method, print the table, write the folder."""
     if arguments.suite and (suite := find_beside(*SUITE)):
         words = _list_words(arguments, suite.list_suite_methods())
@@ -157,9 +157,7 @@ def carry_out(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _open_folder(
-    out: Path, points: Sequence[Point], arguments: argparse.Namespace
-) -> AbstractContextManager[Folder]:
+def _open_folder(out: Path, points: Sequence[Point], arguments: Namespace) -> AbstractContextManager[Folder]:
     """Open the folder of a comparison, see `open_points`; with --overwrite another one in it is removed."""
     methods = [point.words[0] for point in points]
     plan = {"digiclay": __version__, "methods": methods, "speed": arguments.speed}
@@ -175,7 +173,7 @@ def _open_folder(
     return open_points(out, "comparison", {**plan, "scenes": hash_points(points)}, describe, accept)
 
 
-def _measure(point: Point, arguments: argparse.Namespace) -> Record:
+def _measure(point: Point, arguments: Namespace) -> Record:
     """Run a method; return its figures, the force over time, N, and what else the files hold of it."""
     scene, method = point.scene, point.words[0]
     assert scene is not None  # values go together, or nothing was begun
@@ -221,7 +219,7 @@ def _write(out: Path, scene: Scene, every: Mapping[str, Record], *, speed: bool)
     return [*notes, f"written to {out}"]
 
 
-def _list_words(arguments: argparse.Namespace, default: Sequence[str]) -> list[tuple[str, str]]:
+def _list_words(arguments: Namespace, default: Sequence[str]) -> list[tuple[str, str]]:
     """Return the words that name methods, each with its option."""
     words = [(word, "--methods") for word in arguments.methods or default]
     return [*words, (arguments.method, "--method")] if arguments.method is not None else words

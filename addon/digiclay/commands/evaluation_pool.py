@@ -1,7 +1,7 @@
 """Series of points: options, evaluation in processes or on a Dask cluster, stop, and report."""
 
-import argparse
 import sys
+from argparse import ArgumentParser, Namespace
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, ExitStack, contextmanager
 from functools import partial
@@ -43,7 +43,7 @@ PLACES = {
 add_pool = one_of(PLACES)
 
 
-def add_series(parser: argparse.ArgumentParser, syntax: str, metrics: str, varied: str = "RANGE") -> None:
+def add_series(parser: ArgumentParser, syntax: str, metrics: str, varied: str = "RANGE") -> None:
     """Add SCENE and the options of what varies, by its `syntax`, what is measured, where, and how."""
     add_scene(parser)
     several = {"action": "append", "required": True, "help": f"{syntax}; may be repeated"}
@@ -61,7 +61,7 @@ def add_series(parser: argparse.ArgumentParser, syntax: str, metrics: str, varie
 
 @contextmanager
 def open_pool(
-    arguments: argparse.Namespace,
+    arguments: Namespace,
     pieces: int,
     stop: Callable[[], bool],
     draw: Callable[[str], None],
@@ -104,7 +104,7 @@ class Evaluation(ExitStack):
 
     def __init__(
         self,
-        arguments: argparse.Namespace,
+        arguments: Namespace,
         label: str,
         folder: Folder,
         total: int,
@@ -175,7 +175,7 @@ class Evaluation(ExitStack):
 
 
 def run_series(
-    arguments: argparse.Namespace,
+    arguments: Namespace,
     label: str,
     total: int,
     opened: AbstractContextManager[Folder],

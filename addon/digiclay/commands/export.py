@@ -1,7 +1,7 @@
 """``digiclay export`` and ``features``: the formed surface of a run as mesh files, its bosses and creases."""
 
-import argparse
 import json
+from argparse import ArgumentTypeError, Namespace
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
@@ -44,13 +44,13 @@ SURFACE = {
 TIME = {"--time T": (seconds, "instant, s; default: the end")}
 
 
-def finding_of(arguments: argparse.Namespace) -> Finding:
+def finding_of(arguments: Namespace) -> Finding:
     """Return what counts as a feature."""
     with told_as_options("Finding"):
         return Finding(threshold=arguments.threshold, smallest=arguments.smallest)
 
 
-def model_of(arguments: argparse.Namespace, scene: Scene, kind: str) -> Model:
+def model_of(arguments: Namespace, scene: Scene, kind: str) -> Model:
     """Return what is to be made. `kind`: of the mesh."""
     names = ("skin", "resolution", "base_thickness")
     given = {name: value for name in names if (value := getattr(arguments, name, None)) is not None}
@@ -58,7 +58,7 @@ def model_of(arguments: argparse.Namespace, scene: Scene, kind: str) -> Model:
         return Model(kind=kind, cap=scene.actuator.bore / 2.0, **given)
 
 
-def read_formed(arguments: argparse.Namespace, command: str) -> tuple[Scene, Formed]:
+def read_formed(arguments: Namespace, command: str) -> tuple[Scene, Formed]:
     """Return the scene of a run, and its surface at --time compared with that at --former."""
     run = read_run(arguments.run, "height", "position", "force", "mode")
     require_surface(run.scene, command)
@@ -67,7 +67,7 @@ def read_formed(arguments: argparse.Namespace, command: str) -> tuple[Scene, For
         return run.scene, make_formed(run.history, row, float(run.scene.actuator.rest_height))
     try:
         time = seconds(arguments.former)
-    except argparse.ArgumentTypeError as error:
+    except ArgumentTypeError as error:
         raise OutputError(f"--former must be a time or 'rest': {error}.") from None
     return run.scene, make_formed(run.history, row, find_row(run.history, time, "--former"))
 
@@ -117,7 +117,7 @@ def exported(
 
 
 @command("write the formed surface of a run as mesh files", EXAMPLES, OPTIONS)
-def carry_out(arguments: argparse.Namespace) -> int:
+def carry_out(arguments: Namespace) -> int:
     """Export."""
     if arguments.separate and arguments.kind != "features":
         raise OutputError("--separate needs --kind features.")
@@ -153,7 +153,7 @@ points of its crests.
 
 
 @command("list the bosses and creases of a run", LISTING, RUN, SURFACE, TIME, {"--json": "write JSON"})
-def list_features(arguments: argparse.Namespace) -> int:
+def list_features(arguments: Namespace) -> int:
     """List the features."""
     scene, formed = read_formed(arguments, "features")
     features = find_features(formed, model_of(arguments, scene, "surface"), finding_of(arguments))

@@ -1,12 +1,12 @@
 """``digiclay job`` and ``page``: one job of a series, or a part of it, from its files alone; its page."""
 
-import argparse
 import os
 import select
 import shutil
 import sys
 import time
 import traceback
+from argparse import SUPPRESS, Namespace
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
@@ -48,20 +48,20 @@ OPTIONS = {
     "--overwrite": "replace a run, a finished one too",
     "--quiet": "print errors only",
     # How a batch starts it: at what time, and that it is to stop when its standard input ends.
-    "--since": (float, argparse.SUPPRESS),
-    "--follow": argparse.SUPPRESS,
+    "--since": (float, SUPPRESS),
+    "--follow": SUPPRESS,
 }
 #: Seconds that the process of a batch that was killed gets to end.
 GRACE = 20.0
 
 
 @command("run one job of a series from its files alone; for render farms", EXAMPLES, OPTIONS, listed=False)
-def carry_out(arguments: argparse.Namespace) -> int:
+def carry_out(arguments: Namespace) -> int:
     """Do the job, by itself or as a process of a batch."""
     return _follow(arguments) if arguments.follow else _do_alone(arguments)
 
 
-def _do_alone(arguments: argparse.Namespace) -> int:
+def _do_alone(arguments: Namespace) -> int:
     """Do the job with a progress line, and write its failure and its end to the page of its series."""
     note_failure(arguments.job, "")
     try:
@@ -77,7 +77,7 @@ def _do_alone(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _follow(arguments: argparse.Namespace) -> int:
+def _follow(arguments: Namespace) -> int:
     """Do the job for a batch, which reads progress and error from this process's output."""
 
     def tell(step: str, share: float) -> None:
@@ -109,7 +109,7 @@ def has_input_ended() -> bool:
     return bool(select.select([0], [], [], 0.0)[0])
 
 
-def _do_job(arguments: argparse.Namespace, stopped: Callable[[], bool], tell: Tell) -> str:
+def _do_job(arguments: Namespace, stopped: Callable[[], bool], tell: Tell) -> str:
     """Do the job or a part of it, and return its outcome; KeyboardInterrupt when it was stopped."""
     folder, only, frames = arguments.job, arguments.only, arguments.frames
     if not os.path.isfile(folder / JOB):
@@ -135,7 +135,7 @@ def _find_place(job: Path) -> Path:
     return full.parent.parent / RUNS / full.name
 
 
-def _do_run(arguments: argparse.Namespace, work: Work) -> str:
+def _do_run(arguments: Namespace, work: Work) -> str:
     """Do the run, or only what is missing of it."""
     wanted = replace(work.outputs, turntable=None, film=None) if arguments.only else work.outputs
     done = arguments.overwrite or judge_run(work.job, work.run) is not RunState.WHOLE
@@ -145,7 +145,7 @@ def _do_run(arguments: argparse.Namespace, work: Work) -> str:
     return f"written to {work.run}" if done else f"was done already: {work.run}"
 
 
-def _write_run(arguments: argparse.Namespace, work: Work, outputs: Outputs) -> bool:
+def _write_run(arguments: Namespace, work: Work, outputs: Outputs) -> bool:
     """Write the folder of the run; False when another process has just done so."""
     folder, out = work.job, work.run
     scene = load(folder / SCENE)
@@ -183,7 +183,7 @@ It needs neither the JOBS file nor Blender. Exit code 0 also while jobs are miss
     "write the page of a job series from the runs that are done", PAGE_EXAMPLES,
     {"series DIR": (Path, "the folder of the series"), "--quiet": "print errors only"}, listed=False,
 )  # fmt: skip
-def write_page(arguments: argparse.Namespace) -> int:
+def write_page(arguments: Namespace) -> int:
     """Write the page."""
     series = read_batch(arguments.series)
     say(arguments, f"{series.write_page()}; written to {arguments.series / 'index.html'}")

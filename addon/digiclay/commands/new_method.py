@@ -1,8 +1,8 @@
 """``digiclay new-method``: the file of a control method of one's own, which runs as it is."""
 
-import argparse
 import os
 import re
+from argparse import ArgumentTypeError, Namespace
 from pathlib import Path
 from string import Template
 
@@ -28,11 +28,11 @@ def _name(text: str) -> str:
     """Read the name of a method."""
     if not re.fullmatch(r"[a-z][a-z0-9]*(_[a-z0-9]+)*", text) or len(text) > 60:
         rule = "must be small letters and digits, joined by _, such as soft_pad"
-        raise argparse.ArgumentTypeError(f"{rule} (got {text!r})")
+        raise ArgumentTypeError(f"{rule} (got {text!r})")
     if text in METHODS:
-        raise argparse.ArgumentTypeError(f"must not be that of a built-in method (got {text!r})")
+        raise ArgumentTypeError(f"must not be that of a built-in method (got {text!r})")
     if name_method(name_class(text)) != text:
-        raise argparse.ArgumentTypeError(f"must have no digit behind a _ (got {text!r})")
+        raise ArgumentTypeError(f"must have no digit behind a _ (got {text!r})")
     return text
 
 
@@ -50,7 +50,7 @@ def name_class(name: str) -> str:
 
 
 @command("write the file of a control method of your own, which runs as it is", EXAMPLES, OPTIONS)
-def carry_out(arguments: argparse.Namespace) -> int:
+def carry_out(arguments: Namespace) -> int:
     """Write the file."""
     refuse_unwritable(arguments.out)
     path: Path = arguments.out / f"{arguments.name}.py"

@@ -4,7 +4,7 @@ They are in packages beside this one, where those are installed. ``digiclay benc
 benchmarks are.
 """
 
-import argparse
+from argparse import REMAINDER, ArgumentParser
 from importlib import import_module
 from importlib.util import find_spec
 from types import ModuleType
@@ -53,9 +53,9 @@ def add(commands: Any) -> None:
     place.set_defaults(carry_out=lambda _: _refuse(NO_BENCHMARK))
 
 
-def _add_any(commands: Any, name: str, **listed: str) -> argparse.ArgumentParser:
+def _add_any(commands: Any, name: str, **listed: str) -> ArgumentParser:
     """Add a command that takes any arguments."""
     # No argument begins with this, so all are taken alike, --help too.
-    parser: argparse.ArgumentParser = commands.add_parser(name, prefix_chars="\0", add_help=False, **listed)
-    parser.add_argument("rest", nargs=argparse.REMAINDER)
+    parser: ArgumentParser = commands.add_parser(name, prefix_chars="\0", add_help=False, **listed)
+    parser.add_argument("rest", nargs=REMAINDER)
     return parser

@@ -1,8 +1,8 @@
 """Parser of all commands."""
 
-import argparse
 import re
 import sys
+from argparse import Action, ArgumentError, ArgumentParser
 from collections.abc import Sequence
 from importlib import import_module
 from typing import Any, NoReturn
@@ -40,7 +40,7 @@ examples:
 """
 
 
-class Parser(argparse.ArgumentParser):
+class Parser(ArgumentParser):
     """Parser with errors of one line, which suggest the probable word."""
 
     _given: Sequence[str] = ()
@@ -61,14 +61,12 @@ class Parser(argparse.ArgumentParser):
                 return asked.replace("?", f" (not {name})?")
         return ""
 
-    def _check_value(self, action: argparse.Action, value: Any) -> None:
+    def _check_value(self, action: Action, value: Any) -> None:
         """Refuse a value that is not among the choices, and suggest the nearest."""
         if action.choices is not None and value not in action.choices:
             choices = [str(choice) for choice in action.choices]
             self._hint = _asked(str(value), choices)
-            raise argparse.ArgumentError(
-                action, f"invalid choice: {value!r} (choose from {', '.join(choices)})"
-            )
+            raise ArgumentError(action, f"invalid choice: {value!r} (choose from {', '.join(choices)})")
 
     def parse_known_args(self, args: Sequence[str] | None = None, namespace: Any = None) -> Any:  # type: ignore[override]
         """Refuse unknown arguments here, where their command is known."""
@@ -91,7 +89,7 @@ def _asked(word: str, names: Sequence[str]) -> str:
     return f" Did you mean {bare[close]}?" if close else ""
 
 
-def parser(first: str = "") -> argparse.ArgumentParser:
+def parser(first: str = "") -> ArgumentParser:
     """Return the parser of all commands, or of the one that a command line begins with."""
     top = Parser(
         prog="digiclay",

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import argparse
 import sys
+from argparse import SUPPRESS, BooleanOptionalAction, Namespace
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 from dataclasses import replace
@@ -51,9 +51,9 @@ OPTIONS: Options = {
     "--engine": (ENGINES, "default cycles; workbench for films"),
     "--color": (COLORS, "quantity shown by the colors of the pins; default: mode"),
     # Scripts written for older versions have it so.
-    "--colour": {"dest": "color", "choices": COLORS, "help": argparse.SUPPRESS},
+    "--colour": {"dest": "color", "choices": COLORS, "help": SUPPRESS},
     "--arrows": {
-        "action": argparse.BooleanOptionalAction,
+        "action": BooleanOptionalAction,
         "help": "forces as arrows; default: in films only",
     },
     "--rate N": (int, "frames a second of film; default 25"),
@@ -62,7 +62,7 @@ OPTIONS: Options = {
     "--start T": (seconds, "first instant of the film, s"),
     "--stop T": (seconds, "last instant of the film, s"),
     "--strip": {
-        "action": argparse.BooleanOptionalAction,
+        "action": BooleanOptionalAction,
         "help": "plot of the force over time, a line a fingertip; default: in films",
     },
 }
@@ -80,13 +80,13 @@ OF_FILMS, OF_TURNTABLES = ("rate", "speed", "start", "stop", "strip"), ("rate", 
     "draw an instant of a run as a PNG, or a film of it; needs Blender's module, bpy", EXAMPLES,
     RUN, one_of(KINDS), OPTIONS,
 )  # fmt: skip
-def carry_out(arguments: argparse.Namespace) -> int:
+def carry_out(arguments: Namespace) -> int:
     """Render."""
     with told_as_options("Still", "Film", "Turntable", width="size", height="size"):
         return _draw(arguments, _looks(arguments))
 
 
-def _draw(arguments: argparse.Namespace, looks: Still | Turntable | Film) -> int:
+def _draw(arguments: Namespace, looks: Still | Turntable | Film) -> int:
     """Draw, and print the path."""
     default = Path(PICTURE if isinstance(looks, Still) else f"{type(looks).__name__.lower()}.mp4")
     out: Path = arguments.out or arguments.run / default
@@ -108,7 +108,7 @@ def _draw(arguments: argparse.Namespace, looks: Still | Turntable | Film) -> int
     return STOPPED if stop() else 0
 
 
-def _looks(arguments: argparse.Namespace) -> Still | Turntable | Film:
+def _looks(arguments: Namespace) -> Still | Turntable | Film:
     """Return what the picture is to look like; refuse options that mean nothing for it."""
     kind: type[Still | Turntable | Film] = Still
     own: tuple[str, ...] = ()
@@ -205,7 +205,7 @@ def plotted(scene: Scene, history: History, folder: Path) -> list[Path]:
     "draw heights and force of a run over time, and its final surface", PLOT_EXAMPLES,
     RUN, {"--out DIR": (Path, "output folder; default: the run folder")},
 )  # fmt: skip
-def plot(arguments: argparse.Namespace) -> int:
+def plot(arguments: Namespace) -> int:
     """Plot."""
     folder: Path = arguments.out or arguments.run
     refuse_without("digiclay plot", "plots", "matplotlib")

@@ -5,9 +5,9 @@ What a stop prevents of the files in the folder is printed, with the commands th
 
 from __future__ import annotations
 
-import argparse
 import math
 import sys
+from argparse import Namespace
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
@@ -119,7 +119,7 @@ OPTIONS: dict[str, Any] = {
 @command(
     "simulate a scene", EXAMPLES, add_scene, OPTIONS, description="Simulate a scene and write its folder."
 )
-def carry_out(arguments: argparse.Namespace) -> int:
+def carry_out(arguments: Namespace) -> int:
     """Run, write, and print a summary line."""
     scene, path = scene_of(arguments)
     out: Path = arguments.out or Path(find_name(path))
@@ -137,7 +137,7 @@ def carry_out(arguments: argparse.Namespace) -> int:
             return write_run(arguments, claim, result, extras, stop)
 
 
-def _refuse_early(arguments: argparse.Namespace, scene: Scene) -> None:
+def _refuse_early(arguments: Namespace, scene: Scene) -> None:
     """Refuse before the session what is bound to fail after it."""
     extras = [name for name in ("export", "plots", "render") if getattr(arguments, name)]
     for name in extras:
@@ -152,7 +152,7 @@ def _refuse_early(arguments: argparse.Namespace, scene: Scene) -> None:
         refuse_without_blender()
 
 
-def _plan_extras(arguments: argparse.Namespace, result: Result) -> list[Extra]:
+def _plan_extras(arguments: Namespace, result: Result) -> list[Extra]:
     """Return the outputs of the options beside the session."""
     scene, history = result.scene, result.history
     if not history:
@@ -199,7 +199,7 @@ def plan_meshes(
     return Extra([f"{within}/{name}" if within else name for name in file_names(kinds)], make, later)
 
 
-def simulate(arguments: argparse.Namespace, scene: Scene, path: Path, stop: Stop) -> Result:
+def simulate(arguments: Namespace, scene: Scene, path: Path, stop: Stop) -> Result:
     """Run the session of a scene and estimate its errors under progress bars; `path`: of its file."""
     versions = dict[str, str]()
     if scene.method in list_added():
@@ -220,7 +220,7 @@ def simulate(arguments: argparse.Namespace, scene: Scene, path: Path, stop: Stop
 
 
 def write_run(
-    arguments: argparse.Namespace,
+    arguments: Namespace,
     claim: Claim,
     result: Result,
     extras: Iterable[Extra],

@@ -8,9 +8,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..core.base.arrays import Floats
+from ..core.base.arrays import Floats, Modes
 from ..core.base.errors import OutputError
 from ..core.base.modes import Mode
 from ..core.model.actuator import Actuator
@@ -19,7 +18,7 @@ from ..core.model.layout import Layout, make_grid
 from ..core.scene.schema import Scene
 from ..core.session import finished_run
 
-Codes = NDArray[np.int8]
+Codes = Modes
 
 #: What an instant needs of a history.
 ARRAYS = ("position", "height", "mode", "force", "fingertip")

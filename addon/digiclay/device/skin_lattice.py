@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.base.arrays import Floats
+from ..core.base.arrays import Flags, Floats
 from ..core.model.layout import find_grid_shape
 from ..core.surface.formed import take_corners, take_outline
 from ..core.surface.skins import flatten_share
@@ -59,7 +59,7 @@ class SkinLattice(NamedTuple):
     #: (m, 2), points of the skin in plan, m.
     place: Floats
     #: (m,), whether a point is on the lower edge of the skin's sides.
-    sunk: NDArray[np.bool_]
+    sunk: Flags
     #: (f, 4), counter-clockwise from outside.
     faces: Indices
     #: (f,), the pin nearest to the middle of each face, of the nearest row.

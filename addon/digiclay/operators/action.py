@@ -17,11 +17,15 @@ from .poll_messages import edited
 Needs = tuple[Callable[[Any], str], ...]
 
 
-def end_in_order(step: Callable[..., set[str]]) -> Callable[..., set[str]]:
+#: What an operator returns to Blender.
+Result = set[str]
+
+
+def end_in_order(step: Callable[..., Result]) -> Callable[..., Result]:
     """Return a `modal` or `invoke` that no exception leaves: Blender would drop the operator silently."""
 
     @wraps(step)
-    def guarded(self: Polled, context: Context, event: Event) -> set[str]:
+    def guarded(self: Polled, context: Context, event: Event) -> Result:
         try:
             return step(self, context, event)
         except DigiclayError as error:
@@ -45,7 +49,7 @@ class Polled:
     `end_in_order` surrounds `invoke` and `modal`.
     """
 
-    report: Callable[[set[str], str], None]
+    report: Callable[[Result, str], None]
     properties: Any
     poll_message_set: Callable[[str], None]
     needs: Needs = ()
@@ -82,9 +86,9 @@ class Action(Polled):
     """Mixin of an operator without a modal part: a DigiclayError is reported and ends it."""
 
     #: Does it; returns the operator's result where that is not FINISHED.
-    perform: Callable[..., set[str] | None]
+    perform: Callable[..., Result | None]
 
-    def execute(self, context: Context) -> set[str]:
+    def execute(self, context: Context) -> Result:
         """Do it, and report what stands in its way."""
         try:
             return self.perform(context) or {"FINISHED"}
@@ -101,10 +105,10 @@ def action(
     in_any_mode: bool = False,
     bases: tuple[type, ...] = (Action,),
     **properties: Any,
-) -> Callable[[Callable[[Operator, Context], set[str] | None]], Any]:
+) -> Callable[[Callable[[Operator, Context], Result | None]], Any]:
     """Return a decorator that makes an operator, with properties, of its `perform` and its docstring."""
     return declare(
-        (*bases, bpy.types.Operator),
+        (*bases, Operator),
         "perform",
         idname,
         label,
@@ -118,7 +122,7 @@ def action(
 class FileAction(Action):
     """Mixin of an action with a file browser for its `filepath`."""
 
-    def invoke(self, context: Context, event: Event) -> set[str]:
+    def invoke(self, context: Context, event: Event) -> Result:
         context.window_manager.fileselect_add(self)
         return {"RUNNING_MODAL"}
 
@@ -131,7 +135,7 @@ def file_of(pattern: str, *options: str) -> dict[str, Any]:
     }
 
 
-def become_modal(operator: Operator, context: Context) -> set[str]:
+def become_modal(operator: Operator, context: Context) -> Result:
     """Have Blender hand an operator its events: the last step of a start, nothing may fail after it.
 
     Blender crashes when an operator ends by another result while its handler is there.
@@ -144,9 +148,9 @@ class Modal(Polled):
     """Mixin of a modal operator, which first does all that may fail."""
 
     #: Gets ready for events; returns the operator's result where it has ended already.
-    prepare: Callable[..., set[str] | None]
+    prepare: Callable[..., Result | None]
 
-    def invoke(self, context: Context, event: Event) -> set[str]:
+    def invoke(self, context: Context, event: Event) -> Result:
         """Prepare, then borrow what `cancel` gives back, then become modal."""
         self.region = context.region
         ended = self.prepare(context, event)
@@ -186,7 +190,7 @@ class Drawing(Modal):
             self.draw_view, (context.area,), "WINDOW", "POST_PIXEL"
         )
 
-    def end(self, context: Context, *result: str) -> set[str]:
+    def end(self, context: Context, *result: str) -> Result:
         """Give back status bar and view; return the result."""
         clear_status()
         if self.handler is not None:

@@ -33,7 +33,7 @@ from ..settings.devices import BEDS, FIRST, UNNAMED, make_scene
 from ..settings.groups import PRESET_WORDS, method_items
 from ..settings.shown_units import to_si
 from ..ui_text import localize
-from .action import Action, FileAction, action, file_of, millimeters
+from .action import Action, FileAction, Result, action, file_of, millimeters
 from .poll_messages import baked, cannot_change, edited, inside_edit, no_collection, session_runs
 
 DEFAULT = Layout()
@@ -66,9 +66,9 @@ def take_bed(operator: Operator, context: Context) -> None:
 class Placed:
     """Mixin of an operator that adds a bed: at the 3D cursor, or where it is seen."""
 
-    report: Callable[[set[str], str], None]
+    report: Callable[[Result, str], None]
     properties: Any
-    execute: Callable[[Context], set[str]]
+    execute: Callable[[Context], Result]
 
     location: bpy.props.FloatVectorProperty(
         name="Location",
@@ -78,9 +78,9 @@ class Placed:
         options={"SKIP_SAVE", "SKIP_PRESET"},
     )
 
-    def invoke(self, context: Context, event: Event) -> set[str]:
+    def invoke(self, context: Context, event: Event) -> Result:
         """Add the bed, and show all of it."""
-        done: set[str] = self.execute(context)
+        done: Result = self.execute(context)
         if done == {"FINISHED"}:
             frame(context, bed_of(context))
             light(context)
@@ -103,7 +103,7 @@ class Placed:
         running.set_message(words, bed.session_uid)
 
 
-class AddBed(Placed, Action, bpy.types.Operator):
+class AddBed(Placed, Action, Operator):
     """Add a Digital Clay device: a bed of pins that a fingertip forms"""
 
     bl_idname = "mesh.digital_clay_add"
@@ -146,7 +146,7 @@ class AddBed(Placed, Action, bpy.types.Operator):
         max=1000.0,
     )
 
-    def invoke(self, context: Context, event: Event) -> set[str]:
+    def invoke(self, context: Context, event: Event) -> Result:
         """Add the bed to design on unless another is chosen."""
         if not self.properties.is_property_set("bed"):
             own = self.properties.is_property_set
@@ -291,7 +291,7 @@ class AddSceneAction(Placed, Action):
         self.place(context, bed)
 
 
-class OpenScene(AddSceneAction, FileAction, bpy.types.Operator):
+class OpenScene(AddSceneAction, FileAction, Operator):
     """Add the bed of a Digital Clay scene file"""
 
     bl_idname = "digiclay.open_scene"
@@ -300,7 +300,7 @@ class OpenScene(AddSceneAction, FileAction, bpy.types.Operator):
     filepath: bpy.props.StringProperty(subtype="FILE_PATH", options={"SKIP_SAVE"})
     filter_glob: bpy.props.StringProperty(default="*.toml", options={"HIDDEN"})
 
-    def invoke(self, context: Context, event: Event) -> set[str]:
+    def invoke(self, context: Context, event: Event) -> Result:
         """Open the file browser, unless a file was dropped."""
         return (Placed if self.filepath else FileAction).invoke(self, context, event)
 

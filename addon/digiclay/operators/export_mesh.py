@@ -22,7 +22,7 @@ from ..roles import bed_of
 from ..settings.declared import choice, flag, integer
 from ..settings.shown_units import to_si
 from ..ui_text import localize
-from .action import Action, Needs, action, millimeters
+from .action import Action, Needs, Result, action, millimeters
 from .add_bed import select_only
 from .poll_messages import cannot_change, cannot_form, from_rest, no_collection, no_surface
 
@@ -122,7 +122,7 @@ def chosen_bed(context: Context) -> Object:
     return bed
 
 
-class MakeMesh(SurfaceOptions, bpy.types.Operator):
+class MakeMesh(SurfaceOptions, Operator):
     """Make a mesh object of the formed surface of the active bed, with its features as vertex groups"""
 
     bl_idname = "mesh.digital_clay_make"
@@ -210,7 +210,7 @@ AXIS_NAMES = {name.upper().replace("-", "NEGATIVE_"): name for name in AXES}
 AXIS_ITEMS = [(key, name.upper(), "") for key, name in AXIS_NAMES.items()]
 
 
-class ExportMesh(SurfaceOptions, bpy.types.Operator):
+class ExportMesh(SurfaceOptions, Operator):
     """Write the formed surface of the active bed as a mesh file"""
 
     bl_idname = "export_mesh.digital_clay"
@@ -238,7 +238,7 @@ class ExportMesh(SurfaceOptions, bpy.types.Operator):
     up_axis: choice("Up Axis", "Upward axis of an OBJ; slicers expect Z", items=AXIS_ITEMS, default="Y")
     separate: flag("A File Each", "Write each feature into a file of its own", default=False)
 
-    def invoke(self, context: Context, event: Event) -> set[str]:
+    def invoke(self, context: Context, event: Event) -> Result:
         """Open the file browser, with the name of the bed."""
         folder = Path(bpy.data.filepath).parent if bpy.data.filepath else Path.home()
         name = bpy.path.clean_name(bed_of(context).name)

@@ -10,7 +10,7 @@ from ..overlay import views
 from ..press import aim
 from ..roles import bed_of
 from ..ui_text import localize
-from .action import Modal, action, clear_status, show_status
+from .action import Modal, Result, action, clear_status, show_status
 from .poll_messages import cannot_change, no_pins, no_skin, no_view
 
 KEYS = "Click pins to pick them, or again to drop them.  Enter, Esc or right click: done"
@@ -28,7 +28,7 @@ def pick_pins(bed: Object, pins: Iterable[int]) -> None:
     views.redraw()
 
 
-class PickPins(Modal, bpy.types.Operator):
+class PickPins(Modal, Operator):
     """Click pins of the active bed to see their heights in the overlay"""
 
     bl_idname = "digiclay.pick_pins"
@@ -40,7 +40,7 @@ class PickPins(Modal, bpy.types.Operator):
         self.changed = False
         show_status(context, localize(KEYS))
 
-    def modal(self, context: Context, event: Event) -> set[str]:
+    def modal(self, context: Context, event: Event) -> Result:
         """Pick or drop the pin under a click; any other event is passed to the view."""
         show_status(context, localize(KEYS))
         if event.type in ("ESC", "RET", "RIGHTMOUSE") and event.value == "PRESS":
@@ -53,7 +53,7 @@ class PickPins(Modal, bpy.types.Operator):
     def cancel(self, context: Context) -> None:
         clear_status()
 
-    def _click(self, context: Context, event: Event) -> set[str]:
+    def _click(self, context: Context, event: Event) -> Result:
         """Pick or drop the pin under the mouse; a click beside the bed is passed to what lies there."""
         # The view it was started in may be gone by now: another workspace, another editor in its place.
         area, region = _under(context.window.screen, event)

@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 from .. import preferences
-from ..compat import Context, Event, Operator, OperatorProperties, bpy
+from ..compat import Context, Event, Operator, OperatorProperties
 from ..core.scene.scene_source import load
 from ..core.scene.toml_table import PRESETS
 from ..roles import bed_of
@@ -12,11 +12,11 @@ from ..settings.declared import text
 from ..settings.devices import change_layout
 from ..settings.groups import PRESET_WORDS
 from ..ui_text import localize
-from .action import Action, action
+from .action import Action, Result, action
 from .poll_messages import cannot_change, no_bed, no_own_methods, no_own_preset
 
 
-class ApplyPreset(Action, bpy.types.Operator):
+class ApplyPreset(Action, Operator):
     """Set the bed's parameters to those of a preset; its layout stays"""
 
     bl_idname = "digiclay.preset_apply"
@@ -43,7 +43,7 @@ class ApplyPreset(Action, bpy.types.Operator):
             settings.own_preset = self.preset
 
 
-class SavePreset(Action, bpy.types.Operator):
+class SavePreset(Action, Operator):
     """Save the bed's parameters as a custom preset, for other beds and files"""
 
     bl_idname = "digiclay.preset_save"
@@ -52,7 +52,7 @@ class SavePreset(Action, bpy.types.Operator):
 
     name: text("Name", "Name of the preset; a preset of that name is replaced", maxlen=own_presets.LONGEST)
 
-    def invoke(self, context: Context, event: Event) -> set[str]:
+    def invoke(self, context: Context, event: Event) -> Result:
         self.name = bed_of(context).digiclay.own_preset
         return set(context.window_manager.invoke_props_dialog(self))
 
@@ -65,14 +65,14 @@ class SavePreset(Action, bpy.types.Operator):
         self.report({"INFO"}, localize("Saved as {}", file))
 
 
-class RemovePreset(Action, bpy.types.Operator):
+class RemovePreset(Action, Operator):
     """Remove the custom preset that was applied last"""
 
     bl_idname = "digiclay.preset_remove"
     bl_label = "Remove Digital Clay Preset"
     needs = cannot_change, no_own_preset
 
-    def invoke(self, context: Context, event: Event) -> set[str]:
+    def invoke(self, context: Context, event: Event) -> Result:
         return set(context.window_manager.invoke_confirm(self, event))
 
     def perform(self, context: Context) -> None:

@@ -22,9 +22,9 @@ from ..press.brush import FINGERS
 from ..roles import fingertip_of
 from ..settings import devices
 from ..settings.declared import choice, number
-from ..strokes.stroke import DEEPEST, SHALLOWEST, Brush
+from ..strokes.stroke import DEEPEST, SHALLOWEST, Brush, Place
 from ..ui_text import localize
-from .action import Action, Drawing, Polled, action, show_status
+from .action import Action, Drawing, Polled, Result, action, show_status
 from .poll_messages import no_finger, no_tool_in_view
 
 #: Factor of the mouse's way with Shift held down.
@@ -81,7 +81,7 @@ class AdjustMixin(Drawing):
         self.before, self.text, self.snapped = event.mouse_x, "", False
         self._show(context)
 
-    def modal(self, context: Context, event: Event) -> set[str]:
+    def modal(self, context: Context, event: Event) -> Result:
         """Follow the mouse or the keyboard, until confirmed or cancelled."""
         bed = brush.find_bed(context, self.uid)
         if bed is None or not self.poll(context):
@@ -148,7 +148,7 @@ class AdjustMixin(Drawing):
         tool.draw_on_bed(context, bed, places, self.words, (middle[0], middle[1]))
 
 
-def _find_place(context: Context, xy: tuple[float, float]) -> tuple[Any, Any]:
+def _find_place(context: Context, xy: Place) -> tuple[Any, Any]:
     """Return the bed under a pixel of the region and the place there, m; or the bed in use and its middle."""
     target = aim.find_target(context, xy)
     tip = target and fingertip_of(target.bed)
@@ -159,7 +159,7 @@ def _find_place(context: Context, xy: tuple[float, float]) -> tuple[Any, Any]:
     return bed, np.array([0.0, 0.0, float(height.mean())])
 
 
-class AdjustSize(AdjustMixin, bpy.types.Operator):
+class AdjustSize(AdjustMixin, Operator):
     """Set the size of the fingertip: move the mouse sideways, or type a width"""
 
     bl_idname = "digiclay.press_size"
@@ -191,7 +191,7 @@ class AdjustSize(AdjustMixin, bpy.types.Operator):
         return [find_contact_outline(scaled, turn, np.inf), find_contact_outline(scaled, turn, depth)]
 
 
-class AdjustDepth(AdjustMixin, bpy.types.Operator):
+class AdjustDepth(AdjustMixin, Operator):
     """Set the depth, or the height of Raise: move the mouse sideways, or type it"""
 
     bl_idname = "digiclay.press_depth"
@@ -212,7 +212,7 @@ class AdjustDepth(AdjustMixin, bpy.types.Operator):
         return [find_contact_outline(finger, turn, value)]
 
 
-class AdjustStrength(AdjustMixin, bpy.types.Operator):
+class AdjustStrength(AdjustMixin, Operator):
     """Set the share of the depth that a stroke reaches: move the mouse sideways, or type it: 0.5, or 50 %"""
 
     bl_idname = "digiclay.press_strength"
@@ -244,7 +244,7 @@ def scale_size(operator: Operator, context: Context) -> None:
     devices.set_size(devices.find_first(bed), devices.read_size(devices.find_first(bed)) * operator.scalar)
 
 
-class TakeFinger(Action, bpy.types.Operator):
+class TakeFinger(Action, Operator):
     """Give the fingertip the form of a finger, a palm or a tool; its blister follows"""
 
     bl_idname = "digiclay.press_finger"
@@ -307,7 +307,7 @@ class BrushMenu(bpy.types.Menu):
     draw = bpy.types.Menu.draw_preset
 
 
-class SaveBrush(AddPresetBase, Polled, bpy.types.Operator):
+class SaveBrush(AddPresetBase, Polled, Operator):
     """Save fingertip, brush, stroke and symmetry as a preset, or remove the one applied last"""
 
     bl_idname = "digiclay.press_brush_save"

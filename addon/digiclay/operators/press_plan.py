@@ -7,14 +7,14 @@ from ..press.pointer import HELD
 from ..sessions.sculpting import queue_stroke
 from ..strokes.stroke import SHALLOWEST, Brush, let_go, start
 from ..ui_text import localize
-from .action import Drawing, Polled, action, show_status
+from .action import Drawing, Polled, Result, action, show_status
 from .poll_messages import no_finger, no_tool, no_tool_in_view
 from .press_stroke import find_pressed, open_session
 
 KEYS = "Press where the center is to be, and drag along the axis  |  Esc or right click: cancel"
 
 
-class PlaceCenter(Drawing, bpy.types.Operator):
+class PlaceCenter(Drawing, Operator):
     """Place the center of symmetry: press on the bed, and drag along the mirror's axis"""
 
     bl_idname = "digiclay.press_center"
@@ -28,7 +28,7 @@ class PlaceCenter(Drawing, bpy.types.Operator):
         self.before = brush.read_center(brush.tool_settings(context))
         show_status(context, localize(KEYS))
 
-    def modal(self, context: Context, event: Event) -> set[str]:
+    def modal(self, context: Context, event: Event) -> Result:
         """Place the center by the press, and the axis until the release; the view can be turned meanwhile."""
         settings = brush.tool_settings(context)
         if settings is None:
@@ -66,7 +66,7 @@ class PlaceCenter(Drawing, bpy.types.Operator):
             tool.draw_on_bed(context, bed, tool.find_axes(*aim.read_surface(bed), settings), "", (0.0, 0.0))
 
 
-class NoteKeys(Polled, bpy.types.Operator):
+class NoteKeys(Polled, Operator):
     """Note whether Ctrl and Shift are held, for the text at the cursor"""
 
     bl_idname = "digiclay.press_keys"
@@ -74,14 +74,14 @@ class NoteKeys(Polled, bpy.types.Operator):
     bl_options = {"INTERNAL"}
     needs = (no_tool,)
 
-    def invoke(self, context: Context, event: Event) -> set[str]:
+    def invoke(self, context: Context, event: Event) -> Result:
         if (HELD.ctrl, HELD.shift) != (event.ctrl, event.shift):
             HELD.ctrl, HELD.shift = event.ctrl, event.shift
             context.area.tag_redraw()
         return {"PASS_THROUGH"}
 
 
-def _tell_all(operator: Operator, context: Context, kind: Brush) -> set[str] | None:
+def _tell_all(operator: Operator, context: Context, kind: Brush) -> Result | None:
     """Queue a stroke that tells all pins something."""
     session = open_session(operator, context, brush.bed_in_use(context), kind)
     if session is None:
@@ -93,12 +93,12 @@ def _tell_all(operator: Operator, context: Context, kind: Brush) -> set[str] | N
 
 
 @action("digiclay.press_locks_invert", "Invert Locks", no_tool_in_view, no_finger, options=("UNDO",))
-def invert_locks(operator: Operator, context: Context) -> set[str] | None:
+def invert_locks(operator: Operator, context: Context) -> Result | None:
     """Lock the pins that are not locked, and unlock those that are"""
     return _tell_all(operator, context, Brush.INVERT_LOCKS)
 
 
 @action("digiclay.press_locks_clear", "Clear Locks", no_tool_in_view, no_finger, options=("UNDO",))
-def clear_locks(operator: Operator, context: Context) -> set[str] | None:
+def clear_locks(operator: Operator, context: Context) -> Result | None:
     """Unlock all pins"""
     return _tell_all(operator, context, Brush.CLEAR_LOCKS)

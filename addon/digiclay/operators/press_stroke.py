@@ -36,7 +36,7 @@ from ..strokes.stroke import (
 )
 from ..strokes.tracking import find_tracking
 from ..ui_text import localize
-from .action import Drawing, Modal, Polled, clear_status, millimeters, show_status
+from .action import Drawing, Modal, Polled, Result, clear_status, millimeters, show_status
 from .poll_messages import no_place, no_tool
 
 #: How far a turn of the wheel takes the surface up, m.
@@ -144,7 +144,7 @@ class PressSettings:
     )
 
 
-class Press(PressSettings, Modal, bpy.types.Operator):
+class Press(PressSettings, Modal, Operator):
     """Press the fingertip into the pins under the mouse, and drag it"""
 
     bl_idname = "digiclay.press"
@@ -152,7 +152,7 @@ class Press(PressSettings, Modal, bpy.types.Operator):
     bl_options = {"INTERNAL", "UNDO"}
     needs = (no_place,)
 
-    def prepare(self, context: Context, event: Event) -> set[str] | None:
+    def prepare(self, context: Context, event: Event) -> Result | None:
         """Begin where the mouse points; beside the bed there is nothing to press."""
         # Shift and Ctrl change the brush for as long as this stroke lasts.
         self.kind = brush.choose_brush(self.brush, event)
@@ -182,7 +182,7 @@ class Press(PressSettings, Modal, bpy.types.Operator):
     def borrow(self, context: Context) -> None:
         self.timer = loop.time_window(context)
 
-    def modal(self, context: Context, event: Event) -> set[str]:
+    def modal(self, context: Context, event: Event) -> Result:
         """Draw the stroke on; other events are passed to Blender, to turn the view for instance."""
         bed = brush.find_bed(bpy.context, self.uid)
         session = running.find(bed)
@@ -235,7 +235,7 @@ class Press(PressSettings, Modal, bpy.types.Operator):
         self.full = min(max(self.full + by, 0.0), DEEPEST)
         self._change(partial(deepen, by=by * self.strength * self.pressure))
 
-    def _amount(self) -> tuple[float, float]:
+    def _amount(self) -> Place:
         """Return depth or height, m, and share of a sample drawn now."""
         share = float(self.strength * self.pressure)
         return float(self.full) * share, share
@@ -266,7 +266,7 @@ class Press(PressSettings, Modal, bpy.types.Operator):
         words = brush.describe_stroke(self.kind, self.full, self.strength * self.pressure)
         show_status(context, localize(KEYS if self.kind.has_amount else KEYS_PLAIN, words))
 
-    def _end(self, result: set[str]) -> set[str]:
+    def _end(self, result: Result) -> Result:
         """Give back the status bar, and the timer."""
         clear_status()
         if self.timer is not None:
@@ -287,7 +287,7 @@ def _is_undo_key(context: Context, event: Event) -> bool:
     )
 
 
-def find_pressed(operator: Operator, context: Context, xy: tuple[float, float]) -> aim.Target | None:
+def find_pressed(operator: Operator, context: Context, xy: Place) -> aim.Target | None:
     """Return the place on a bed under a pixel of the region; the operator reports what hides it."""
     target, hider = aim.look_at(context, xy)
     if hider is not None:
@@ -345,7 +345,7 @@ def _no_shape(context: Context) -> str:
     return "" if chosen else "Select the Press tool, and Line, Ring or Stamp in its header"
 
 
-class PressShape(Drawing, bpy.types.Operator):
+class PressShape(Drawing, Operator):
     """Form a line from the place under the mouse, or a ring or stamp about it, by dragging to its end"""
 
     bl_idname = "digiclay.press_shape"
@@ -353,7 +353,7 @@ class PressShape(Drawing, bpy.types.Operator):
     bl_options = {"INTERNAL", "UNDO"}
     needs = (_no_shape,)
 
-    def prepare(self, context: Context, event: Event) -> set[str] | None:
+    def prepare(self, context: Context, event: Event) -> Result | None:
         settings: OperatorProperties = brush.tool_settings(context)
         self.kind = brush.choose_brush(settings.brush, event)
         self.shape = brush.find_path(settings, self.kind)
@@ -367,7 +367,7 @@ class PressShape(Drawing, bpy.types.Operator):
         self._show(context)
         return None
 
-    def modal(self, context: Context, event: Event) -> set[str]:
+    def modal(self, context: Context, event: Event) -> Result:
         """Draw the path until the mouse button is released; the view can be turned meanwhile."""
         bed = brush.find_bed(context, self.uid)
         if bed is None or brush.tool_settings(context) is None:
@@ -403,7 +403,7 @@ class PressShape(Drawing, bpy.types.Operator):
         show_status(context, self.words)
         self.region.tag_redraw()
 
-    def end(self, context: Context, *result: str) -> set[str]:
+    def end(self, context: Context, *result: str) -> Result:
         ghost.plan(self.uid, None)
         return super().end(context, *result)
 
@@ -421,7 +421,7 @@ class PressShape(Drawing, bpy.types.Operator):
         tool.draw_on_bed(context, bed, lines, self.words.partition("  |")[0], (at[0], at[1] - 14.0))
 
 
-class PressLine(Polled, bpy.types.Operator):
+class PressLine(Polled, Operator):
     """Form a line from the end of the last stroke to the place under the mouse"""
 
     bl_idname = "digiclay.press_line"
@@ -429,7 +429,7 @@ class PressLine(Polled, bpy.types.Operator):
     bl_options = {"INTERNAL", "UNDO"}
     needs = (no_tool,)
 
-    def invoke(self, context: Context, event: Event) -> set[str]:
+    def invoke(self, context: Context, event: Event) -> Result:
         """Queue the line; without a stroke before it, the place alone."""
         target = find_pressed(self, context, (event.mouse_region_x, event.mouse_region_y))
         if target is None:
@@ -454,7 +454,7 @@ def _lay_stroke(settings: OperatorProperties, path: Floats | list[Place], kind: 
 
 def _queue_path(
     operator: Operator, context: Context, bed: Object, path: Floats | list[Place], kind: Brush
-) -> set[str]:
+) -> Result:
     """Queue a path for the fingertip, as the tool's settings have it."""
     session = open_session(operator, context, bed, kind)
     if session is None:

@@ -30,7 +30,7 @@ from ..settings import properties
 from ..settings.declared import flag, text
 from ..ui_text import localize
 from . import poll_messages as poll
-from .action import Action, Modal, Polled, action, become_modal
+from .action import Action, Modal, Polled, Result, action, become_modal
 
 #: How often Blender gets a moment to save by itself, and how long that is, s. It tries every 10 ms.
 EVERY, MOMENT = 20.0, 0.1
@@ -57,7 +57,7 @@ class Ticking(Polled):
 class LoopMixin(Ticking):
     """Mixin of the modal operators for the sessions of a window."""
 
-    def drive(self, context: Context) -> set[str]:
+    def drive(self, context: Context) -> Result:
         """Begin to drive the loop."""
         loop.LOOP.aside = False
         self.token, self.since = loop.token(), time.perf_counter()
@@ -66,7 +66,7 @@ class LoopMixin(Ticking):
         with context.temp_override(area=None, region=None):
             return become_modal(self, context)
 
-    def modal(self, context: Context, event: Event) -> set[str]:
+    def modal(self, context: Context, event: Event) -> Result:
         """Tick with the timer; pass every other event on."""
         if self.token != loop.token():
             return {"CANCELLED"}
@@ -103,7 +103,7 @@ class LoopMixin(Ticking):
         handlers.end_all(localize("ended: {}", words))
 
 
-class GoOn(LoopMixin, bpy.types.Operator):
+class GoOn(LoopMixin, Operator):
     """Continue the sessions after Blender's auto save"""
 
     bl_idname = "digiclay.session_go_on"
@@ -111,11 +111,11 @@ class GoOn(LoopMixin, bpy.types.Operator):
     bl_options = {"INTERNAL"}
     needs = (poll.no_undriven,)
 
-    def invoke(self, context: Context, event: Event) -> set[str]:
+    def invoke(self, context: Context, event: Event) -> Result:
         return self.drive(context)
 
 
-class FinishStrokes(Ticking, Modal, bpy.types.Operator):
+class FinishStrokes(Ticking, Modal, Operator):
     """Finish all press strokes at once, without drawing them meanwhile; Esc lets them go on as before"""
 
     bl_idname = "digiclay.finish_strokes"
@@ -131,7 +131,7 @@ class FinishStrokes(Ticking, Modal, bpy.types.Operator):
         views.stop()  # its curves would have the views drawn
         context.window_manager.progress_begin(0, 100)
 
-    def modal(self, context: Context, event: Event) -> set[str]:
+    def modal(self, context: Context, event: Event) -> Result:
         """End with the strokes, or at Esc; the loop has every other event."""
         if event.type == "ESC" and event.value == "PRESS":
             return self._end(context, "CANCELLED")
@@ -142,7 +142,7 @@ class FinishStrokes(Ticking, Modal, bpy.types.Operator):
             context.window_manager.progress_update(int(100.0 * max(0.0, done)))
         return {"PASS_THROUGH"}
 
-    def execute(self, context: Context) -> set[str]:
+    def execute(self, context: Context) -> Result:
         """Finish them before anything else, as a script would have it; not what waits, for a hand say."""
         before: list[int] = []
         while tick.has_strokes() and before != (now := [one.state.period for one in running.list_sessions()]):
@@ -153,7 +153,7 @@ class FinishStrokes(Ticking, Modal, bpy.types.Operator):
     def cancel(self, context: Context) -> None:
         self._end(context)
 
-    def _end(self, context: Context, *result: str) -> set[str]:
+    def _end(self, context: Context, *result: str) -> Result:
         """Give back the cursor and the timer, and let the loop take its time again; return the result."""
         tick.end_haste(context)
         views.follow()
@@ -235,7 +235,7 @@ def leave_entry(menu: Menu, context: Context) -> None:
         menu.layout.operator(to_object_mode.bl_idname, icon="LOOP_BACK")
 
 
-class Session(LoopMixin, Action, bpy.types.Operator):
+class Session(LoopMixin, Action, Operator):
     """Start sculpting: the pins follow the fingertip, which any tool can move. Esc stops"""
 
     bl_idname = "digiclay.session"
@@ -247,10 +247,10 @@ class Session(LoopMixin, Action, bpy.types.Operator):
         poll.no_window,
     )
 
-    def invoke(self, context: Context, event: Event) -> set[str]:
+    def invoke(self, context: Context, event: Event) -> Result:
         return self.execute(context)
 
-    def perform(self, context: Context) -> set[str] | None:
+    def perform(self, context: Context) -> Result | None:
         """Start the session, and the loop unless another session's drives this one as well."""
         bed = bed_of(context)
         leave_mode(context)
@@ -321,7 +321,7 @@ def rewind_session(operator: Operator, context: Context) -> None:
         options={"HIDDEN", "SKIP_SAVE"},
     ),
 )  # fmt: skip
-def reset_session(operator: Operator, context: Context) -> set[str] | None:
+def reset_session(operator: Operator, context: Context) -> Result | None:
     """Return all pins to rest and lift the fingertip off them"""
     active = active_session(context)
     if active is None:
@@ -349,7 +349,7 @@ def _bring_to_rest(bed: Object) -> None:
     bridge.place_fingertips(bed, poses, find_ellipsoids(scene))
 
 
-class FollowServer(Action, bpy.types.Operator):
+class FollowServer(Action, Operator):
     """Move the fingertip with that of a server, digiclay serve, by OSC; the bed forms as under the hand"""
 
     bl_idname = "digiclay.follow_server"
@@ -360,7 +360,7 @@ class FollowServer(Action, bpy.types.Operator):
     address: text("Address", "Address and port that the server prints for OSC", default="127.0.0.1:8766")
     token: text("Token", "Token that the server prints; no file keeps it", subtype="PASSWORD")
 
-    def invoke(self, context: Context, event: Event) -> set[str]:
+    def invoke(self, context: Context, event: Event) -> Result:
         return set(context.window_manager.invoke_props_dialog(self))
 
     def perform(self, context: Context) -> None:

@@ -30,7 +30,7 @@ from ..sessions import running, sculpting
 from ..settings import properties
 from ..settings.declared import choice, integer, text
 from ..ui_text import localize
-from .action import FileAction, TimedAction, action, file_of, show_status
+from .action import FileAction, Result, TimedAction, action, file_of, show_status
 from .poll_messages import (
     baked,
     cannot_change,
@@ -58,7 +58,7 @@ def record_take(operator: Operator, context: Context) -> None:
     "digiclay.take_keep", "Keep Take", no_recording,
     name=text("Name", "Name of the take; empty: its number", maxlen=60),
 )  # fmt: skip
-def keep_take(operator: Operator, context: Context) -> set[str] | None:
+def keep_take(operator: Operator, context: Context) -> Result | None:
     """Stop recording and keep the take in this file"""
     handlers.clear_recovery()
     bed = bed_of(context)
@@ -74,7 +74,7 @@ def keep_take(operator: Operator, context: Context) -> set[str] | None:
     return None
 
 
-class ExportTake(FileAction, bpy.types.Operator):
+class ExportTake(FileAction, Operator):
     """Write a take as a scene file for `digiclay run`"""
 
     bl_idname = "digiclay.take_export"
@@ -86,7 +86,7 @@ class ExportTake(FileAction, bpy.types.Operator):
     filepath: bpy.props.StringProperty(subtype="FILE_PATH")
     filter_glob: bpy.props.StringProperty(default="*.toml", options={"HIDDEN"})
 
-    def invoke(self, context: Context, event: Event) -> set[str]:
+    def invoke(self, context: Context, event: Event) -> Result:
         """Open the file browser, with the name of the take."""
         try:
             name = takes.find(bed_of(context), self.take).name
@@ -147,7 +147,7 @@ def read_fitting_take(bed: Object, number: str) -> Take:
     return take
 
 
-class ReplayTake(TimedAction, bpy.types.Operator):
+class ReplayTake(TimedAction, Operator):
     """Replay a take at its recorded speed. Esc stops and restores the bed"""
 
     _states: Iterator[tuple[System, State]]
@@ -179,7 +179,7 @@ class ReplayTake(TimedAction, bpy.types.Operator):
         self._begin(context)
         self.interval = 1.0 / preferences.get(context).redraw_rate
 
-    def modal(self, context: Context, event: Event) -> set[str]:
+    def modal(self, context: Context, event: Event) -> Result:
         """Continue by the wall clock."""
         if event.type == "ESC" and event.value == "PRESS":
             return self._restore(context)
@@ -233,7 +233,7 @@ class ReplayTake(TimedAction, bpy.types.Operator):
         fingers = find_ellipsoids(self._take.scene)
         bridge.place_fingertips(bed, self._take.poses[self._at], fingers, self._numbers)
 
-    def _finish(self, context: Context) -> set[str]:
+    def _finish(self, context: Context) -> Result:
         """Leave the bed in the final state of the take, and report the comparison."""
         bed, system = bed_of(context), self._system
         state = snapshot.dump(system, self._state)
@@ -266,7 +266,7 @@ class ReplayTake(TimedAction, bpy.types.Operator):
             self.report({"INFO"}, localize("Replayed {}: {}", seconds, words))
         return {"FINISHED"}
 
-    def _restore(self, context: Context) -> set[str]:
+    def _restore(self, context: Context) -> Result:
         """Show the bed as it was before."""
         self.cancel(context)
         bed = next((thing for thing in bpy.data.objects if thing.session_uid == self._uid), None)
@@ -299,7 +299,7 @@ SOURCES = (
 )
 
 
-class Bake(TimedAction, bpy.types.Operator):
+class Bake(TimedAction, Operator):
     """Make an ordinary animation of the bed from a session; it plays and renders without simulation"""
 
     bl_idname = "digiclay.bake"
@@ -329,7 +329,7 @@ class Bake(TimedAction, bpy.types.Operator):
         super().borrow(context)
         context.window_manager.progress_begin(0.0, 100.0)
 
-    def modal(self, context: Context, event: Event) -> set[str]:
+    def modal(self, context: Context, event: Event) -> Result:
         """Work for a moment, unless the user has had enough."""
         if event.type == "ESC" and event.value == "PRESS":
             self.cancel(context)

@@ -6,9 +6,8 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..core.base.arrays import Floats
+from ..core.base.arrays import Floats, Indices
 from ..core.base.modes import Mode
 from ..core.model.touch import MOST_FORCE, MOST_INDENTATION
 from ..device import heat
@@ -52,7 +51,7 @@ class Readings:
     #: (t, k), their heights, m; NaN where they were not followed yet.
     heights: Floats
     #: (m,), number of pins in each of the m modes.
-    modes: NDArray[np.int64]
+    modes: Indices
     #: Of the modes, as the pins wear them.
     colors: tuple[Color, ...]
     #: How much of the past is shown, s.

@@ -10,6 +10,8 @@ from ..roles import bed_of
 CATEGORY = "Digital Clay"
 #: The panels that others are sub-panels of.
 SESSION, EXPORT, LABORATORY = "DIGICLAY_PT_session", "DIGICLAY_PT_export", "DIGICLAY_PT_laboratory"
+#: What Blender calls a panel of ours with when it draws it.
+Sidebar = bpy.types.Panel
 #: Letters a line of the sidebar holds at its usual width.
 LINE = 36
 
@@ -46,7 +48,7 @@ def declare(
 
 def panel(
     idname: str, label: str, order: int, *, parent: str = "", closed: bool = True, with_bed: bool = True
-) -> Callable[[Callable[[bpy.types.Panel, Context], None]], Any]:
+) -> Callable[[Callable[[Sidebar, Context], None]], Any]:
     """Return a decorator that makes a panel of its `draw`, a sub-panel of `parent` if that is given."""
 
     return declare(

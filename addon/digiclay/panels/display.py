@@ -23,7 +23,7 @@ from ..sessions import running
 from ..settings import properties
 from ..settings.declared import choice, flag, number
 from ..ui_text import localize
-from .base import LABORATORY, draw_property, panel
+from .base import LABORATORY, Sidebar, draw_property, panel
 
 COLORINGS = (
     ("mode", "Mode", "Color the pins by what they do"),
@@ -168,7 +168,7 @@ class Display(bpy.types.PropertyGroup):
 
 
 @panel("DIGICLAY_PT_show", "Show", 20, closed=False)
-def show(sidebar: bpy.types.Panel, context: Context) -> None:
+def show(sidebar: Sidebar, context: Context) -> None:
     """What is seen of the bed."""
     bed, layout = bed_of(context), sidebar.layout
     layout.enabled = not is_edited(context)
@@ -182,7 +182,7 @@ def show(sidebar: bpy.types.Panel, context: Context) -> None:
 
 
 @panel("DIGICLAY_PT_display", "View Details", 0, parent=LABORATORY)
-def details(sidebar: bpy.types.Panel, context: Context) -> None:
+def details(sidebar: Sidebar, context: Context) -> None:
     """Skin, colors and arrows of the bed, details of the overlay; a disabled item takes no time."""
     bed, layout = bed_of(context), sidebar.layout
     layout.enabled = not is_edited(context)

@@ -13,14 +13,14 @@ from ..settings.devices import find_settings
 from ..settings.groups import method_of, method_property
 from ..settings.properties import part_group
 from ..ui_text import localize
-from .base import LABORATORY, Panel, draw_lines, menu, panel
+from .base import LABORATORY, Panel, Sidebar, draw_lines, menu, panel
 
 #: Kinds of properties whose label stands beside the field.
 BESIDE = {"ENUM", "STRING"}
 
 
 @panel("DIGICLAY_PT_start", "Digital Clay", 0, closed=False, with_bed=False)
-def start(sidebar: bpy.types.Panel, context: Context) -> None:
+def start(sidebar: Sidebar, context: Context) -> None:
     """Content of the tab without an active bed: how to add one."""
     column = sidebar.layout.column()
     column.label(text="Select a bed or its fingertip,")
@@ -42,7 +42,7 @@ def presets(entries: Menu, context: Context) -> None:
 
 
 @panel("DIGICLAY_PT_device", "Device", 2, parent=LABORATORY)
-def device(sidebar: bpy.types.Panel, context: Context) -> None:
+def device(sidebar: Sidebar, context: Context) -> None:
     """Type of device."""
     bed = bed_of(context)
     settings = bed.digiclay
@@ -59,7 +59,7 @@ def device(sidebar: bpy.types.Panel, context: Context) -> None:
 
 
 @panel("DIGICLAY_PT_control", "Control", 3, parent=LABORATORY)
-def control(sidebar: bpy.types.Panel, context: Context) -> None:
+def control(sidebar: Sidebar, context: Context) -> None:
     """Control of the cells."""
     settings = bed_of(context).digiclay
     row = sidebar.layout.row()

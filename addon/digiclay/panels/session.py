@@ -1,6 +1,6 @@
 """Panels Session, Takes and Laboratory: start and stop, recordings, speed and error."""
 
-from ..compat import Context, UILayout, bpy
+from ..compat import Context, UILayout
 from ..live import beds, follow
 from ..overlay.sections import effort_message, error_message
 from ..recorded import bake, takes
@@ -8,11 +8,11 @@ from ..roles import bed_of
 from ..sessions import running
 from ..sessions.running import Running
 from ..ui_text import localize
-from .base import LABORATORY, SESSION, draw_lines, panel
+from .base import LABORATORY, SESSION, Sidebar, draw_lines, panel
 
 
 @panel(SESSION, "Session", 10, closed=False)
-def session_panel(sidebar: bpy.types.Panel, context: Context) -> None:
+def session_panel(sidebar: Sidebar, context: Context) -> None:
     """Live sculpting."""
     bed = bed_of(context)
     session, column = running.find(bed), sidebar.layout.column(align=True)
@@ -82,7 +82,7 @@ def error_line(session: Running) -> str:
 
 
 @panel(LABORATORY, "Laboratory", 40)
-def laboratory(sidebar: bpy.types.Panel, context: Context) -> None:
+def laboratory(sidebar: Sidebar, context: Context) -> None:
     """Single steps, speed and error of a session, and the server that it follows."""
     session, column = running.find(bed_of(context)), sidebar.layout.column(align=True)
     column.operator("digiclay.session_step", icon="FRAME_NEXT")
@@ -98,7 +98,7 @@ def laboratory(sidebar: bpy.types.Panel, context: Context) -> None:
 
 
 @panel("DIGICLAY_PT_takes", "Takes", 1, parent=SESSION)
-def takes_panel(sidebar: bpy.types.Panel, context: Context) -> None:
+def takes_panel(sidebar: Sidebar, context: Context) -> None:
     """Takes of the bed, and its bake."""
     layout, bed = sidebar.layout, bed_of(context)
     session = running.find(bed)

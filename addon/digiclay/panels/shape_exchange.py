@@ -2,10 +2,10 @@
 
 from typing import Any
 
-from ..compat import Context, UILayout, bpy
+from ..compat import Context, UILayout
 from ..exchange import formed_bed
 from ..roles import bed_of, is_edited
-from .base import EXPORT, SESSION, panel
+from .base import EXPORT, SESSION, Sidebar, panel
 
 #: Property of a bed that holds the list of its features; the operator that lists them writes it.
 LISTED = "digiclay_features"
@@ -14,7 +14,7 @@ MOST = 24
 
 
 @panel("DIGICLAY_PT_shapes", "Shapes", 0, parent=SESSION)
-def shapes(sidebar: bpy.types.Panel, context: Context) -> None:
+def shapes(sidebar: Sidebar, context: Context) -> None:
     """Initial shape of the bed."""
     settings = bed_of(context).digiclay
     sidebar.layout.enabled = not is_edited(context)
@@ -47,7 +47,7 @@ def _draw_shape(layout: UILayout, shape: Any) -> None:
 
 
 @panel(EXPORT, "Export", 30, closed=False)
-def export(sidebar: bpy.types.Panel, context: Context) -> None:
+def export(sidebar: Sidebar, context: Context) -> None:
     """Formed surface as meshes."""
     column = sidebar.layout.column(align=True)
     column.operator_menu_enum("mesh.digital_clay_make", "kind", text="Make Mesh", icon="MESH_DATA")
@@ -55,7 +55,7 @@ def export(sidebar: bpy.types.Panel, context: Context) -> None:
 
 
 @panel("DIGICLAY_PT_features", "Features", 0, parent=EXPORT)
-def features(sidebar: bpy.types.Panel, context: Context) -> None:
+def features(sidebar: Sidebar, context: Context) -> None:
     """List of bosses and creases, and the surface they are measured from."""
     bed, layout = bed_of(context), sidebar.layout
     column = layout.column(align=True)

@@ -15,11 +15,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..bridge import SCALE
-from ..compat import Object, bpy, quiet, strips, to_video
-from ..core.base.arrays import Array, Floats
+from ..compat import Object, Scene, bpy, quiet, strips, to_video
+from ..core.base.arrays import Array, Cells, Floats
 from ..core.base.errors import OutputError
 from ..core.base.modes import Mode
 from ..core.files.run_folder import name_unfinished
@@ -98,7 +97,7 @@ LOOKS = 24
 class Shots:
     """Frames of a film, which can be drawn in any order."""
 
-    scene: bpy.types.Scene
+    scene: Scene
     #: Number of frames.
     count: int
     #: Changes the scene to what a frame shows, by its number from 0.
@@ -164,9 +163,7 @@ def stage_turntable(instant: Instant, looks: Turntable) -> Iterator[Shots]:
         yield Shots(scene, looks.frames, show)
 
 
-def _visible_points(
-    bed: Object, history: Mapping[str, Array], rows: NDArray[np.intp], sizes: Table
-) -> Floats:
+def _visible_points(bed: Object, history: Mapping[str, Array], rows: Cells, sizes: Table) -> Floats:
     """Return what must be in the frame, (k, 3), Blender units: all pins, the fingertips that are near."""
     used = slice(int(rows[0]), int(rows[-1]) + 1)
     instant = Instant.of(history, int(rows[0]), **sizes)

@@ -12,7 +12,7 @@ import numpy as np
 
 from .. import bridge
 from ..bridge import linear
-from ..compat import Material, Object, bpy, shader_nodes
+from ..compat import Material, Object, Scene, bpy, shader_nodes
 from ..core.base.arrays import Floats
 from ..core.base.modes import MEANINGS, Mode
 from ..device import heat, palettes, primitives
@@ -38,7 +38,7 @@ class Front:
     """Plane in front of the camera, without shadow or shading."""
 
     #: Blender's.
-    scene: bpy.types.Scene
+    scene: Scene
     camera: Object
     #: Distance from the camera, Blender units.
     depth: float
@@ -47,7 +47,7 @@ class Front:
     height: float
 
     @classmethod
-    def before(cls, scene: bpy.types.Scene, camera: Object, half: tuple[float, float]) -> Front:
+    def before(cls, scene: Scene, camera: Object, half: tuple[float, float]) -> Front:
         """Return the plane of a camera; `half` of the frame's width and height at depth 1."""
         depth = camera.data.clip_start * 20.0
         return cls(scene, camera, depth, half[0] * depth, half[1] * depth)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from .. import bridge
-from ..compat import Object, bpy, shader_nodes
+from ..compat import Object, Scene, bpy, shader_nodes
 from ..core.base.arrays import Floats
 from ..core.base.modes import Mode
 from ..device import parts, view
@@ -24,7 +24,7 @@ FLOOR = (0.80, 0.81, 0.82)
 
 
 def set_up(
-    scene: bpy.types.Scene,
+    scene: Scene,
     bed: Object,
     instant: Instant,
     *,
@@ -78,7 +78,7 @@ def outline(bed: Object) -> Floats:
     return np.concatenate(clouds)
 
 
-def _camera(scene: bpy.types.Scene, points: Floats, margins: Margins) -> Object:
+def _camera(scene: Scene, points: Floats, margins: Margins) -> Object:
     """Add the camera that frames the points."""
     data = bpy.data.cameras.new("Digital Clay Camera")
     data.lens, data.sensor_width, data.sensor_fit = LENS, SENSOR, "HORIZONTAL"
@@ -103,13 +103,13 @@ def _camera(scene: bpy.types.Scene, points: Floats, margins: Margins) -> Object:
     return camera
 
 
-def half_frame(scene: bpy.types.Scene) -> tuple[float, float]:
+def half_frame(scene: Scene) -> tuple[float, float]:
     """Return half the frame's width and height at depth 1."""
     width = SENSOR / 2 / LENS
     return width, width * scene.render.resolution_y / scene.render.resolution_x
 
 
-def _floor(scene: bpy.types.Scene, height: float, size: float) -> None:
+def _floor(scene: Scene, height: float, size: float) -> None:
     """Add the plane the housing stands on."""
     square = np.array([[-size, -size], [size, -size], [size, size], [-size, size]])
     square = np.column_stack([square, np.full(4, height)])
@@ -118,7 +118,7 @@ def _floor(scene: bpy.types.Scene, height: float, size: float) -> None:
     scene.collection.objects.link(bpy.data.objects.new(mesh.name, mesh))
 
 
-def _lights(scene: bpy.types.Scene) -> None:
+def _lights(scene: Scene) -> None:
     """Light from the left and behind, low enough that slopes show; the sky fills the shadows."""
     data = bpy.data.lights.new("Digital Clay Sun", "SUN")
     data.energy, data.angle = 2.6, math.radians(5.0)

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from ..compat import Object, PropertyGroup, View3DShading, bpy, has_denoiser, quiet, scratch
+from ..compat import Object, PropertyGroup, Scene, View3DShading, bpy, has_denoiser, quiet, scratch
 from ..core.base.errors import OutputError
 from ..core.files.formats import is_whole_picture
 from ..core.files.run_folder import name_unfinished
@@ -32,7 +32,7 @@ def render_still(instant: Instant, out: Path, looks: Still) -> Path:
 @contextmanager
 def stage_bed(
     name: str, instant: Instant, looks: Picture, lowest: float | None = None
-) -> Iterator[tuple[bpy.types.Scene, Object]]:
+) -> Iterator[tuple[Scene, Object]]:
     """Give a scene that draws pictures and a bed in it, for the block; `lowest` of the pins ever, m."""
     with scratch():
         scene = add_picture_scene(name, looks)
@@ -42,7 +42,7 @@ def stage_bed(
         yield scene, bed
 
 
-def render_picture(scene: bpy.types.Scene, file: Path, out: Path) -> None:
+def render_picture(scene: Scene, file: Path, out: Path) -> None:
     """Draw a scene into a PNG file, whole or not at all; messages name `out`, which the user knows."""
     part = name_unfinished(file)
     scene.render.filepath = str(part)
@@ -69,7 +69,7 @@ def failure_reason(path: Path) -> str:
     return "no space is left on the disk" if full else "Blender wrote no whole file"
 
 
-def add_picture_scene(name: str, looks: Picture) -> bpy.types.Scene:
+def add_picture_scene(name: str, looks: Picture) -> Scene:
     """Add a scene with all that decides a picture besides the scene's contents."""
     scene = bpy.data.scenes.new(name)
     render, engine = scene.render, looks.engine

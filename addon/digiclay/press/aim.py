@@ -18,6 +18,7 @@ from ..device import view
 from ..roles import ROLE, find_whole, is_bed
 from ..sessions import running
 from ..settings import properties
+from ..strokes.stroke import Place
 from ..ui_text import localize
 
 
@@ -39,13 +40,13 @@ class Target:
         return int(self.grid.at(self.point[:1], self.point[1:2])[0])
 
 
-def find_target(context: Context, xy: tuple[float, float]) -> Target | None:
+def find_target(context: Context, xy: Place) -> Target | None:
     """Return the nearest place on a bed that is seen under a pixel of the context's region."""
     target, hider = look_at(context, xy)
     return target if hider is None else None
 
 
-def look_at(context: Context, xy: tuple[float, float]) -> tuple[Target | None, Object | None]:
+def look_at(context: Context, xy: Place) -> tuple[Target | None, Object | None]:
     """Return the nearest place on a visible bed under a pixel, and the object that hides it there, if any."""
     target, nearest, eye = None, np.inf, np.zeros(3)
     for bed in context.visible_objects:
@@ -75,9 +76,7 @@ def read_surface(bed: Object) -> tuple[Grid, Floats]:
     return make_grid(properties.scene_of(bed).layout), bridge.read_cells(bed.data)["height"]
 
 
-def hit_point(
-    context: Context, bed: Object, cells: Grid, height: Floats, xy: tuple[float, float]
-) -> Floats | None:
+def hit_point(context: Context, bed: Object, cells: Grid, height: Floats, xy: Place) -> Floats | None:
     """Return where the ray through a pixel of the region meets pins of heights (n,), m; None if it misses."""
     origin, direction = _ray(context, bed, xy)
     first, last = shown_stretch(context, _place(bed, origin), _place(bed, origin + direction))
@@ -99,7 +98,7 @@ def _place(bed: Object, point: Floats) -> Floats:
     return np.asarray(placed[:3, :3] @ (point * SCALE) + placed[:3, 3])
 
 
-def _ray(context: Context, bed: Object, xy: tuple[float, float]) -> tuple[Floats, Floats]:
+def _ray(context: Context, bed: Object, xy: Place) -> tuple[Floats, Floats]:
     """Return the ray through a pixel in the bed's space: origin, m, and direction of length 1."""
     bridge.uniform(bed)
     looking, region = context.region_data, context.region
@@ -118,7 +117,7 @@ OPEN = frozenset({"WIRE", "BOUNDS"})
 NEAR = 1e-6
 
 
-def shown_stretch(context: Context, start: Floats, end: Floats) -> tuple[float, float]:
+def shown_stretch(context: Context, start: Floats, end: Floats) -> Place:
     """Return the stretch of a ray that a view shows, 0 its start, 1 its end; first > last: nothing of it."""
     looking = context.region_data
     clip = np.array(looking.perspective_matrix, np.float64)

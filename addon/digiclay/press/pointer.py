@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..core.base.arrays import Floats
+from ..strokes.stroke import Place
 
 #: Lean of a pen at full tilt, rad: tablets report up to some 60°.
 FULL_TILT = math.radians(60.0)
@@ -28,7 +29,7 @@ def find_share(pressure: float, curve: str) -> float:
     return float(min(max(pressure, 0.0), 1.0) ** EXPONENTS[curve])
 
 
-def find_lean(tilt: tuple[float, float], seen: Floats) -> tuple[float, float]:
+def find_lean(tilt: Place, seen: Floats) -> Place:
     """Return a pen's lean towards x and y of the bed, rad, by its tilt, -1 to 1, and the view's axes."""
     # A pen leans over the bed as over the tablet: its far side is what lies farther up in the view.
     right, up = float(tilt[0]), -float(tilt[1])

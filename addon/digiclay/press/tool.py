@@ -26,7 +26,7 @@ from ..sessions import running
 from ..sessions.sculpting import estimate_time, list_pressing
 from ..settings import devices
 from ..strokes.nominal import find_radius
-from ..strokes.stroke import LOCKS, STAMPS, Brush, lay_ring, lay_square
+from ..strokes.stroke import LOCKS, STAMPS, Brush, Place, lay_ring, lay_square
 from ..strokes.sweep import SWEEPS
 from ..ui_text import localize
 from . import aim
@@ -61,9 +61,7 @@ def make_lines(paths: Sequence[Floats], width: float, color: Color = LIGHT) -> l
     return [Line(points, *look, pairs=True) for look in ((DARK, 4.0 * width), (color, 2.0 * width))]
 
 
-def make_label(
-    context: Context, text: str, xy: tuple[float, float], corner: tuple[float, float] = (0.0, 0.0)
-) -> list[Words]:
+def make_label(context: Context, text: str, xy: Place, corner: Place = (0.0, 0.0)) -> list[Words]:
     """Return text beside a place, light on a dark edge, where no panel covers it; see `draw_on_bed`."""
     from ..overlay.draw import measure
 
@@ -97,9 +95,9 @@ def draw_on_bed(
     bed: Object,
     paths: Sequence[Floats],
     text: str,
-    xy: tuple[float, float],
+    xy: Place,
     color: Color = LIGHT,
-    corner: tuple[float, float] = (0.0, 0.0),
+    corner: Place = (0.0, 0.0),
 ) -> None:
     """Draw paths (k, 3), m, of a bed's space, and text beside a place; pixels from a corner of the region."""
     from ..overlay.draw import cursor

@@ -13,13 +13,14 @@ from ..compat import (
     Modifier,
     NodeTree,
     Object,
+    Scene,
     bpy,
     curves,
     keyframe_node_setting,
     own_curves,
     set_node_setting,
 )
-from ..core.base.arrays import Floats
+from ..core.base.arrays import Cells, Floats, Modes
 from ..core.base.errors import DigiclayError
 from ..core.model.fingertip import Fingertip
 from ..core.model.layout import make_grid
@@ -78,14 +79,14 @@ class BakedFrames:
     #: (t, n), m.
     height: NDArray[np.float32]
     #: (t, n).
-    mode: NDArray[np.int8]
+    mode: Modes
     #: (t, n), N.
     force: NDArray[np.float32]
     #: (t, f, 7), of the fingertips.
     pose: Floats
 
 
-def frame_periods(take: Take, rate: float) -> NDArray[np.intp]:
+def frame_periods(take: Take, rate: float) -> Cells:
     """Return the control period, 0 to t, that each frame of a take shows at a rate, 1/s: the nearest one."""
     period = take.scene.simulation.control_period
     count = int(np.floor(take.duration * rate + 1e-6)) + 1
@@ -167,7 +168,7 @@ def free(bed: Object) -> bool:
     return True
 
 
-def read_rate(scene: bpy.types.Scene) -> float:
+def read_rate(scene: Scene) -> float:
     """Return the frames of a scene per second; DigiclayError where its time is stretched."""
     render = scene.render
     if render.frame_map_old != render.frame_map_new:
@@ -176,9 +177,7 @@ def read_rate(scene: bpy.types.Scene) -> float:
     return float(render.fps / render.fps_base)
 
 
-def sample_path(
-    scene: bpy.types.Scene, bed: Object, first: int, last: int, period: float
-) -> Iterator[float | Floats]:
+def sample_path(scene: Scene, bed: Object, first: int, last: int, period: float) -> Iterator[float | Floats]:
     """Read the paths of the fingertips as animated; yield the share done, at last the poses (t + 1, f, 7)."""
     if not 0 < last - first <= MOST_FRAMES:
         rule = f"must have from 1 to {MOST_FRAMES} frames after its first"

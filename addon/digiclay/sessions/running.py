@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from ..core.model.fingers import MOST_FINGERS
 from ..core.session.live_session import Clock, LiveSession, Moment
 from ..core.session.recent_trace import RecentTrace
-from ..strokes.stroke import Stroke
+from ..strokes.stroke import Place, Stroke
 
 if TYPE_CHECKING:
     from bpy.types import Object
@@ -67,7 +67,7 @@ class Running(LiveSession):
     begun_strokes: int = 0
     finished_strokes: int = 0
     #: Where the last finished stroke ended, x and y, m.
-    last_place: tuple[float, float] | None = None
+    last_place: Place | None = None
     #: Stored settings of the bed that `scene` was made of; None: unknown.
     settings: tuple[Any, ...] | None = None
 

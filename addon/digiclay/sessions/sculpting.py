@@ -24,7 +24,7 @@ from ..strokes.motion import DRAG, follow, follow_images
 from ..strokes.motion import begin as begin_stroke
 from ..strokes.nominal import Device
 from ..strokes.pose import turn_image
-from ..strokes.stroke import FINISHING, Brush, Stroke
+from ..strokes.stroke import FINISHING, Brush, Place, Stroke
 from ..strokes.sweep import SWEEPS, WHOLE, finish, order_all, sweep
 from ..strokes.tracking import find_blister, find_tracking
 from ..ui_text import localize
@@ -411,7 +411,7 @@ def find_stroke(running: Running, number: int) -> Stroke | None:
     return next((stroke for stroke in running.strokes if stroke.number == number), None)
 
 
-def last_place(running: Running) -> tuple[float, float] | None:
+def last_place(running: Running) -> Place | None:
     """Return where the last stroke ends, x and y, m; None before the first."""
     if not running.strokes:
         return running.last_place

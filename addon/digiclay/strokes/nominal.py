@@ -169,7 +169,7 @@ def _mark(nominal: Nominal, stroke: Stroke, device: Device, image: Image, index:
         nominal.height[cells] = np.where(np.abs(change) > np.abs(now - ground) + TIE, ground + change, now)
 
 
-def find_frame(stroke: Stroke, device: Device) -> tuple[float, float]:
+def find_frame(stroke: Stroke, device: Device) -> Place:
     """Return half the side of what a stroke stamps, m, and how far it is turned, rad.
 
     Drawn from its middle it reaches to the place where its right side is; a click gives the ring's size.

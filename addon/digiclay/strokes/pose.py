@@ -7,10 +7,10 @@ import math
 import numpy as np
 
 from ..core.base.arrays import TIE, Floats
-from .stroke import Image
+from .stroke import Image, Place
 
 
-def lean_finger(turn: Floats, lean: tuple[float, float]) -> Floats:
+def lean_finger(turn: Floats, lean: Place) -> Floats:
     """Return an orientation (4,) that leans from `turn` (4,) towards x and y of the bed, rad."""
     angle = math.hypot(*lean)
     if angle == 0.0:

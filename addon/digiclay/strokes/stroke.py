@@ -145,7 +145,7 @@ class Sample:
     #: Share of the way from the surface to the level, or strength of the smoothing, from 0 to 1.
     share: float = 1.0
     #: How far the fingertip leans towards x and y of the bed, rad; see `pose.lean_finger`.
-    lean: tuple[float, float] = (0.0, 0.0)
+    lean: Place = (0.0, 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -241,7 +241,7 @@ def start(
     images: tuple[Image, ...] = ALONE,
     brush: Brush = Brush.LOWER,
     share: float = 1.0,
-    lean: tuple[float, float] = (0.0, 0.0),
+    lean: Place = (0.0, 0.0),
     *,
     accumulate: bool = False,
     stamp: HeightMap | None = None,
@@ -257,7 +257,7 @@ def draw(
     y: float,
     depth: float,
     share: float = 1.0,
-    lean: tuple[float, float] = (0.0, 0.0),
+    lean: Place = (0.0, 0.0),
 ) -> Stroke:
     """Return the stroke drawn on to a place; a released one stays as it is."""
     if not stroke.held:

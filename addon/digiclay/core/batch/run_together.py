@@ -13,7 +13,6 @@ from ..base.modes import Mode
 from ..engine.simulation import repeat_period
 from ..engine.state import ActiveSet
 from ..engine.system import System
-from ..files.tables import Record
 from ..metrics.summary import CellSums, compute_metrics_from_sums, sum_row
 from ..scene.assembly import assemble
 from ..scene.recorder import HistoryWriter, Recorder, Recording, Stretch
@@ -124,7 +123,7 @@ class Sums:
             near = [np.argmin((grid.x - x) ** 2 + (grid.y - y) ** 2) for x, y in places]
             self._ways[same] = moments, tip, np.unique(near)
         moments, tip, cells = self._ways[same]
-        metrics: Record = {
+        metrics = {
             **compute_metrics_from_sums(sums, moments, tip, grid.positions, scene.set_point, cells),
             **measure_losses(scene, play.batch.systems[index], moments, [(total, tip[:, 2])]),
         }
