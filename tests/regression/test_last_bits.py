@@ -35,7 +35,7 @@ from tests.assemble import assert_near, sample
 from tests.scenes.test_hands import FINGER as PAPER_FINGER
 from tests.scenes.test_hands import PERIOD, REST, press, scene
 from tests.scenes.test_hands import follow as simulate
-from tests.scenes.test_pressed_together import at_times, play, replaying, rock
+from tests.scenes.test_pressed_together import at_times, play, pose_at, replaying, rock
 
 #: Largest relative change of a number.
 SHAKEN = 1e-15
@@ -288,8 +288,8 @@ def test_a_fingertip_that_hovers_exactly_on_a_pin_changes_nothing_of_what_anothe
     for seed in range(6):
         random = np.random.default_rng(seed)
 
-        def hover(_, random=random):
-            return np.array([0.0, 0.0, *shake(np.array([REST]), random), *LEVEL])
+        def hover(times, random=random):
+            return pose_at(0.0, 0.0, shake(np.full(times.shape, REST), random))
 
         forces.append(play(bed, at_times(bed, [rock(0), hover], 30))[1])
     # Rounding; 0.16 mN where one that presses by the last bit has the pin moved as under both.

@@ -14,15 +14,12 @@ from digiclay.core.engine.state import State
 from digiclay.core.engine.system import System
 from digiclay.core.files.tables import parse_tables
 from digiclay.core.model.control_interface import Measurement
-from digiclay.core.model.fingertip import compute_forms, compute_underside
 from digiclay.core.model.relaxation import Relaxation
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.scene_source import find, load
 from digiclay.core.scene.toml_table import resolve
 from digiclay.core.session import snapshot
-from digiclay.core.session.accuracy import Replay
 from digiclay.core.session.run_scene import run
-from scipy.integrate import solve_ivp
 
 from tests.assemble import assert_near
 
@@ -76,59 +73,6 @@ def test_fingers_far_from_each_other_form_what_each_forms_alone(method):
     assert_near(state.row(0) - REST, formed, 1e-10)
 
 
-def pose_of(finger, apart):
-    """Return the pose at a time, s, of one of two fingers about 0, 1 mm that press, rock and slide."""
-
-    def pose(time):
-        side, angle = (-0.5, 0.5)[finger], 0.3 * (finger + 1)
-        depth = 1.9e-3 * np.sin(min(16.0 * time, np.pi / 2)) + finger * 0.3e-3 * np.sin(20.0 * time)
-        place = [side * apart + 4e-3 * np.sin(9.0 * time), (0.5e-3, 1.8e-3)[finger], REST + 0.6e-3 - depth]
-        return np.array([*place, np.cos(angle / 2), 0.0, 0.0, np.sin(angle / 2)])
-
-    return pose
-
-
-def integrate(system, cell, commands, ways):
-    """Return height and force, (t,), of a cell by SciPy, and in how many periods two fingers press it."""
-    touches = getattr(system.cell.touch, "each", ())
-    x, y = system.grid.x[cell], system.grid.y[cell]
-    basis = np.array([[1.0, x, y, x * x, x * y, y * y]]).T
-    parts, lag, dead = system.cell, 2e-3, 1e-3
-
-    def press_at(time, height, filters):
-        forces, rates, first = [], [], 0
-        for touch, way in zip(touches, ways, strict=True):
-            outline = touch.fingertip.outline(way(time)[None])
-            under = compute_underside(*compute_forms(outline), basis).item()
-            law, own = touch.contact, filters[first : first + touch.pulp.rows]
-            tension = law.stiffness / law.exponent * np.expm1(max(law.exponent * (height - under), 0.0))
-            forces.append(law.share * max(tension - float(touch.pulp.shares @ own), 0.0))
-            rates.append(touch.pulp.rates[:, 0] * (tension - own))
-            first += touch.pulp.rows
-        return forces, rates
-
-    def change(time, state, command):
-        forces, rates = press_at(time, state[0], state[2:])
-        drop = parts.supply.pressure(state[1:2]) - sum(forces) / parts.actuator.area
-        speed = parts.flow.flow(state[1:2], drop)[0] / parts.actuator.area
-        return np.concatenate([[speed, (command - state[1]) / lag], *rates])
-
-    state = np.zeros(2 + sum(touch.pulp.rows for touch in touches))
-    state[0], before, rows, double = REST, 0.0, [], 0
-    for period, command in enumerate(commands[:, cell]):
-        start = period * PERIOD
-        for a, b, given in ((start, start + dead, before), (start + dead, start + PERIOD, command)):
-            solved = solve_ivp(
-                change, (a, b), state, "LSODA", args=(given,), rtol=1e-8, atol=1e-12, max_step=1e-3
-            )
-            state = solved.y[:, -1]
-        before = command
-        forces, _ = press_at(start + PERIOD, state[0], state[2:])
-        rows.append((state[0], sum(forces)))
-        double += min(forces) > 0.0
-    return *np.array(rows).T, double
-
-
 SOFT = replace(FINGER, contact=replace(FINGER.contact, exponent=1700.0, stiffness=280.0))
 LONG = replace(
     FINGER,
@@ -136,31 +80,6 @@ LONG = replace(
     fingertip=replace(FINGER.fingertip, length=12e-3),
     relaxation=Relaxation((5e-3, 0.3), (0.5, 0.2, 0.3)),
 )
-
-
-@pytest.mark.parametrize(
-    "apart, other",
-    [(5e-3, FINGER), (7e-3, FINGER), (6e-3, SOFT), (7e-3, LONG), (6e-3, replace(FINGER, relaxation=None))],
-    ids=["5 mm", "7 mm", "another exponent", "another size and relaxation", "one elastic"],
-)
-def test_a_cell_that_two_fingers_press_moves_by_the_sum_of_their_forces(apart, other):
-    system, ways = assemble(scene(None, FINGER, other)), [pose_of(finger, apart) for finger in (0, 1)]
-    commands = np.random.default_rng(3).uniform(-0.3, 0.3, (45, system.grid.count))
-    system = replace(system, controller=Replay(system.grid, commands))
-    times = np.arange(45)[:, None] * PERIOD + system.instants
-    poses = np.array([[[way(time) for way in ways] for time in row] for row in times])
-    state, rows, pressed = begin(system), [], np.zeros(system.grid.count)
-    for finger in trace_fingers(system, poses):
-        state = advance(system, state, finger)
-        rows.append((state.row(0), state.row(system.rows.force)))
-        own = np.array([state.row(row) for row in range(system.rows.count)[system.rows.pressing]])
-        pressed += (own > 0.0).all(axis=0)
-    found, cell = np.array(rows), int(pressed.argmax())
-    height, force, double = integrate(system, cell, commands, ways)
-    # What issue 26 asks for: 3 µm and 3 mN.
-    assert_near(found[:, 0, cell], height, 3e-6)
-    assert_near(found[:, 1, cell], force, 3e-3)
-    assert double > 10
 
 
 @pytest.mark.parametrize("method", [None, "virtual_master", "elastic"])

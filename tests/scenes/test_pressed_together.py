@@ -1,6 +1,7 @@
 """Pins that several fingertips press: by the law of each, as SciPy has them; bounded where they are stiff."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -10,9 +11,10 @@ from digiclay.core.model.layout import Layout
 from digiclay.core.model.touch import compute_force
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.session.accuracy import Replay
+from scipy.integrate import solve_ivp
 
-from tests.assemble import assert_near
-from tests.scenes.test_hands import FINGER, LONG, PAPER, PERIOD, REST, SOFT, integrate, press, scene
+from tests.assemble import assert_near, table
+from tests.scenes.test_hands import FINGER, LONG, PAPER, PERIOD, REST, SOFT, press, scene
 
 
 def replaying(fingers, commands, **parts):
@@ -42,20 +44,37 @@ def test_a_finger_presses_as_its_law_says_in_the_period_in_which_another_one_lan
 
 
 #: A bore of 0.2 mm, and an orifice of 2 mm: a pin rises at meters a second.
-NARROW = replace(PAPER.actuator, bore=0.2e-3)
-WIDE = replace(PAPER.valve, orifice_diameter=2e-3)
+NARROW = {"actuator": replace(PAPER.actuator, bore=0.2e-3)}
+WIDE = {"valve": replace(PAPER.valve, orifice_diameter=2e-3)}
+
+
+def pose_at(x, y, z, turn=0.0):
+    """Return poses (..., 7) of a fingertip at places, m, turned about the vertical, rad."""
+    x, y, z, half = np.broadcast_arrays(x, y, z, turn / 2)
+    return np.stack([x, y, z, np.cos(half), 0 * x, 0 * x, np.sin(half)], axis=-1)
+
+
+def slide(finger, apart):
+    """Return the poses at times, s, of one of two fingertips so far apart, m, that press, rock and slide."""
+
+    def poses(times):
+        depth = 1.9e-3 * np.sin(np.minimum(16.0 * times, np.pi / 2)) + finger * 0.3e-3 * np.sin(20.0 * times)
+        x = (finger - 0.5) * apart + 4e-3 * np.sin(9.0 * times)
+        return pose_at(x, (0.5e-3, 1.8e-3)[finger], REST + 0.6e-3 - depth, 0.3 * (finger + 1))
+
+    return poses
 
 
 def rock(finger):
-    """Return the pose at a time, s, of a fingertip that presses while the other one yields, and so on."""
+    """Return the poses at times, s, of a fingertip that presses while the other one yields, and so on."""
+    x, y = ((-2.2e-3, 0.5e-3), (2.4e-3, -1.1e-3), (0.4e-3, 3.1e-3))[finger]
 
-    def pose(time):
-        down = min(1.0, time / 0.06) ** 2 * (3.0 - 2.0 * min(1.0, time / 0.06))
-        depth = down * (1.6e-3 + 0.5e-3 * np.sin(2.0 * np.pi * time / 0.06 + np.pi * finger))
-        place = (-2.2e-3, 0.5e-3), (2.4e-3, -1.1e-3), (0.4e-3, 3.1e-3)
-        return np.array([*place[finger], REST + 0.6e-3 - depth, 1.0, 0.0, 0.0, 0.0])
+    def poses(times):
+        part = np.minimum(1.0, times / 0.06)
+        depth = 1.6e-3 + 0.5e-3 * np.sin(2.0 * np.pi * times / 0.06 + np.pi * finger)
+        return pose_at(x, y, REST + 0.6e-3 - part**2 * (3.0 - 2.0 * part) * depth)
 
-    return pose
+    return poses
 
 
 def play(system, poses):
@@ -70,47 +89,100 @@ def play(system, poses):
 
 
 def at_times(system, ways, periods):
+    """Return poses (t, p, f, 7) of fingertips with these ways."""
     times = np.arange(periods)[:, None] * PERIOD + system.instants
-    return np.array([[[way(time) for way in ways] for time in row] for row in times])
+    return np.stack([way(times) for way in ways], axis=2)
+
+
+def integrate(system, cell, commands, ways):
+    """Return height and force, (t,), of a cell by SciPy."""
+    touches, parts, lag, dead = system.cell.touch.each, system.cell, 2e-3, 1e-3
+    x, y = system.grid.x[cell], system.grid.y[cell]
+    basis = np.array([[1.0, x, y, x * x, x * y, y * y]]).T
+    # Between two of these, 25 µs apart, an underside is straight to within 1 nm.
+    moments = np.linspace(0.0, len(commands) * PERIOD, 200 * len(commands) + 1)
+    forms = [
+        compute_forms(touch.fingertip.outline(way(moments))) for touch, way in zip(touches, ways, strict=True)
+    ]
+    undersides = [compute_underside(*form, basis).ravel() for form in forms]
+
+    def press_at(time, height, filters):
+        forces, rates, first = [], [], 0
+        for touch, underside in zip(touches, undersides, strict=True):
+            law, own = touch.contact, filters[first : first + touch.pulp.rows]
+            depth = max(height - np.interp(time, moments, underside), 0.0)
+            tension = law.stiffness / law.exponent * np.expm1(law.exponent * depth)
+            forces.append(law.share * max(tension - float(touch.pulp.shares @ own), 0.0))
+            rates.append(touch.pulp.rates[:, 0] * (tension - own))
+            first += touch.pulp.rows
+        return forces, rates
+
+    def change(time, state, command):
+        forces, rates = press_at(time, state[0], state[2:])
+        drop = parts.supply.pressure(state[1:2]) - sum(forces) / parts.actuator.area
+        speed = parts.flow.flow(state[1:2], drop)[0] / parts.actuator.area
+        return np.concatenate([[speed, (command - state[1]) / lag], *rates])
+
+    state = np.zeros(2 + sum(touch.pulp.rows for touch in touches))
+    state[0], before, rows = REST, 0.0, []
+    for period, command in enumerate(commands[:, cell]):
+        start = period * PERIOD
+        for a, b, given in ((start, start + dead, before), (start + dead, start + PERIOD, command)):
+            solved = solve_ivp(
+                change, (a, b), state, "LSODA", args=(given,), rtol=1e-7, atol=1e-12, max_step=1e-3
+            )
+            state = solved.y[:, -1]
+        before = command
+        forces, _ = press_at(start + PERIOD, state[0], state[2:])
+        rows.append((state[0], sum(forces)))
+    return np.array(rows).T
 
 
 SLACK = replace(FINGER, contact=replace(FINGER.contact, exponent=1000.0, stiffness=300.0))
 STEEP = replace(FINGER, contact=replace(FINGER.contact, exponent=2e4))
-
-
-@pytest.mark.parametrize("other, most", [(FINGER, 0.3e-3), (SOFT, 0.3e-3), (SLACK, 0.4e-3)])
-def test_on_a_locked_pin_the_forces_of_fingers_that_rock_agree_with_scipy(other, most):
-    system = replaying((FINGER, other), np.zeros((30, 1)), layout=Layout(rows=1, columns=1))
-    ways = [rock(0), rock(1)]
-    height, force, pressed = play(system, at_times(system, ways, 30))
-    _, exact, _ = integrate(system, 0, np.zeros((30, 1)), ways)
-    assert (height == REST).all()
-    assert pressed[0] >= 10
+ELASTIC = replace(FINGER, relaxation=None)
+#: Pins a side; largest command, and for how many periods each lasts; periods.
+SLIDE, LOCKED, QUICK = (15, 0.3, 1, 45), (1, 0.0, 1, 30), (5, 0.5, 5, 30)
+#: In how many periods two fingers press the pin, at least; largest errors, m and N.
+CASES = {
+    # What is asked for: 3 µm and 3 mN.
+    "5 mm apart": (SLIDE, {}, partial(slide, apart=5e-3), (FINGER, FINGER), (10, 3e-6, 3e-3)),
+    "7 mm apart": (SLIDE, {}, partial(slide, apart=7e-3), (FINGER, FINGER), (10, 3e-6, 3e-3)),
+    "another exponent": (SLIDE, {}, partial(slide, apart=6e-3), (FINGER, SOFT), (10, 3e-6, 3e-3)),
+    "another size and relaxation": (SLIDE, {}, partial(slide, apart=7e-3), (FINGER, LONG), (10, 3e-6, 3e-3)),
+    "one elastic": (SLIDE, {}, partial(slide, apart=6e-3), (FINGER, ELASTIC), (10, 3e-6, 3e-3)),
     # 0.17, 0.21 and 0.33 mN; 0.6 by the trapezoidal rule, 0.7 in one part, 1.1 without the bend of the way,
     # 0.35 if a finger may be pressed harder than alone, 1.7 where another m is not of equal slope.
-    assert_near(force[:, 0], exact, most)
+    "locked": (LOCKED, {}, rock, (FINGER, FINGER), (10, 0.0, 0.3e-3)),
+    "locked, another exponent": (LOCKED, {}, rock, (FINGER, SOFT), (10, 0.0, 0.3e-3)),
+    "locked, a slack one": (LOCKED, {}, rock, (FINGER, SLACK), (10, 0.0, 0.4e-3)),
+    # Measured 34, 96, 42 and 25 µm, and 2, 1, 18 and 17 mN: bounded, not accurate (docs/stability.md).
+    "bore 0.2 mm": (QUICK, NARROW, rock, (FINGER, FINGER), (1, 0.1e-3, 5e-3)),
+    "bore 0.2 mm, three unlike": (QUICK, NARROW, rock, (FINGER, SOFT, LONG), (0, 0.2e-3, 5e-3)),
+    "orifice 2 mm": (QUICK, WIDE, rock, (FINGER, FINGER), (5, 0.1e-3, 50e-3)),
+    "orifice 2 mm, three unlike": (QUICK, WIDE, rock, (FINGER, SOFT, LONG), (5, 0.1e-3, 50e-3)),
+}
 
 
-@pytest.mark.parametrize("fingers", [(FINGER, FINGER), (FINGER, SOFT, LONG)])
-@pytest.mark.parametrize(
-    "parts, height_error, force_error",
-    [({"actuator": NARROW}, 0.1e-3, 5e-3), ({"valve": WIDE}, 0.1e-3, 50e-3)],
-    ids=["bore 0.2 mm", "orifice 2 mm"],
-)
-def test_stiff_pins_under_several_fingers_agree_with_scipy(fingers, parts, height_error, force_error):
-    commands = np.random.default_rng(3).uniform(-0.5, 0.5, (6, 25)).repeat(5, axis=0)
-    system = replaying(fingers, commands, layout=Layout(rows=5, columns=5), **parts)
-    ways = [rock(finger) for finger in range(len(fingers))]
-    heights, forces, pressed = play(system, at_times(system, ways, 30))
-    cell = int(pressed.argmax())
-    height, force, _ = integrate(system, cell, commands, ways)
-    # Measured 58 µm, and 2 and 35 mN; such cases are bounded, not accurate (docs/stability.md).
-    assert_near(heights[:, cell], height, height_error)
-    assert_near(forces[:, cell], force, force_error)
+@table("bed, parts, motion, fingers, bounds", CASES)
+def test_a_pin_that_several_fingers_press_agrees_with_scipy(bed, parts, motion, fingers, bounds):
+    (side, largest, lasting, periods), (together, apart, force_apart) = bed, bounds
+    commands = np.random.default_rng(3).uniform(-largest, largest, (periods // lasting, side**2))
+    commands = commands.repeat(lasting, axis=0)
+    system = replaying(fingers, commands, layout=Layout(side, side), **parts)
+    ways = [motion(finger) for finger in range(len(fingers))]
+    heights, forces, pressed = play(system, at_times(system, ways, periods))
+    # The pin that two press longest; of several, the one that is pressed longest.
+    cell = np.lexsort(((forces > 0.0).sum(axis=0), pressed))[-1]
+    assert pressed[cell] >= together
+    assert (forces[:, cell] > 0.0).sum() >= 10
+    height, force = integrate(system, cell, commands, ways)
+    assert_near(heights[:, cell], height, apart)
+    assert_near(forces[:, cell], force, force_apart)
 
 
 @pytest.mark.parametrize("seed", [0, 3])
-@pytest.mark.parametrize("parts", [{"actuator": NARROW}, {"valve": WIDE}], ids=["bore", "orifice"])
+@pytest.mark.parametrize("parts", [NARROW, WIDE], ids=["bore", "orifice"])
 @pytest.mark.parametrize("fingers", [(FINGER,) * 2, (FINGER,) * 3, (FINGER, STEEP, SOFT)])
 def test_a_pin_that_rises_into_several_fingertips_is_pressed_at_most_as_by_each_alone(fingers, parts, seed):
     random, layout = np.random.default_rng(seed), Layout(rows=5, columns=5)
