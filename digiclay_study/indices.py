@@ -7,6 +7,7 @@ import numpy as np
 from digiclay.core.base.arrays import Floats
 from digiclay.core.base.errors import OutputError
 from digiclay.core.files.tables import Record
+from digiclay.core.studies.evaluation import FIGURES
 
 
 def describe_problem(parameters: int) -> Record:
@@ -90,7 +91,7 @@ def find_excess_losses(records: Sequence[Record], reference: Record) -> Floats:
 
 
 def make_response(name: str, records: Sequence[Record], excess: Floats) -> Response:
-    """Return an output of all runs; those without it, or that lost the fingertip, have the others' largest.
+    """Return an output of all runs; those without it, or that lost the fingertip, have the others' worst.
 
     Left out they would leave holes in the design of a study; at their own values runs that touch for a moment
     only would count as good.
@@ -102,7 +103,8 @@ def make_response(name: str, records: Sequence[Record], excess: Floats) -> Respo
     if replaced.all():
         errors = (f"; the first error: {record['error']}" for record in records if "error" in record)
         raise OutputError(f"No run that keeps the fingertip has the metric {name}{next(errors, '.')}")
-    values[replaced] = values[~replaced].max()
+    pick = np.min if FIGURES[name].worse == "lower" else np.max
+    values[replaced] = pick(values[~replaced])
     return Response(name, values, int(absent.sum()), int(lost.sum()))
 
 

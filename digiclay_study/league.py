@@ -29,7 +29,8 @@ MEANS = (
 )
 #: Measures of a league, in the order of its columns; those of `LIMITS` are speeds.
 MEASURES: dict[str, Metric] = {
-    name: {**METRICS, **METHOD, **ERRORS}.get(name) or Metric("m/s", "", name.replace("-", " "), "mm/s")
+    name: {**METRICS, **METHOD, **ERRORS}.get(name)
+    or METHOD["speed_limit"]._replace(label=name.replace("-", " "))
     for name in (
         "rfd",
         "rfd_jnd_least",

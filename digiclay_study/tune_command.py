@@ -61,6 +61,10 @@ def carry_out(arguments: Namespace) -> int:
     subject = read_subject(arguments)
     if len(subject.names) != 2:
         raise ParameterError("--metric", "", "must name two metrics", repr(arguments.metric))
+    for name in subject.names:
+        if FIGURES[name].worse == "lower":
+            rule = "must be metrics whose lower values are better: both are minimized"
+            raise ParameterError("--metric", "", rule, name)
     choice = _read_choice(arguments.choose, subject.names)
     total = arguments.population * arguments.generations + 1
     refuse_too_many("--population times --generations", total)

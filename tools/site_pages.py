@@ -71,6 +71,16 @@ PYTHON = """\
     options:
       heading_level: 3
 
+::: digiclay.samples
+    options:
+      heading_level: 3
+
+::: digiclay.core.scene.schema.Scene
+    options:
+      heading: digiclay.Scene
+      toc_label: Scene
+      heading_level: 3
+
 [Sample scenes](samples.md) and [parameters](parameters.md) have tables of their own.
 
 ## Runs
@@ -79,11 +89,16 @@ PYTHON = """\
     options:
       heading_level: 3
 
-::: digiclay.core.session.run_scene.Result
+::: digiclay.load
+    options:
+      heading_level: 3
+
+::: digiclay.front_door.Result
     options:
       heading: digiclay.Result
       toc_label: Result
       heading_level: 3
+      inherited_members: true
 
 ### History
 
@@ -92,12 +107,89 @@ single finger the axis f is missing. Pin `i` is in row `i // columns` and column
 row follow each other along x, the rows along y, both upwards. The last row begins no control period: its
 commands are 0, its modes those of the period before.
 {arrays}
-Codes of `mode`:
+The codes of `mode` are those of the class `Mode`:
 {modes}
-## Metrics
+::: digiclay.core.base.modes.Mode
+    options:
+      heading: digiclay.Mode
+      toc_label: Mode
+      heading_level: 3
+
+## Sweeps and metrics
+
+::: digiclay.sweep
+    options:
+      heading_level: 3
+
+::: digiclay.core.studies.evaluation.FIGURES
+    options:
+      heading: digiclay.METRICS
+      toc_label: METRICS
+      heading_level: 3
 
 [Metrics](../metrics.md) has the formulas.
 {metrics}
+## Control methods
+
+[Write your own control method](../own-methods.md) shows how.
+
+::: digiclay.methods
+    options:
+      heading_level: 3
+
+::: digiclay.core.control.own_method.OwnMethod
+    options:
+      heading: digiclay.Method
+      toc_label: Method
+      heading_level: 3
+      inherited_members: true
+
+::: digiclay.core.base.quantity.quantity
+    options:
+      heading: digiclay.quantity
+      toc_label: quantity
+      heading_level: 3
+
+::: digiclay.core.control.own_method.Orders
+    options:
+      heading: digiclay.Orders
+      toc_label: Orders
+      heading_level: 3
+
+## Control periods and the device
+
+::: digiclay.core.session.probes.steps
+    options:
+      heading: digiclay.steps
+      toc_label: steps
+      heading_level: 3
+
+::: digiclay.core.session.probes.force
+    options:
+      heading: digiclay.force
+      toc_label: force
+      heading_level: 3
+
+::: digiclay.core.session.probes.free_speed
+    options:
+      heading: digiclay.free_speed
+      toc_label: free_speed
+      heading_level: 3
+
+::: digiclay.core.session.probes.step_response
+    options:
+      heading: digiclay.step_response
+      toc_label: step_response
+      heading_level: 3
+
+## Errors
+
+::: digiclay.core.base.errors.DigiclayError
+    options:
+      heading: digiclay.DigiclayError
+      toc_label: DigiclayError
+      heading_level: 3
+
 ## Extension of Blender
 
 ::: digiclay.register

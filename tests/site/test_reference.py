@@ -67,7 +67,7 @@ def test_every_name_that_python_offers_has_its_entry_by_subject(site: Path) -> N
     text = (site / "reference" / "python.html").read_text(encoding="utf-8")
     entries = set(re.findall(r"doc-object-name[^>]*>digiclay\.(\w+)<", text))
     functions = (name for name, value in vars(digiclay).items() if inspect.isfunction(value))
-    offered = {name for name in functions if name[0] != "_"} | {*getattr(digiclay, "__all__", ())}
+    offered = {*(name for name in functions if name[0] != "_"), *digiclay.__all__}
     assert offered - entries == set(), "PYTHON in tools/site_pages.py needs a ':::' entry of each"
 
 

@@ -106,7 +106,8 @@ def test_a_design_has_a_block_of_points_a_sample_and_depends_on_its_seed_alone()
 
 
 def record(rfd, loss=0.0):
-    return {"figures": {"rfd": rfd, "contact_loss_share": loss}}
+    share = None if loss is None else 1.0 - loss
+    return {"figures": {"rfd": rfd, "contact_loss_share": loss, "contact_share": share}}
 
 
 #: Runs: two that keep the fingertip, one that failed, one without contact, one that loses the fingertip.
@@ -119,9 +120,10 @@ RUNS = [record(0.2), record(0.5, 0.04), {"error": "no memory"}, record(None, Non
         ("rfd", 0.0, [0.2, 0.5, 0.5, 0.5, 0.5], (2, 1)),
         ("rfd", 0.26, [0.2, 0.5, 0.5, 0.5, 0.01], (2, 0)),  # what the unchanged scene loses is no loss
         ("contact_loss_share", 0.0, [0.0, 0.04, 0.3, 0.3, 0.3], (2, 0)),  # the loss keeps its value
+        ("contact_share", 0.0, [1.0, 0.96, 0.7, 0.7, 0.7], (2, 0)),  # of which less is worse
     ],
 )
-def test_runs_without_a_value_or_the_fingertip_have_the_largest_of_the_others(name, usual, values, counts):
+def test_runs_without_a_value_or_the_fingertip_have_the_worst_of_the_others(name, usual, values, counts):
     found = make_response(name, RUNS, find_excess_losses(RUNS, record(0.1, usual)))
     assert (found.values.tolist(), (found.absent, found.lost)) == (values, counts)
     runs = [record(None), {"error": "There is not enough memory."}]

@@ -108,6 +108,10 @@ def test_points_of_another_search_are_refused_and_without_any_contact_there_is_n
     [
         ("--metric rfd", "--metric must name two metrics (got 'rfd')."),
         ("--metric rfd,lag,relief", "--metric must name two metrics"),
+        (
+            "--metric rfd,contact_share",
+            "whose lower values are better: both are minimized (got contact_share)",
+        ),
         ("--choose relief", "--choose must be knee, rfd or lag_mean (got 'ridge_error')."),
         ("--choose kneee", "--choose must be knee, rfd or lag_mean (got 'kneee')."),
         ("--population 3", "digiclay tune: argument --population: must be a whole number from 4 to"),

@@ -1,7 +1,7 @@
 """Table of all metrics of sessions and of methods: units, labels and meanings; time and errors as text."""
 
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 #: Factor from the SI unit to the unit that people read.
 FACTORS = {"mm": 1e3, "mm/s": 1e3, "mN": 1e3, "µm": 1e6, "µs": 1e6, "ml": 1e6, "%": 1e2}
@@ -12,6 +12,8 @@ class Metric(NamedTuple):
 
     unit: str
     """SI; "1" of a share or a count."""
+    worse: Literal["higher", "lower", "absent", "neither"]
+    """Which amounts are worse; absent: higher ones, and none at all is worst."""
     doc: str
     label: str = ""
     """Short name for people, where one is shown."""
@@ -31,60 +33,93 @@ class Metric(NamedTuple):
 
 #: Metrics of a history, from `summary.compute_metrics`, in its order.
 METRICS: dict[str, Metric] = {
-    "duration": Metric("s", "simulated time from the first row to the last", "duration", "s"),
+    "duration": Metric("s", "neither", "simulated time from the first row to the last", "duration", "s"),
     "set_point": Metric(
         "N",
+        "neither",
         "total force asked for; one that changes from row to row: its mean while shaping",
         "set point",
         "N",
     ),
-    "rfd": Metric("N", "rms over time of (total force - set point) while the fingertip touches", "RFD", "mN"),
-    "rfd_shaping": Metric(
-        "N", "the same, only while a cell follows the force: without touching down", "RFD while shaping", "mN"
+    "rfd": Metric(
+        "N", "higher", "rms over time of (total force - set point) while the fingertip touches", "RFD", "mN"
     ),
-    "rfd_session": Metric("N", "the same over the whole session; without contact the force is 0"),
-    "contact_share": Metric("1", "share of the session's time in which the fingertip touches"),
+    "rfd_shaping": Metric(
+        "N",
+        "higher",
+        "the same, only while a cell follows the force: without touching down",
+        "RFD while shaping",
+        "mN",
+    ),
+    "rfd_session": Metric("N", "higher", "the same over the whole session; without contact the force is 0"),
+    "contact_share": Metric("1", "lower", "share of the session's time in which the fingertip touches"),
     "contact_loss_share": Metric(
-        "1", "share of the time from first to last contact in which it does not touch", "without contact", "%"
+        "1",
+        "higher",
+        "share of the time from first to last contact in which it does not touch",
+        "without contact",
+        "%",
     ),
     "lag_mean": Metric(
-        "m", "mean horizontal distance from fingertip to the centroid of the cells' forces", "lag", "mm"
+        "m",
+        "higher",
+        "mean horizontal distance from fingertip to the centroid of the cells' forces",
+        "lag",
+        "mm",
     ),
-    "lag_max": Metric("m", "largest such distance", "largest lag", "mm"),
+    "lag_max": Metric("m", "higher", "largest such distance", "largest lag", "mm"),
     "force_deviation": Metric(
-        "N", "standard deviation over time of the total force while shaping", "force deviation", "mN"
+        "N",
+        "higher",
+        "standard deviation over time of the total force while shaping",
+        "force deviation",
+        "mN",
     ),
     "force_oscillation": Metric(
-        "N", "rms over time of the total force less its moving average over 0.25 s, while shaping"
+        "N", "higher", "rms over time of the total force less its moving average over 0.25 s, while shaping"
     ),
-    "force_overshoot": Metric("1", "first touch: largest force beyond the set point, as a share of it"),
+    "force_overshoot": Metric(
+        "1", "higher", "first touch: largest force beyond the set point, as a share of it"
+    ),
     "settling_time": Metric(
-        "s", "first touch: from touching down until the force stays within 10 % of its set point"
+        "s", "absent", "first touch: from touching down until the force stays within 10 % of its set point"
     ),
     "height_deviation": Metric(
         "m",
+        "higher",
         "standard deviation over time of the surface's height over the fingertip, shaping",
         "height deviation",
         "mm",
     ),
-    "ridge_offset": Metric("m", "mean height of what the fingertip left behind over its path"),
-    "ridge_error": Metric("m", "rms of the same", "ridge-height error", "mm"),
-    "ridge_unevenness": Metric("m", "standard deviation of the same", "unevenness", "mm"),
-    "max_cell_force": Metric("N", "largest force on one cell"),
-    "max_total_force": Metric("N", "largest force on all cells together", "largest force", "N"),
-    "lowest": Metric("m", "height of the lowest pin at the end"),
-    "highest": Metric("m", "height of the highest pin at the end"),
-    "height_range": Metric("m", "highest less lowest: the relief that was formed", "relief formed", "mm"),
-    "raised_volume": Metric("m3", "volume formed above the initial surface"),
-    "sunk_volume": Metric("m3", "volume formed below the initial surface"),
+    "ridge_offset": Metric("m", "higher", "mean height of what the fingertip left behind over its path"),
+    "ridge_error": Metric("m", "higher", "rms of the same", "ridge-height error", "mm"),
+    "ridge_unevenness": Metric("m", "higher", "standard deviation of the same", "unevenness", "mm"),
+    "max_cell_force": Metric("N", "higher", "largest force on one cell"),
+    "max_total_force": Metric("N", "higher", "largest force on all cells together", "largest force", "N"),
+    "lowest": Metric("m", "neither", "height of the lowest pin at the end"),
+    "highest": Metric("m", "neither", "height of the highest pin at the end"),
+    "height_range": Metric(
+        "m", "neither", "highest less lowest: the relief that was formed", "relief formed", "mm"
+    ),
+    "raised_volume": Metric("m3", "neither", "volume formed above the initial surface"),
+    "sunk_volume": Metric("m3", "neither", "volume formed below the initial surface"),
     "rfd_jnd_least": Metric(
-        "1", "RFD over the largest just noticeable difference of the set point", "RFD, at least", "JND"
+        "1",
+        "higher",
+        "RFD over the largest just noticeable difference of the set point",
+        "RFD, at least",
+        "JND",
     ),
     "rfd_jnd_most": Metric(
-        "1", "RFD over the smallest just noticeable difference of the set point", "RFD, at most", "JND"
+        "1",
+        "higher",
+        "RFD over the smallest just noticeable difference of the set point",
+        "RFD, at most",
+        "JND",
     ),
     "ridge_unevenness_touch": Metric(
         "1",
+        "higher",
         "ridge_unevenness over the spatial resolution of a fingertip",
         "unevenness",
         "spatial resolutions",
@@ -92,39 +127,45 @@ METRICS: dict[str, Metric] = {
 }
 #: Metrics of a run beside those of its history.
 RUN: dict[str, Metric] = {
-    "losses": Metric("1", "how often the controller lost the fingertip, at every lift-off too", "losses"),
-    "run_time": Metric("s", "time the simulation took", "run time", "s"),
-    "real_time_factor": Metric("1", "simulated time over run time"),
-    "simulated": Metric("s", "simulated time", "simulated", "s"),
-    "max_indentation": Metric("m", "largest indentation of the fingertip by a pin"),
+    "losses": Metric(
+        "1", "higher", "how often the controller lost the fingertip, at every lift-off too", "losses"
+    ),
+    "run_time": Metric("s", "higher", "time the simulation took", "run time", "s"),
+    "real_time_factor": Metric("1", "lower", "simulated time over run time"),
+    "simulated": Metric("s", "neither", "simulated time", "simulated", "s"),
+    "max_indentation": Metric("m", "higher", "largest indentation of the fingertip by a pin"),
 }
 #: Errors of a run, for which it is integrated once more. Each covers the truth in 95 of 100 runs: no bound.
 ERRORS: dict[str, Metric] = {
-    "height_error": Metric("m", "largest error of a pin's height, estimated", "height error, about", "µm"),
-    "force_error": Metric("N", "largest error of the force on a cell, estimated", "force error, about", "mN"),
+    "height_error": Metric(
+        "m", "higher", "largest error of a pin's height, estimated", "height error, about", "µm"
+    ),
+    "force_error": Metric(
+        "N", "higher", "largest error of the force on a cell, estimated", "force error, about", "mN"
+    ),
     "total_force_error": Metric(
-        "N", "largest error of the total force, estimated", "total force error, about", "mN"
+        "N", "higher", "largest error of the total force, estimated", "total force error, about", "mN"
     ),
 }
 #: Largest speeds at which a fingertip is followed.
 SPEEDS: dict[str, Metric] = {
-    "largest_drag_speed": Metric("m/s", "fastest straight level drag of a ridge that is followed"),
-    "largest_lift_speed": Metric("m/s", "fastest lift straight up that is followed"),
+    "largest_drag_speed": Metric("m/s", "lower", "fastest straight level drag of a ridge that is followed"),
+    "largest_lift_speed": Metric("m/s", "lower", "fastest lift straight up that is followed"),
 }
 #: Metrics of a method beside those of a history.
 METHOD: dict[str, Metric] = {
     "relief_rms": Metric(
-        "m", "rms deviation of the formed relief from the nominal one", "relief error", "mm"
+        "m", "higher", "rms deviation of the formed relief from the nominal one", "relief error", "mm"
     ),
-    "relief_largest": Metric("m", "largest deviation of the formed relief from the nominal one"),
+    "relief_largest": Metric("m", "higher", "largest deviation of the formed relief from the nominal one"),
     "losses": Metric(
-        "1", "how often contact ended though the fingertip rose no faster than a pin can", "losses"
+        "1", "higher", "how often contact ended though the fingertip rose no faster than a pin can", "losses"
     ),
-    "speed_limit": Metric("m/s", "largest speed that is followed", "speed limit", "mm/s"),
+    "speed_limit": Metric("m/s", "lower", "largest speed that is followed", "speed limit", "mm/s"),
     "period_cost": Metric(
-        "s", "processor time of a control period, device included", "cost of a period", "µs"
+        "s", "higher", "processor time of a control period, device included", "cost of a period", "µs"
     ),
-    "cost_ratio": Metric("1", "the same over that of the first method", "cost, ratio"),
+    "cost_ratio": Metric("1", "higher", "the same over that of the first method", "cost, ratio"),
 }
 
 

@@ -18,6 +18,7 @@ from ..base.errors import ParameterError
 from ..base.modes import Mode
 from ..model.control_interface import SetPoint, find_set_point
 from ..model.layout import find_grid_shape
+from .metric_table import METRICS
 
 #: How far the fingertip must have gone on from a cell for it to count as left behind, m.
 AWAY = 12e-3
@@ -385,10 +386,10 @@ def take_worst(each: Sequence[Mapping[str, float | None]]) -> dict[str, float | 
     worst: dict[str, float | None] = {}
     for name in each[0]:
         values = [value for one in each if (value := one[name]) is not None]
-        pick = min if name == "contact_share" else max
-        worst[name] = pick(values, key=abs, default=None)
-        if name == "settling_time" and len(values) < len(each):  # one never does
-            worst[name] = None
+        worse = METRICS[name].worse
+        pick = min if worse == "lower" else max
+        lacking = worse == "absent" and len(values) < len(each)
+        worst[name] = None if lacking else pick(values, key=abs, default=None)
     return worst
 
 
