@@ -77,17 +77,23 @@ def _are_finite(numbers: Floats) -> bool:
     return all(map(_are_finite, parts))
 
 
-def simulate_period(system: System, state: State, finger: FingerPeriod | None) -> State:
-    """Simulate one control period of a run, or of a batch, in the arrays of `state`."""
-    sensors, controller, period = system.sensors, system.controller, state.period
-    memory, disc = controller.locate(state.memory, sensors.read(state.active.touched, period))
+def simulate_period(
+    system: System,
+    state: State,
+    finger: FingerPeriod | None,
+) -> State:
+    """Simulate a control period of a run or batch in the arrays of `state`."""
+    sensors, controller = system.sensors, system.controller
+    touched = sensors.read(state.active.touched, state.period)
+    memory, disc = controller.locate(state.memory, touched)
     state = system.selection.update(state, finger, disc)
     active = state.active
     if active.cells.size:
-        memory, orders = controller.command(memory, sensors.read(active.all, period))
+        measured = sensors.read(active.all, state.period)
+        memory, orders = controller.command(memory, measured)
         active.follow(orders)
         system.move(active, finger)
-        sensors.note(active.all, period + 1)
+        sensors.note(active.all, state.period + 1)
     return state.end_period(memory)
 
 
