@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .core.base.errors import DigiclayError, OutputError, SceneError
+from .core.base.errors import DigiclayError, OutputError, ParameterError, SceneError
 from .core.control.methods import list_added
 from .core.files.run_folder import write_folder
 from .core.files.tables import Record, Table, format_html
@@ -28,7 +28,7 @@ from .core.scene.schema import Scene
 from .core.session import finished_run, run_scene
 from .core.session.probes import require_scene
 from .core.studies.axes import make_axis, make_columns, make_points
-from .core.studies.evaluation import evaluate_bundle, find_figure, judge_all, make_bundles
+from .core.studies.evaluation import evaluate_bundle, find_figure, judge_all, make_bundles, require_recorder
 from .core.studies.sweep_plan import EFFORT
 from .core.surface.features import Feature, Finding
 from .core.surface.formed import Formed, make_formed
@@ -153,6 +153,9 @@ class Result(run_scene.Result):
         """
         self.require_history("surface")
         finished_run.require_surface(self.scene, "surface")
+        for name, moment in (("time", time), ("former", former)):
+            if not (moment is None or isinstance(moment, (int, float))):
+                raise ParameterError("surface", name, "must be a number of seconds", repr(moment))
         row = -1 if time is None else finished_run.find_row(self.history, time, "time")
         return Surface(
             self.scene, make_formed(self.history, row, finished_run.find_row(self.history, former, "former"))
@@ -212,6 +215,8 @@ def change_scene(source: Source, changes: Table | None) -> Scene:
     """Return the scene of a source with changes, whose methods are loaded."""
     if changes is not None and not isinstance(changes, Mapping):
         raise SceneError(f"Changes must be a table of keys and values (got {changes!r:.60}).")
+    if isinstance(source, Scene):
+        find_code(source)  # refuses one of former code
     path, table = read_source(source)
     control = table.get("control")
     if isinstance(source, Mapping) and isinstance(control, Mapping) and "method" in control:
@@ -249,12 +254,14 @@ def sweep(
     """Run a scene over a grid of values; return a row for each point."""
     if not isinstance(varied, Mapping) or not varied:
         raise SceneError(f"A sweep must vary at least one key: {{key: values}} (got {varied!r:.60}).")
-    words = metrics.split(",") if isinstance(metrics, str) else list(metrics)
+    words = metrics.split(",") if isinstance(metrics, str) else metrics
+    if not isinstance(words, Iterable):
+        raise ParameterError("metrics", "", "must be a list of metrics", repr(metrics))
     names = list(dict.fromkeys(find_figure(str(word).strip(), "metrics") for word in words))
-    if require_scene(scene).recorder is None:
-        raise OutputError("A sweep needs a recorder, and the scene has recorder = 'absent'.")
+    find_code(require_scene(scene))  # refuses one of former code
     axes = [make_axis(key, values, partial(write_value, key)) for key, values in varied.items()]
     points = judge_all(make_points(scene, (), axes, option="sweep"))
+    require_recorder(points)
     records: dict[int, Record] = {}
     for bundle in make_bundles(points).every:
         for point, record in zip(bundle, evaluate_bundle(bundle), strict=True):

@@ -32,7 +32,8 @@ METHODS = ("virtual_master", "cell_states", "hybrid", "elastic", "viscous", "pus
 def scene(method, *fingers, **parts):
     """Return a bed of 50 x 50 pins under some fingers."""
     control = find_method(method).import_parameters()() if method else None
-    blister = Blister(**(find_method(method).blister or {})) if method else None
+    shape = find_method(method).blister if method else None
+    blister = None if shape is None else Blister(**shape)
     layout = replace(PAPER.layout, rows=50, columns=50)
     made = replace(PAPER, layout=layout, control=control, method=method or "virtual_master", blister=blister)
     return replace(made, fingers=fingers, recorder=None, **parts)

@@ -1,13 +1,11 @@
-"""Commands beside run: compare, features, form; what is stopped before its end; scene and run in Python."""
+"""Commands beside run: compare, features, form; what is stopped before its end."""
 
 import json
-import re
 import shlex
 import shutil
 import signal
 from pathlib import Path
 
-import digiclay
 import numpy as np
 import pytest
 import trimesh
@@ -16,15 +14,14 @@ from digiclay.commands import compare as compare_command
 from digiclay.commands import form as form_command
 from digiclay.commands import run as run_command
 from digiclay.commands.run import plan_meshes
-from digiclay.core.base.errors import DigiclayError
 from digiclay.core.metrics.metric_table import ERRORS
 from digiclay.core.model.actuator import Actuator
 from digiclay.core.model.fingertip import Fingertip
 from digiclay.core.model.layout import Layout, make_grid
 from digiclay.core.scene import forming
 from digiclay.core.scene.assembly import assemble
-from digiclay.core.scene.scene_source import find, load
-from digiclay.core.scene.toml_table import format_scene, resolve
+from digiclay.core.scene.scene_source import load
+from digiclay.core.scene.toml_table import resolve
 from digiclay.core.session.finished_run import find_row
 from digiclay.core.session.run_scene import RUN_METRICS, Result, RunRecording
 from digiclay.core.session.run_scene import run as run_scene
@@ -32,8 +29,7 @@ from digiclay.core.shapes.fitting import fit_shape
 from digiclay.core.shapes.request import Shape
 from digiclay.plots.sweep import PANELS, comparison
 
-from tests.assemble import refused_in_a_line, table
-from tests.other_process import finish, start
+from tests.assemble import table
 from tests.scene_files import SMALL_BLISTER, call, left, read_json, scene_text
 
 pytestmark = pytest.mark.usefixtures("here")
@@ -418,43 +414,3 @@ def test_the_finger_touches_the_highest_part_nearest_to_the_middle_at_the_height
     under = touch + finger.height * (1.0 - np.sqrt(np.maximum(1.0 - square, 0.0)))
     near = square < 0.9
     assert np.min((under - heights)[near]) == pytest.approx(0.0, abs=1e-12)
-
-
-TABLES = {"layout": {"rows": 5, "columns": 5}, "control": "absent", "simulation": {"duration": "50 ms"}}
-
-
-def test_a_scene_is_of_tables_of_a_file_a_name_or_nothing(tmp_path):
-    file = tmp_path / "my.toml"
-    file.write_text(format_scene(resolve(TABLES, "my")), encoding="utf-8")
-    assert digiclay.scene(TABLES) == resolve(TABLES)
-    assert digiclay.scene(file) == digiclay.scene(str(file)) == load(file)
-    assert digiclay.scene("ridge_mound_valley") == load(find("ridge_mound_valley"))
-    assert digiclay.scene() == digiclay.scene({}) == resolve({})
-
-
-def test_a_run_has_heights_metrics_and_a_summary():
-    # Importing it imports no part of the simulation.
-    parts = "{'numpy', 'bpy', 'trimesh', 'digiclay.core.base'}"
-    assert finish(start(f"import sys, digiclay; print({parts} & {{*sys.modules}})"))[1] == "set()\n"
-    periods = []
-    done = digiclay.run(digiclay.scene(TABLES), lambda *counts: periods.append(counts))
-    assert periods == [(count, 10) for count in range(1, 11)]
-    assert done.history["height"].shape == done.history["force"].shape == (11, 25)
-    np.testing.assert_allclose(done.history["time"], np.arange(11) * 5e-3)
-    assert done.metrics["simulated"] == pytest.approx(0.05)
-    assert done.metrics["versions"]["digiclay"] == digiclay.__version__
-    assert done.summary().startswith("0.1 s simulated in ")
-
-
-@pytest.mark.parametrize(
-    "content, message",
-    [
-        ({"contrl": {}}, "contrl must be a known key (got an empty section). Did you mean control?"),
-        ({"valve": {"orifice_diameter": "3 s"}}, "valve.orifice_diameter must be in m or a multiple"),
-        ("no_such_scene", "no_such_scene is neither a file nor a sample"),
-        (7, "A scene must be tables, a file or a name (got 7)."),
-    ],
-)
-def test_a_wrong_scene_is_refused_in_one_line(content, message):
-    with refused_in_a_line(DigiclayError, f"^{re.escape(message)}"):
-        digiclay.scene(content)

@@ -18,6 +18,7 @@ from ..core.studies.evaluation import (
     judge_all,
     make_bundles,
     read_metrics,
+    require_recorder,
 )
 from ..core.studies.sweep_plan import format_table, make_grid, open_sweep
 from ..core.version import __version__
@@ -53,8 +54,7 @@ def carry_out(arguments: argparse.Namespace) -> int:
     axes = [read_axis(name_methods(varied)) for varied in arguments.vary]
     with Counted(sys.stderr, "sweep", "points read", quiet=arguments.quiet) as bar:
         points = make_points(find(arguments.scene), settings_of(arguments), axes, bar)
-        if not any(point.scene and point.scene.recorder for point in points):
-            raise OutputError("A sweep needs a recorder, and the scene has recorder = 'absent'.")
+        require_recorder(points)
         if any(name in ERRORS for name in names):
             points = judge_all(points)
         bundles = make_bundles(points)

@@ -239,7 +239,9 @@ def load_method(word: str) -> str:
         if row.source.digest == source.digest and row.source.attribute == source.attribute:
             return name
         other = row.source.file
-        raise MethodError(f"{source.label}: the method's name {name} must be its own (also that of {other}).")
+        if other != source.file:
+            rule = f"the method's name {name} must be its own (also that of {other or 'a class in memory'})"
+            raise MethodError(f"{source.label}: {rule}.")
     add_source(name, source)
     return name
 
@@ -303,7 +305,8 @@ def add_source(name: str, source: MethodSource) -> OwnRow:
 
 def add_class(name: str, source: MethodSource, kind: Any) -> OwnRow:
     """Check the class of a method, and put it into the table of methods."""
-    if isinstance(kind, type) and "__dataclass_params__" not in vars(kind):
+    is_method = isinstance(kind, type) and issubclass(kind, ControlParameters)
+    if is_method and "__dataclass_params__" not in vars(kind):
         try:
             kind = dataclass(frozen=True, eq=False, repr=False)(kind)
         except TypeError as error:
@@ -422,8 +425,8 @@ def find_code(scene: Scene) -> MethodSource | None:
     Raises MethodError if another class has that name by now.
     """
     row = list_added().get(scene.method) if scene.control is not None else None
-    if isinstance(row, OwnRow) and is_in_memory(row.source) and type(scene.control) is not row.kind:
-        rule = "must be made of the class of that name that was loaded last"
+    if isinstance(row, OwnRow) and type(scene.control) is not row.kind:
+        rule = "must be of the code that was loaded last under its name"
         raise MethodError(f"The scene's method {scene.method} {rule}: make the scene again.")
     return row.source if isinstance(row, OwnRow) else None
 

@@ -101,7 +101,10 @@ METHODS: dict[str, Method] = {
 #: What has been added to this process, see `add_method`; a .blend keeps the names of these.
 _ADDED: dict[str, Method] = {}
 #: Where an unknown method may come from.
-HINT = "A method of your own must be loaded: by --method path/to/mine.py:Mine, in Blender by the preferences."
+HINT = (
+    "A method of your own must be loaded: by --method path/to/mine.py:Mine, in Python by "
+    "digiclay.scene(..., {'control.method': Mine}), in Blender by the preferences."
+)
 
 
 def add_method(name: str, method: Method) -> None:

@@ -165,7 +165,7 @@ def check_folder(out: Path, *, overwrite: bool, content: Content = RUN) -> None:
         what = f"holds other things than a {content.name}"
         raise OutputError(f"{out} {what}: choose another folder with --out.")
     if filled and not overwrite:
-        other = f"replace the {content.name} in it with --overwrite"
+        other = f"replace the {content.name} in it with --overwrite (in Python overwrite=True)"
         raise OutputError(f"{out} is not empty: choose another folder with --out, or {other}.")
     above = out.resolve().parent
     while not above.exists():

@@ -198,7 +198,7 @@ def _make_sensors(scene: Scene, cell: Cell, line: Queue) -> Sensors:
 
 def _make_controller(scene: Scene, bed: Grid, cells: tuple[Cell, ...]) -> Controller:
     """Return the control method for the cells of all fingers, after the display of a shape, if any."""
-    cell = cells[0]
+    cell, method = cells[0], find_method(scene.method)  # refuses a run whose method is not loaded
     if scene.control is None and scene.shape is None:
         return Uncontrolled()
     from ..control.device_info import DeviceInfo
@@ -217,8 +217,7 @@ def _make_controller(scene: Scene, bed: Grid, cells: tuple[Cell, ...]) -> Contro
     if scene.shape and not (controller and scene.method == "shape_display"):
         from ..control.displays import make_handover
 
-        recovers = find_method(scene.method).recovers
-        controller = make_handover(scene.shape, device, controller, recovers=recovers)
+        controller = make_handover(scene.shape, device, controller, recovers=method.recovers)
     assert controller is not None
     return controller
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..base.errors import ParameterError
 from ..base.quantity import Parameters, quantity
-from ..control.methods import ControlParameters, find_method
+from ..control.methods import ControlParameters, find_method, list_methods
 from ..files.tables import format_html, format_lines, refuse_unknown
 from ..model.control_interface import SetPoint
 from ..model.fingertip import require_one
@@ -242,6 +242,8 @@ class Scene:
     def describe(self) -> dict[str, str]:
         """Return what matters most of it, by name."""
         bed, time, control = self.layout, self.simulation, self.method if self.control else "absent"
+        if self.method not in list_methods():
+            control = f"{self.method}, which is not loaded"
         absent = [name for name in OPTIONAL if name != "control" and None in self.list_parts(name)]
         return {
             "bed": f"{bed.rows} x {bed.columns} pins, {bed.pitch * 1e3:g} mm apart, {bed.arrangement}",

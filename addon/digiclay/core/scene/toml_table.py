@@ -200,7 +200,7 @@ def _check_text(key: str, value: object) -> str:
 
 def _read_section(section: str, value: object, owner: str = "") -> Record | None:
     """Return the table of a section, or None for an omitted part."""
-    if value == ABSENT and section in OPTIONAL:
+    if isinstance(value, str) and value == ABSENT and section in OPTIONAL:
         return None
     if isinstance(value, dict):
         return dict(value)

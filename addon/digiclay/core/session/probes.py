@@ -99,7 +99,8 @@ def force(scene: Scene, pose: ArrayLike, height: ArrayLike | None = None, finger
     Raises
     ------
     DigiclayError
-        Without a fingertip, or for a pose or heights of another shape or with numbers that are not finite.
+        Without a fingertip; for a pose or heights of another shape or with numbers that are not finite; for
+        a finger deeper in the bed than half its thickness. The law was measured up to 2 N and 3 mm.
     """
     if not (isinstance(finger, int) and 1 <= finger <= len(require_scene(scene).fingers)):
         raise ParameterError("force", "finger", f"must be from 1 to {len(scene.fingers)}", repr(finger))
@@ -113,6 +114,9 @@ def force(scene: Scene, pose: ArrayLike, height: ArrayLike | None = None, finger
     path = Trajectory(np.zeros(1), pose[None, :3], pose[None, 3:])
     forms = compute_forms(cell.touch.fingertip.outline(path.poses(np.zeros(1))))
     under = compute_underside(*forms, bed.compute_basis(np.arange(bed.count)))[0]
+    depth, thickness = float((held - under).max()), cell.touch.fingertip.height
+    if depth > thickness:
+        raise ParameterError("force", "pose", f"must press at most {thickness:g} m deep", f"{depth:g} m")
     state = np.zeros((cell.rows, bed.count))
     state[0] = held
     return find_contact_force(cell, state, under)

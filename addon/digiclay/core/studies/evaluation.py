@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
-from ..base.errors import DigiclayError, ParameterError, one_line
+from ..base.errors import DigiclayError, OutputError, ParameterError, one_line
 from ..base.quantity import find_nearest_name
 from ..batch.run_together import measure_together
 from ..batch.structure import Findings, describe_structure
@@ -78,6 +78,12 @@ class Bundles:
         count, noun = sum(map(len, self.batches)), "batch" if len(self.batches) == 1 else "batches"
         lines = [f"{count} points run in {len(self.batches)} {noun}"] if self.batches else []
         return [*lines, *self.why]
+
+
+def require_recorder(points: Iterable[Point]) -> None:
+    """Refuse points none of which has a history."""
+    if not any(point.scene and point.scene.recorder for point in points):
+        raise OutputError("A sweep needs a recorder, and the scene has recorder = 'absent'.")
 
 
 def judge_all(points: Iterable[Point]) -> list[Point]:

@@ -1,0 +1,617 @@
+"""Python's front door: scenes, runs, folders, sweeps, periods, own methods, and the device's own answers."""
+
+import pickle
+import re
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import digiclay
+import numpy as np
+import pandas
+import pytest
+from digiclay import DigiclayError
+from digiclay.core.base.errors import LONGEST
+from digiclay.core.scene.scene_source import Setting, find, list_samples, load
+from digiclay.core.scene.toml_table import format_scene, resolve, tabulate
+from digiclay.core.session.run_scene import run as simulate
+
+from tests.assemble import refused_in_a_line
+from tests.other_process import finish, start
+from tests.own_methods import PAD, forgotten, write_method
+from tests.scene_files import call
+
+pytestmark = pytest.mark.usefixtures("here")
+
+TABLES = {"layout": {"rows": 5, "columns": 5}, "control": "absent", "simulation": {"duration": "50 ms"}}
+SHORT = {"simulation.duration": 0.3}
+
+
+@pytest.fixture(autouse=True)
+def no_methods():
+    with forgotten():
+        yield
+
+
+@pytest.fixture(scope="module")
+def tap():
+    return digiclay.scene("tap", SHORT)
+
+
+@pytest.fixture(scope="module")
+def done(tap):
+    return digiclay.run(tap)
+
+
+class Mine(digiclay.Method):
+    """Pins under a force give way."""
+
+    yield_force: float = digiclay.quantity(0.03, "force above which a pin gives way", unit="N", above=0.0)
+
+    def command(self, memory, cells, device):
+        down = cells.force > self.yield_force
+        return memory, digiclay.Orders(height=np.where(down, cells.height - 50e-6, cells.target))
+
+
+def make_again():
+    """Return another class of the same name, with half the parameters' effect."""
+
+    class Other(Mine):
+        def command(self, memory, cells, device):
+            return memory, digiclay.Orders(height=cells.target)
+
+    Other.__name__ = "Mine"
+    return Other
+
+
+def test_a_scene_is_of_tables_of_a_file_a_name_another_scene_or_nothing(here):
+    file = here / "my.toml"
+    file.write_text(format_scene(resolve(TABLES, "my")), encoding="utf-8")
+    assert digiclay.scene(TABLES) == resolve(TABLES)
+    assert digiclay.scene(file) == digiclay.scene(str(file)) == load(file)
+    assert digiclay.scene("ridge_mound_valley") == load(find("ridge_mound_valley"))
+    assert digiclay.scene() == digiclay.scene({}) == resolve({})
+    assert digiclay.scene(digiclay.scene(file)) == load(file)
+
+
+@pytest.mark.parametrize("name", list_samples())
+def test_the_tables_of_a_scene_resolve_to_it(name):
+    scene = load(find(name))
+    assert resolve(tabulate(scene)) == scene
+
+
+@pytest.mark.parametrize(
+    "changes, settings",
+    [
+        ({"control.force_setpoint": "0.3 N"}, ["control.force_setpoint=0.3"]),
+        ({"control": {"force_gain": 3, "travel": 2e-3}}, ["control.force_gain=3", "control.travel=2e-3"]),
+        ({"conduit": "absent", "layout.rows": np.int64(15)}, ["conduit=absent", "layout.rows=15"]),
+        ({"contact.stiffness": np.array(200)}, ["contact.stiffness=200"]),
+        ({"layout.pitch": np.float32(0.25)}, ["layout.pitch=0.25"]),
+        ({"control.method": "hybrid"}, ["control.method=hybrid"]),
+        ({"preset": "fast"}, ["preset=fast"]),
+        ({"layout.arrangement": "hexagonal"}, ["layout.arrangement=hexagonal"]),
+        ({"actuator.rest_height": "30 mm"}, ["actuator.rest_height=0.03"]),
+        ({"name": "true"}, ['name="true"']),
+        (
+            {"trajectory.waypoints": [{"time": np.float64(1.0), "position": np.array([0.0, 0.0, 0.04])}]},
+            ["trajectory.waypoints=[{time=1.0, position=[0.0, 0.0, 0.04]}]"],
+        ),
+    ],
+)  # fmt: skip
+@pytest.mark.parametrize("source", ["name", "scene"])
+def test_changes_are_those_of_the_command_line_also_of_a_scene_that_is_made(changes, settings, source):
+    # What follows from a method, a preset or an arrangement of pins follows in a scene as in its file.
+    wanted = load(find("tap"), [Setting(*one.split("=", 1)) for one in settings])
+    assert digiclay.scene("tap" if source == "name" else digiclay.scene("tap"), changes) == wanted
+
+
+@pytest.mark.parametrize("number", [np.float32(0.25), np.array(0.25), pandas.Series([0.25])[0]], ids=type)
+def test_numbers_of_numpy_and_pandas_are_numbers_in_tables(number):
+    points = [{"time": number, "position": np.array([0.0, 0.0, 0.04])}]
+    scene = digiclay.scene({"control": {"force_setpoint": number}, "trajectory": {"waypoints": points}})
+    assert scene.control.force_setpoint == scene.simulation.duration == 0.25
+
+
+@pytest.mark.parametrize(
+    "content, changes, message",
+    [
+        ({"contrl": {}}, None, "contrl must be a known key (got an empty section). Did you mean control?"),
+        ({"valve": {"orifice_diameter": "3 s"}}, {}, "valve.orifice_diameter must be in m or a multiple"),
+        ("no_such_scene", None, "no_such_scene is neither a file nor a sample"),
+        (7, None, "A scene must be tables, a file or a name (got 7)."),
+        ({"control": np.array([1, 2])}, None, "control must be a section, [control]"),
+        ({"layout": {"rows": np.array([5, 6])}}, None, "layout.rows must be a whole number (got [5, 6])."),
+        ("tap", [1], "Changes must be a table of keys and values (got [1])."),
+        ("tap", {"control.force_gian": 3}, "changes: control.force_gian must be a known key (got 3). Did"),
+        ("tap", {"control": {"force_gain": float("nan")}}, "changes: control.force_gain must be a finite"),
+        ("tap", {"control.force_gain": None}, "changes: control.force_gain must be a number"),
+        ("tap", {"control.force_gain": "3"}, "changes: control.force_gain must have a unit known here"),
+        ("tap", {3: 4}, "changes: 3 must be a known key (got 4)"),
+        ("tap", {"control.method": "hybird"}, "changes: control.method must be one of virtual_master, "),
+        ("tap", {"control.method": int}, "int: the class must derive from digiclay.Method (got int)."),
+        ("tap", {"control.method": "no.py:No"}, "no.py cannot be read as a control method: No such file"),
+        ({"control": {"method": "no.py:No"}}, None, "no.py cannot be read as a control method: No such"),
+    ],
+)
+def test_a_wrong_scene_is_refused_in_one_line(content, changes, message):
+    with refused_in_a_line(DigiclayError, f"^{re.escape(message)}") as caught:
+        digiclay.scene(content, changes)
+    assert len(str(caught.value)) <= LONGEST
+
+
+@pytest.mark.parametrize(
+    "change, message",
+    [
+        (
+            lambda scene: scene.with_sections(method="hybrid"),
+            "control must be Hybrid, the parameters of the m",
+        ),
+        (lambda scene: replace(scene, control=Mine()), "control must be VirtualMaster, the parameters of th"),
+        (
+            lambda scene: replace(scene, method="mine", control=Mine()),
+            "control.method must be one of virtual",
+        ),
+        (
+            lambda scene: replace(scene, blister=None),
+            "blister must not be omitted with the method virtual_ma",
+        ),
+        (
+            lambda scene: scene.with_sections(layot=3),
+            "layot must be a known key (got 3). Did you mean layout",
+        ),
+        (lambda scene: scene.with_sections(layout=3), "layout must be a Layout (got int)."),
+        (lambda scene: scene.with_sections(valve=None), "valve must not be omitted"),
+        (
+            lambda scene: scene.with_sections(fingertip=scene.valve),
+            "fingertip must be a Fingertip (got Valve)",
+        ),
+        (lambda scene: replace(scene, fingers=[1]), "fingers must be a tuple of Finger (got list)."),
+        (lambda scene: scene.with_sections(trajectory=None), "trajectory must be a Path (got NoneType)."),
+    ],
+)
+def test_a_scene_has_only_parts_of_its_sections_and_its_method(tap, change, message):
+    with refused_in_a_line(DigiclayError, f"^{re.escape(message)}"):
+        change(tap)
+
+
+def test_importing_it_imports_no_part_of_the_simulation():
+    parts = "{'numpy', 'bpy', 'trimesh', 'digiclay.core.base'}"
+    assert finish(start(f"import sys, digiclay; print({parts} & {{*sys.modules}})"))[1] == "set()\n"
+    with pytest.raises(AttributeError, match="has no attribute 'swep'"):
+        digiclay.swep  # noqa: B018
+    assert {*digiclay.__all__} <= {*dir(digiclay)}
+
+
+def test_a_run_has_heights_metrics_and_a_summary():
+    periods = []
+    done = digiclay.run(digiclay.scene(TABLES), lambda *counts: periods.append(counts))
+    assert periods == [(count, 10) for count in range(1, 11)]
+    assert done.history["height"].shape == done.history["force"].shape == (11, 25)
+    np.testing.assert_allclose(done.history["time"], np.arange(11) * 5e-3)
+    assert done.metrics["simulated"] == pytest.approx(0.05)
+    assert done.metrics["versions"]["digiclay"] == digiclay.__version__
+    assert done.summary().startswith("0.1 s simulated in ")
+    without = digiclay.run(digiclay.scene(TABLES), errors=False)
+    assert done.metrics["height_error"] >= 0.0
+    assert without.metrics["errors_absent"] == "errors=False"
+
+
+def test_a_run_is_restored_from_its_folder_as_the_commands_have_it(here, tap, done):
+    assert done.save("out") == Path("out")
+    assert call("run tap --set simulation.duration=0.3 --out cli") == 0
+    again, other = digiclay.load("out"), digiclay.load(here / "cli")
+    assert again.scene == other.scene == tap
+    for name, array in done.history.items():
+        np.testing.assert_array_equal(again.history[name], array)
+        np.testing.assert_array_equal(other.history[name], array)
+    assert again.metrics == done.metrics
+    assert again.summary() == done.summary()
+    with refused_in_a_line(DigiclayError, "^out is not empty: .* overwrite=True"):
+        done.save("out")
+    assert done.save("out", overwrite=True) == Path("out")
+    assert call("export out --format obj") == 0
+
+
+def test_a_run_without_a_record_is_restored_too(tap):
+    done = digiclay.run(digiclay.scene(tap, {"recorder": "absent"}))
+    done.save("bare")
+    again = digiclay.load("bare")
+    assert again.history == {}
+    assert again.metrics == done.metrics
+    for name, ask in (("finger_force", lambda: again.finger_force), ("surface", again.surface)):
+        with refused_in_a_line(DigiclayError, f"^{name} needs a recorder, and the scene has"):
+            ask()
+    with refused_in_a_line(DigiclayError, "^plot needs a recorder"):
+        again.plot("a.png")
+    assert "<img" not in again._repr_html_()
+
+
+def test_the_surface_is_exported_by_the_ending_and_compared_with_a_former_one(here):
+    run = digiclay.run(digiclay.scene("plastic_press"), errors=False)
+    run.save("out")
+    for ending in ("stl", "glb"):
+        assert run.surface().export(f"a.{ending}") == Path(f"a.{ending}")
+        assert call(f"export out --format {ending}") == 0
+        assert (here / f"a.{ending}").read_bytes() == (here / "out" / f"surface.{ending}").read_bytes()
+    assert [feature.kind for feature in run.surface().features()] == ["crease"]
+    assert run.surface(former=run.scene.simulation.duration).features() == []
+    assert run.surface(time=0.0).formed.height.max() == pytest.approx(0.04)
+
+
+def test_forces_contact_and_losses_are_of_each_finger(done):
+    np.testing.assert_array_equal(done.finger_force, done.history["total_force"][:, None])
+    (contact,) = done.fingers
+    assert contact.losses == 0
+    assert contact.contact_time == pytest.approx(done.metrics["contact_share"] * done.metrics["duration"])
+    two = digiclay.scene("pinch_crease", {"simulation.duration": 2.0})
+    pinch = digiclay.run(two, errors=False)
+    assert pinch.finger_force.shape == (len(pinch.history["time"]), 2)
+    shares = [one["contact_share"] * pinch.metrics["duration"] for one in pinch.metrics["fingers"]]
+    assert [finger.contact_time for finger in pinch.fingers] == pytest.approx(shares)
+    lost = [{"losses": 2, "time": 0.5}, {"losses": 0, "time": 0.0}]
+    noted = replace(pinch, metrics={**pinch.metrics, "lost": lost})
+    assert [(finger.losses, finger.lost_time) for finger in noted.fingers] == [(2, 0.5), (0, 0.0)]
+
+
+def test_scene_and_run_are_shown_in_a_few_lines_and_in_a_notebook_with_the_plot(tap, done):
+    assert len(repr(tap).splitlines()) == len(repr(done).splitlines()) == 6
+    assert "11 x 11 pins, 3 mm apart" in repr(tap)
+    assert "real time" in repr(done)
+    assert "height error about" in repr(done)
+    named = replace(tap, name="a<b")
+    assert named._repr_html_().startswith(
+        "<table><caption>Scene a&lt;b</caption><tr><th>bed</th><td>11 x 11 pins"
+    )
+    assert re.search(
+        r'^<table>.*</table><img alt="[^"]+" width="800" src="data:image/png;base64,iVBOR', done._repr_html_()
+    )
+
+
+def test_without_matplotlib_there_is_the_table_and_a_line_with_the_extra(done, monkeypatch):
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    assert done._repr_html_().endswith("</table>")
+    with refused_in_a_line(DigiclayError, r"^Plots need matplotlib: run 'pip install .*digiclay\[plots\]'"):
+        done.plot("a.png")
+
+
+@pytest.mark.parametrize(
+    "ask, message",
+    [
+        (lambda run: run.plot("a.pdf"), "The file of a plot must end with .png or .svg (got a.pdf)."),
+        (lambda run: run.plot(None), "A file or folder must be a path (got None)."),
+        (lambda run: run.surface().export("a.xyz"), "Unknown mesh format 'xyz': known are stl, "),
+        (lambda run: run.surface().export("no/a.stl"), "Cannot write no/a.stl: No such file"),
+        (lambda run: run.surface().export("a.stl", kind="soild"), "Model.kind must be one of solid, "),
+        (lambda run: run.surface().export("a.stl", unit="inch"), "Export.unit must be one of mm, m"),
+        (lambda run: run.surface(time=9.0), "time must be between 0 s and 0.3 s (got 9 s)."),
+        (lambda run: run.surface(time=float("nan")), "time must be between 0 s and 0.3 s (got nan s)."),
+        (lambda run: run.surface(former="rest"), "surface.former must be a number of seconds (got 'rest')."),
+        (lambda run: run.save(3), "A file or folder must be a path (got 3)."),
+        (lambda run: digiclay.load("none"), "none is no run's folder: it has no scene.toml."),
+        (lambda run: digiclay.load(None), "A file or folder must be a path (got None)."),
+        (lambda run: digiclay.run("tap"), "scene must be a Scene, as digiclay.scene returns it (got 'tap')."),
+        (
+            lambda run: digiclay.steps("tap"),
+            "scene must be a Scene, as digiclay.scene returns it (got 'tap').",
+        ),
+    ],
+)
+def test_what_cannot_be_is_refused_in_one_line(done, ask, message):
+    with refused_in_a_line(DigiclayError, f"^{re.escape(message)}"):
+        ask(done)
+
+
+@pytest.mark.parametrize(
+    "file, text, message",
+    [
+        ("metrics.json", "[", "out/metrics.json must be a table of metrics in JSON."),
+        (
+            "metrics.json",
+            '{"run_time": 0, "control_periods": 3}',
+            "out/metrics.json must have the numbers cont",
+        ),
+        (
+            "metrics.json",
+            '{"digiclay": 1}',
+            "out/metrics.json must have the numbers control_periods and run_t",
+        ),
+        ("history.npz", "", "out/history.npz cannot be read as a run's history"),
+        (
+            "scene.toml",
+            "layot = 3",
+            "out/scene.toml: layot must be a known key (got 3). Did you mean layout?",
+        ),
+    ],
+)
+def test_a_damaged_folder_is_refused_in_one_line(done, file, text, message):
+    (done.save("out") / file).write_text(text, encoding="utf-8")
+    with refused_in_a_line(DigiclayError, f"^{re.escape(message)}"):
+        digiclay.load("out")
+
+
+def test_a_sweep_is_a_table_with_errors_that_numpy_and_pandas_read(tap):
+    counts = []
+    varied = {"control.force_gain": np.array([1.0, 2.0]), "layout.pitch": ["3 mm", "4 mm"]}
+    table = digiclay.sweep(
+        tap, varied, ["max_total_force", "lag", "height_error"], lambda *n: counts.append(n)
+    )
+    assert counts[-1] == (4, 4)
+    np.testing.assert_array_equal(table["control.force_gain"], [1.0, 1.0, 2.0, 2.0])
+    np.testing.assert_allclose(table["layout.pitch"], [3e-3, 4e-3, 3e-3, 4e-3])
+    names = "max_total_force lag_mean height_error run_time force_error lost error"
+    assert list(pandas.DataFrame(table).columns) == [*varied, *names.split()]
+    # As of a run of its own, up to the rounding of a batch.
+    for row in table:
+        changes = {key: float(row[key]) for key in varied}
+        alone = digiclay.run(digiclay.scene(tap, changes)).metrics
+        for name in ("max_total_force", "height_error", "force_error"):
+            assert row[name] == pytest.approx(alone[name], rel=1e-6), name
+    assert set(table["error"]) == {""}
+
+
+def test_a_sweep_over_methods_has_their_names_also_of_ones_own(tap):
+    write_method(Path())
+    table = digiclay.sweep(tap, {"control.method": ["plastic", "pad.py:SoftPad", Mine]}, "max_total_force")
+    assert list(table["control.method"]) == ["plastic", "soft_pad", "mine"]
+    alone = simulate(digiclay.scene(tap, {"control.method": Mine}))
+    assert table["max_total_force"][2] == pytest.approx(alone.metrics["max_total_force"], rel=1e-9)
+
+
+def test_points_that_fail_have_their_reason_and_no_number(tap):
+    varied = {"layout.pitch": ["3 mm", "4 mm"], "actuator.bore": ["2 mm", "3.5 mm"]}
+    table = digiclay.sweep(tap, varied, "max_total_force")
+    failed = table["error"] != ""
+    assert failed.tolist() == [False, True, False, False]
+    assert np.isnan(table["max_total_force"]).tolist() == failed.tolist()
+
+
+@pytest.mark.parametrize(
+    "varied, metrics, message",
+    [
+        ({}, ["rfd"], "A sweep must vary at least one key: {key: values} (got {})."),
+        (["control.force_gain"], ["rfd"], "A sweep must vary at least one key"),
+        ({"control.force_gain": []}, ["rfd"], "control.force_gain must be varied over at least one value"),
+        (
+            {"control.force_gain": 3},
+            ["rfd"],
+            "control.force_gain must be varied over a list of values (got 3)",
+        ),
+        ({"control.force_gain": "1,2"}, ["rfd"], "control.force_gain must be varied over a list of values"),
+        ({"control.force_gain": [1, 2, 1]}, ["rfd"], "control.force_gain must not have a value twice"),
+        (
+            {"control.force_gain": [1, -2]},
+            ["rfd"],
+            "sweep: control.force_gain must be at least 0 1/N (got -2",
+        ),
+        ({"control.force_gian": [1]}, ["rfd"], "sweep: control.force_gian must be a known key (got 1). Did"),
+        ({"control.force_gain": range(20_000)}, ["rfd"], "sweep must come to 10000 points at most"),
+        (
+            {"control.force_gain": [1]},
+            ["rdf"],
+            "metrics must be a known metric (got 'rdf'). Did you mean rfd?",
+        ),
+        ({"control.force_gain": [1]}, None, "metrics must be a list of metrics (got None)."),
+        ({"recorder": ["absent"]}, ["rfd"], "A sweep needs a recorder, and the scene has recorder = 'ab"),
+    ],
+)
+def test_a_sweep_that_cannot_be_is_refused_in_one_line(tap, varied, metrics, message):
+    with refused_in_a_line(DigiclayError, f"^{re.escape(message)}"):
+        digiclay.sweep(tap, varied, metrics)
+
+
+def test_steps_are_the_rows_of_a_run_and_stay_as_they_are(done, tap):
+    states = list(digiclay.steps(tap))
+    assert len(states) == tap.periods
+    for name in ("height", "force"):
+        np.testing.assert_array_equal([getattr(state, name) for state in states], done.history[name][1:])
+    np.testing.assert_allclose([state.finger_forces for state in states], done.finger_force[1:], rtol=1e-12)
+    np.testing.assert_allclose([state.time for state in states], done.history["time"][1:], rtol=1e-12)
+
+
+def test_tables_name_metrics_methods_and_samples():
+    assert digiclay.METRICS["rfd"].unit == "N"
+    assert digiclay.METRICS["height_error"].unit == "m"
+    assert list(digiclay.samples()) == list_samples()
+    assert all(digiclay.samples().values())
+    digiclay.scene("tap", {"control.method": Mine})
+    assert digiclay.methods()["mine"] == "Pins under a force give way"
+
+
+def test_a_class_in_memory_runs_as_the_same_one_in_a_file(tap):
+    write_method(Path())
+    changes = {"control.yield_force": "20 mN"}
+    mine = digiclay.run(digiclay.scene(tap, {**changes, "control.method": Mine}), errors=False)
+    filed = digiclay.run(digiclay.scene(tap, {**changes, "control.method": "pad.py:SoftPad"}), errors=False)
+    np.testing.assert_array_equal(mine.history["height"], filed.history["height"])
+    assert np.ptp(mine.history["height"]) > 1e-4
+    assert mine.metrics["versions"]["method"].startswith("Mine sha256:")
+
+
+def test_a_saved_run_of_a_class_in_memory_says_what_is_missing_and_is_never_reloaded_wrongly(tap):
+    run = digiclay.run(digiclay.scene(tap, {"control.method": Mine}), errors=False)
+    with pytest.warns(
+        UserWarning, match=r"^out has parameters and results of Mine, but not its code"
+    ) as said:
+        run.save("out")
+    assert "\n" not in str(said[0].message)
+    assert not Path("out/method.py").exists()
+    assert digiclay.load("out").scene == run.scene
+    other = make_again()
+    digiclay.scene("tap", {"control.method": other})
+    with pytest.warns(UserWarning, match="^out was run with other code of mine than is loaded"):
+        digiclay.load("out")
+    for ask in (
+        digiclay.run,
+        lambda scene: digiclay.scene(scene, {}),
+        lambda scene: digiclay.sweep(scene, {"layout.rows": [11]}, "lag"),
+    ):
+        with refused_in_a_line(DigiclayError, "^The scene's method mine must be of the code that was loaded"):
+            ask(run.scene)
+
+
+def test_a_run_whose_method_is_not_loaded_keeps_its_results_and_is_not_simulated_without_it(tap):
+    write_method(Path())
+    scene = digiclay.scene(tap, {"control.method": "pad.py:SoftPad"})
+    with forgotten():
+        digiclay.run(scene, errors=False).save("out")
+    assert Path("out/method.py").read_text(encoding="utf-8") == PAD
+    code = """
+import digiclay
+run = digiclay.load("out")
+print(run.scene.control, run.scene.method, run.metrics["method"], run.history["height"].shape)
+print(run.scene)
+for ask in (digiclay.run, digiclay.steps, digiclay.scene, lambda scene: run.save("copy")):
+    try:
+        ask(run.scene)
+    except digiclay.DigiclayError as error:
+        print(error)
+digiclay.scene("tap", {"control.method": "out/method.py:SoftPad"})
+again = digiclay.run(digiclay.load("out").scene, errors=False)
+print(again.history["height"].tobytes() == run.history["height"].tobytes())
+"""
+    _, said, wrong = finish(start(code))
+    lines = said.splitlines()
+    assert lines[0] == f"None soft_pad soft_pad {digiclay.load('out').history['height'].shape}", wrong
+    assert "method: soft_pad, which is not loaded" in said
+    assert [line[:35] for line in lines[7:-1]] == ["control.method must be one of virtu"] * 4
+    assert lines[-1] == "True"
+
+
+def test_a_changed_file_replaces_its_method_and_scenes_of_the_former_code_are_refused(tap):
+    path = write_method(Path())
+    scene = digiclay.scene(tap, {"control.method": "pad.py:SoftPad"})
+    path.write_text(PAD.replace("self.step", "0.5 * self.step"), encoding="utf-8")
+    changed = digiclay.scene(tap, {"control.method": "pad.py:SoftPad"})
+    with refused_in_a_line(DigiclayError, "^The scene's method soft_pad must be of the code that was loaded"):
+        digiclay.run(scene)
+    assert digiclay.run(changed, errors=False).metrics["method"] == "soft_pad"
+
+
+def test_a_class_that_is_only_in_memory_is_no_value_of_another_process(tap):
+    scene = digiclay.scene(tap, {"control.method": Mine})
+    assert pickle.loads(pickle.dumps(scene)) == scene
+    code = """
+import pickle
+try:
+    pickle.load(open("scene", "rb"))
+except Exception as error:
+    print(error)
+"""
+    Path("scene").write_bytes(pickle.dumps(scene))
+    assert finish(start(code))[1] == (
+        "Mine: the class must be in a file for other processes, by its name file.py:Mine.\n"
+    )
+
+
+def test_a_script_defines_and_runs_its_own_method():
+    text = """
+import digiclay
+import numpy as np
+
+class Mine(digiclay.Method):
+    def command(self, memory, cells, device):
+        return memory, digiclay.Orders(height=np.where(cells.force > 0.03, cells.height - 5e-5, cells.target))
+
+if __name__ == "__main__":
+    scene = digiclay.scene("tap", {"control.method": Mine, "simulation.duration": 0.2})
+    print(digiclay.run(scene, errors=False).metrics["method"])
+"""
+    Path("mine.py").write_text(text, encoding="utf-8")
+    assert finish(start("import runpy; runpy.run_path('mine.py', run_name='__main__')"))[1] == "mine\n"
+
+
+def test_a_held_bed_has_the_law_of_the_contact():
+    scene = digiclay.scene("tap", {"relaxation": "absent"})
+    finger, law = scene.section("fingertip"), scene.section("contact")
+    force = digiclay.force(scene, (0.0, 0.0, 0.039))
+    # The pin at the lowest point is 1 mm deep: equation 11 by hand.
+    deepest = law.share * law.stiffness / law.exponent * np.expm1(law.exponent * (1e-3 - law.offset))
+    assert force.max() == force[60] == pytest.approx(deepest, rel=1e-9)
+    assert digiclay.force(scene, (0.0, 0.0, 0.039, 2.0, 0.0, 0.0, 0.0)).tolist() == force.tolist()
+    assert digiclay.force(scene, (0.0, 0.0, 0.041), 0.042).tolist() == pytest.approx(force.tolist(), rel=1e-9)
+    assert not digiclay.force(scene, (0.0, 0.0, 0.041)).any()
+    # A bed that is held, as a run has it: valves without a command stay shut.
+    held = digiclay.scene({**tabulate(scene), "control": "absent"}, {"simulation.duration": 0.005})
+    pressed = held.with_sections(
+        trajectory=digiclay.scene(
+            {"trajectory": {"waypoints": [{"time": 1, "position": [0, 0, 0.039]}]}}
+        ).section("trajectory")
+    )
+    first = next(digiclay.steps(pressed))
+    np.testing.assert_allclose(first.force, force, rtol=1e-9, atol=1e-15)
+    several = digiclay.scene("five_fingers_mound", {"finger.2.contact.stiffness": 300})
+    soft, stiff = (digiclay.force(several, (0.0, 0.0, 0.039), finger=number).sum() for number in (1, 2))
+    assert stiff == pytest.approx(soft * 300 / 250, rel=1e-9)
+    assert finger == scene.section("fingertip")
+
+
+def test_a_pin_moves_as_the_equations_of_valve_and_cylinder_say():
+    plain = digiclay.scene("tap", {"conduit": "absent", "valve_lag": "absent", "delay": "absent"})
+    speeds = digiclay.free_speed(plain)
+    law, area = plain.valve.flow_law(plain.fluid), plain.actuator.area
+    assert speeds.rise == -speeds.fall == pytest.approx(law.laminar * plain.supply.high / area, rel=1e-12)
+    time, height = digiclay.step_response(plain, 0.5, 1.0)
+    # The laminar flow is as the square of the opening.
+    np.testing.assert_allclose(height, 0.04 + 0.25 * speeds.rise * time, rtol=1e-9)
+    lagging = digiclay.scene(plain, {"valve_lag": {"time_constant": "20 ms"}, "delay": {"dead_time": "7 ms"}})
+    time, height = digiclay.step_response(lagging, -1.0, 0.2)
+    late = np.maximum(time - 7e-3, 0.0)
+    one, two = -np.expm1(-late / 20e-3), -np.expm1(-late / 10e-3)
+    wanted = 0.04 + speeds.fall * (late - 40e-3 * one + 10e-3 * two)
+    # Of the fourth order in steps of a sixteenth of the time constant.
+    np.testing.assert_allclose(height, wanted, atol=1e-9)
+    assert digiclay.step_response(plain, 1.0, 10.0).height[-1] == plain.actuator.stroke
+    assert digiclay.step_response(digiclay.scene("five_fingers_mound"), 0.0).height.tolist() == [0.04] * 21
+
+
+@pytest.mark.parametrize(
+    "ask, message",
+    [
+        (
+            lambda scene: digiclay.force(scene, (0, 0)),
+            "force.pose must have the shape (3,) or (7,) (got (2,)).",
+        ),
+        (lambda scene: digiclay.force(scene, "abc"), "force.pose must be numbers (got 'abc')."),
+        (lambda scene: digiclay.force(scene, (0, 0, np.nan)), "force.pose must be finite numbers (got nan)."),
+        (
+            lambda scene: digiclay.force(scene, (0, 0, 0.04, 0, 0, 0, 0)),
+            "Trajectory.orientations must have a",
+        ),
+        (lambda scene: digiclay.force(scene, (0, 0, 0.0)), "force.pose must press at most 0.0"),
+        (
+            lambda scene: digiclay.force(scene, (0, 0, 0.04), [1, 2]),
+            "force.height must have the shape () or (121,)",
+        ),
+        (
+            lambda scene: digiclay.force(scene, (0, 0, 0.04), finger=2),
+            "force.finger must be from 1 to 1 (got 2).",
+        ),
+        (
+            lambda scene: digiclay.force(digiclay.scene(scene, {"fingertip": "absent"}), (0, 0, 0)),
+            "fingertip must be",
+        ),
+        (
+            lambda scene: digiclay.force("tap", (0, 0, 0.04)),
+            "scene must be a Scene, as digiclay.scene returns",
+        ),
+        (
+            lambda scene: digiclay.free_speed(None),
+            "scene must be a Scene, as digiclay.scene returns it (got None",
+        ),
+        (lambda scene: digiclay.step_response(scene, 2.0), "ValveStep.command must be at most 1 (got 2)."),
+        (lambda scene: digiclay.step_response(scene, np.nan), "ValveStep.command must be a finite number"),
+        (
+            lambda scene: digiclay.step_response(scene, 1.0, 0.0),
+            "ValveStep.duration must be above 0 s (got 0 s).",
+        ),
+        (lambda scene: digiclay.step_response(scene, 1.0, 1e9), "ValveStep.duration must be at most 100 s"),
+        (
+            lambda scene: digiclay.step_response(None, 1.0),
+            "scene must be a Scene, as digiclay.scene returns it",
+        ),
+    ],
+)
+def test_the_device_is_not_asked_what_has_no_answer(tap, ask, message):
+    with refused_in_a_line(DigiclayError, f"^{re.escape(message)}"):
+        ask(tap)
