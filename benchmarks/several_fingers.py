@@ -106,7 +106,8 @@ def make_scene(method: str, ways: list[Way], size: int = 40, turn: float = TURN)
     """
     paper = load(find("ridge_mound_valley"))
     control = find_method(method).import_parameters()() if method else None
-    other: Record = dict(find_method(method).blister or {}) if method else {}
+    shape = find_method(method).blister if method else None
+    other: Record = dict(shape or {})
     half = math.cos(turn / 2), 0.0, 0.0, math.sin(turn / 2)
 
     def lay(time: float, x: float, y: float, z: float) -> Waypoint:
@@ -122,7 +123,7 @@ def make_scene(method: str, ways: list[Way], size: int = 40, turn: float = TURN)
         paper,
         layout=replace(paper.layout, rows=size, columns=size),
         control=control,
-        blister=Blister(**other) if method else None,
+        blister=None if shape is None else Blister(**other),
         method=method or paper.method,
         simulation=replace(paper.simulation, duration=max(way[-1][0] for way in ways)),
         fingers=tuple(replace(paper.fingers[0], trajectory=path) for path in paths),

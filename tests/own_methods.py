@@ -2,6 +2,8 @@
 
 from contextlib import contextmanager
 
+import digiclay
+import numpy as np
 from digiclay.cli import main
 from digiclay.core.control.methods import list_added, remove_method
 from digiclay.core.scene.scene_source import Setting, find, load
@@ -44,6 +46,16 @@ PLACED = (
     PAD.replace("    def command", "    def begin(self, device):\n        return Kept()\n\n    def command")
     + "\nclass Kept(NamedTuple):\n    place: float = 0.5\n"
 )
+
+
+class Mine(digiclay.Method):
+    """Pins under a force give way."""
+
+    yield_force: float = digiclay.quantity(0.03, "force above which a pin gives way", unit="N", above=0.0)
+
+    def command(self, memory, cells, device):
+        down = cells.force > self.yield_force
+        return memory, digiclay.Orders(height=np.where(down, cells.height - 50e-6, cells.target))
 
 
 def write_method(folder, text=PAD, name="pad.py"):

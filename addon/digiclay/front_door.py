@@ -240,8 +240,8 @@ def load(folder: object) -> Result:
     found = Result(**vars(finished_run.read_result(path)))
     origin = found.metrics.get("versions", {}).get("method")
     if found.scene.method in list_added() and describe_origin(found.scene).get("method") != origin:
-        rule = f"was run with other code of {found.scene.method} than is loaded"
-        warnings.warn(f"{path} {rule}: its scene would give another run.", stacklevel=3)
+        rule = f"was not run with the code of {found.scene.method} that is loaded, or with a class in memory"
+        warnings.warn(f"{path} {rule}: its scene may give another run.", stacklevel=3)
     return found
 
 

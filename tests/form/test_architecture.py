@@ -37,7 +37,7 @@ ROOMS = {
     "metrics": "base model",
     "scene": "base files model engine shapes control",
     "session": "base files model engine control metrics scene",
-    "batch": "base files model steppers engine control metrics scene session",
+    "batch": "base model steppers engine control metrics scene session",
     "studies": "base files model engine mesh_io shapes control metrics scene session batch",
 }
 #: Packages and top modules of the extension: each row imports from those above it only.

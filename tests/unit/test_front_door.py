@@ -1,6 +1,5 @@
 """Python's front door: scenes, runs, folders, sweeps, periods, own methods, and the device's own answers."""
 
-import pickle
 import re
 import sys
 from dataclasses import replace
@@ -18,7 +17,7 @@ from digiclay.core.session.run_scene import run as simulate
 
 from tests.assemble import refused_in_a_line
 from tests.other_process import finish, start
-from tests.own_methods import PAD, forgotten, write_method
+from tests.own_methods import Mine, forgotten, write_method
 from tests.scene_files import call
 
 pytestmark = pytest.mark.usefixtures("here")
@@ -41,27 +40,6 @@ def tap():
 @pytest.fixture(scope="module")
 def done(tap):
     return digiclay.run(tap)
-
-
-class Mine(digiclay.Method):
-    """Pins under a force give way."""
-
-    yield_force: float = digiclay.quantity(0.03, "force above which a pin gives way", unit="N", above=0.0)
-
-    def command(self, memory, cells, device):
-        down = cells.force > self.yield_force
-        return memory, digiclay.Orders(height=np.where(down, cells.height - 50e-6, cells.target))
-
-
-def make_again():
-    """Return another class of the same name, with half the parameters' effect."""
-
-    class Other(Mine):
-        def command(self, memory, cells, device):
-            return memory, digiclay.Orders(height=cells.target)
-
-    Other.__name__ = "Mine"
-    return Other
 
 
 def test_a_scene_is_of_tables_of_a_file_a_name_another_scene_or_nothing(here):
@@ -416,202 +394,3 @@ def test_tables_name_metrics_methods_and_samples():
     assert all(digiclay.samples().values())
     digiclay.scene("tap", {"control.method": Mine})
     assert digiclay.methods()["mine"] == "Pins under a force give way"
-
-
-def test_a_class_in_memory_runs_as_the_same_one_in_a_file(tap):
-    write_method(Path())
-    changes = {"control.yield_force": "20 mN"}
-    mine = digiclay.run(digiclay.scene(tap, {**changes, "control.method": Mine}), errors=False)
-    filed = digiclay.run(digiclay.scene(tap, {**changes, "control.method": "pad.py:SoftPad"}), errors=False)
-    np.testing.assert_array_equal(mine.history["height"], filed.history["height"])
-    assert np.ptp(mine.history["height"]) > 1e-4
-    assert mine.metrics["versions"]["method"].startswith("Mine sha256:")
-
-
-def test_a_saved_run_of_a_class_in_memory_says_what_is_missing_and_is_never_reloaded_wrongly(tap):
-    run = digiclay.run(digiclay.scene(tap, {"control.method": Mine}), errors=False)
-    with pytest.warns(
-        UserWarning, match=r"^out has parameters and results of Mine, but not its code"
-    ) as said:
-        run.save("out")
-    assert "\n" not in str(said[0].message)
-    assert not Path("out/method.py").exists()
-    assert digiclay.load("out").scene == run.scene
-    other = make_again()
-    digiclay.scene("tap", {"control.method": other})
-    with pytest.warns(UserWarning, match="^out was run with other code of mine than is loaded"):
-        digiclay.load("out")
-    for ask in (
-        digiclay.run,
-        lambda scene: digiclay.scene(scene, {}),
-        lambda scene: digiclay.sweep(scene, {"layout.rows": [11]}, "lag"),
-    ):
-        with refused_in_a_line(DigiclayError, "^The scene's method mine must be of the code that was loaded"):
-            ask(run.scene)
-
-
-def test_a_run_whose_method_is_not_loaded_keeps_its_results_and_is_not_simulated_without_it(tap):
-    write_method(Path())
-    scene = digiclay.scene(tap, {"control.method": "pad.py:SoftPad"})
-    with forgotten():
-        digiclay.run(scene, errors=False).save("out")
-    assert Path("out/method.py").read_text(encoding="utf-8") == PAD
-    code = """
-import digiclay
-run = digiclay.load("out")
-print(run.scene.control, run.scene.method, run.metrics["method"], run.history["height"].shape)
-print(run.scene)
-for ask in (digiclay.run, digiclay.steps, digiclay.scene, lambda scene: run.save("copy")):
-    try:
-        ask(run.scene)
-    except digiclay.DigiclayError as error:
-        print(error)
-digiclay.scene("tap", {"control.method": "out/method.py:SoftPad"})
-again = digiclay.run(digiclay.load("out").scene, errors=False)
-print(again.history["height"].tobytes() == run.history["height"].tobytes())
-"""
-    _, said, wrong = finish(start(code))
-    lines = said.splitlines()
-    assert lines[0] == f"None soft_pad soft_pad {digiclay.load('out').history['height'].shape}", wrong
-    assert "method: soft_pad, which is not loaded" in said
-    assert [line[:35] for line in lines[7:-1]] == ["control.method must be one of virtu"] * 4
-    assert lines[-1] == "True"
-
-
-def test_a_changed_file_replaces_its_method_and_scenes_of_the_former_code_are_refused(tap):
-    path = write_method(Path())
-    scene = digiclay.scene(tap, {"control.method": "pad.py:SoftPad"})
-    path.write_text(PAD.replace("self.step", "0.5 * self.step"), encoding="utf-8")
-    changed = digiclay.scene(tap, {"control.method": "pad.py:SoftPad"})
-    with refused_in_a_line(DigiclayError, "^The scene's method soft_pad must be of the code that was loaded"):
-        digiclay.run(scene)
-    assert digiclay.run(changed, errors=False).metrics["method"] == "soft_pad"
-
-
-def test_a_class_that_is_only_in_memory_is_no_value_of_another_process(tap):
-    scene = digiclay.scene(tap, {"control.method": Mine})
-    assert pickle.loads(pickle.dumps(scene)) == scene
-    code = """
-import pickle
-try:
-    pickle.load(open("scene", "rb"))
-except Exception as error:
-    print(error)
-"""
-    Path("scene").write_bytes(pickle.dumps(scene))
-    assert finish(start(code))[1] == (
-        "Mine: the class must be in a file for other processes, by its name file.py:Mine.\n"
-    )
-
-
-def test_a_script_defines_and_runs_its_own_method():
-    text = """
-import digiclay
-import numpy as np
-
-class Mine(digiclay.Method):
-    def command(self, memory, cells, device):
-        return memory, digiclay.Orders(height=np.where(cells.force > 0.03, cells.height - 5e-5, cells.target))
-
-if __name__ == "__main__":
-    scene = digiclay.scene("tap", {"control.method": Mine, "simulation.duration": 0.2})
-    print(digiclay.run(scene, errors=False).metrics["method"])
-"""
-    Path("mine.py").write_text(text, encoding="utf-8")
-    assert finish(start("import runpy; runpy.run_path('mine.py', run_name='__main__')"))[1] == "mine\n"
-
-
-def test_a_held_bed_has_the_law_of_the_contact():
-    scene = digiclay.scene("tap", {"relaxation": "absent"})
-    finger, law = scene.section("fingertip"), scene.section("contact")
-    force = digiclay.force(scene, (0.0, 0.0, 0.039))
-    # The pin at the lowest point is 1 mm deep: equation 11 by hand.
-    deepest = law.share * law.stiffness / law.exponent * np.expm1(law.exponent * (1e-3 - law.offset))
-    assert force.max() == force[60] == pytest.approx(deepest, rel=1e-9)
-    assert digiclay.force(scene, (0.0, 0.0, 0.039, 2.0, 0.0, 0.0, 0.0)).tolist() == force.tolist()
-    assert digiclay.force(scene, (0.0, 0.0, 0.041), 0.042).tolist() == pytest.approx(force.tolist(), rel=1e-9)
-    assert not digiclay.force(scene, (0.0, 0.0, 0.041)).any()
-    # A bed that is held, as a run has it: valves without a command stay shut.
-    held = digiclay.scene({**tabulate(scene), "control": "absent"}, {"simulation.duration": 0.005})
-    pressed = held.with_sections(
-        trajectory=digiclay.scene(
-            {"trajectory": {"waypoints": [{"time": 1, "position": [0, 0, 0.039]}]}}
-        ).section("trajectory")
-    )
-    first = next(digiclay.steps(pressed))
-    np.testing.assert_allclose(first.force, force, rtol=1e-9, atol=1e-15)
-    several = digiclay.scene("five_fingers_mound", {"finger.2.contact.stiffness": 300})
-    soft, stiff = (digiclay.force(several, (0.0, 0.0, 0.039), finger=number).sum() for number in (1, 2))
-    assert stiff == pytest.approx(soft * 300 / 250, rel=1e-9)
-    assert finger == scene.section("fingertip")
-
-
-def test_a_pin_moves_as_the_equations_of_valve_and_cylinder_say():
-    plain = digiclay.scene("tap", {"conduit": "absent", "valve_lag": "absent", "delay": "absent"})
-    speeds = digiclay.free_speed(plain)
-    law, area = plain.valve.flow_law(plain.fluid), plain.actuator.area
-    assert speeds.rise == -speeds.fall == pytest.approx(law.laminar * plain.supply.high / area, rel=1e-12)
-    time, height = digiclay.step_response(plain, 0.5, 1.0)
-    # The laminar flow is as the square of the opening.
-    np.testing.assert_allclose(height, 0.04 + 0.25 * speeds.rise * time, rtol=1e-9)
-    lagging = digiclay.scene(plain, {"valve_lag": {"time_constant": "20 ms"}, "delay": {"dead_time": "7 ms"}})
-    time, height = digiclay.step_response(lagging, -1.0, 0.2)
-    late = np.maximum(time - 7e-3, 0.0)
-    one, two = -np.expm1(-late / 20e-3), -np.expm1(-late / 10e-3)
-    wanted = 0.04 + speeds.fall * (late - 40e-3 * one + 10e-3 * two)
-    # Of the fourth order in steps of a sixteenth of the time constant.
-    np.testing.assert_allclose(height, wanted, atol=1e-9)
-    assert digiclay.step_response(plain, 1.0, 10.0).height[-1] == plain.actuator.stroke
-    assert digiclay.step_response(digiclay.scene("five_fingers_mound"), 0.0).height.tolist() == [0.04] * 21
-
-
-@pytest.mark.parametrize(
-    "ask, message",
-    [
-        (
-            lambda scene: digiclay.force(scene, (0, 0)),
-            "force.pose must have the shape (3,) or (7,) (got (2,)).",
-        ),
-        (lambda scene: digiclay.force(scene, "abc"), "force.pose must be numbers (got 'abc')."),
-        (lambda scene: digiclay.force(scene, (0, 0, np.nan)), "force.pose must be finite numbers (got nan)."),
-        (
-            lambda scene: digiclay.force(scene, (0, 0, 0.04, 0, 0, 0, 0)),
-            "Trajectory.orientations must have a",
-        ),
-        (lambda scene: digiclay.force(scene, (0, 0, 0.0)), "force.pose must press at most 0.0"),
-        (
-            lambda scene: digiclay.force(scene, (0, 0, 0.04), [1, 2]),
-            "force.height must have the shape () or (121,)",
-        ),
-        (
-            lambda scene: digiclay.force(scene, (0, 0, 0.04), finger=2),
-            "force.finger must be from 1 to 1 (got 2).",
-        ),
-        (
-            lambda scene: digiclay.force(digiclay.scene(scene, {"fingertip": "absent"}), (0, 0, 0)),
-            "fingertip must be",
-        ),
-        (
-            lambda scene: digiclay.force("tap", (0, 0, 0.04)),
-            "scene must be a Scene, as digiclay.scene returns",
-        ),
-        (
-            lambda scene: digiclay.free_speed(None),
-            "scene must be a Scene, as digiclay.scene returns it (got None",
-        ),
-        (lambda scene: digiclay.step_response(scene, 2.0), "ValveStep.command must be at most 1 (got 2)."),
-        (lambda scene: digiclay.step_response(scene, np.nan), "ValveStep.command must be a finite number"),
-        (
-            lambda scene: digiclay.step_response(scene, 1.0, 0.0),
-            "ValveStep.duration must be above 0 s (got 0 s).",
-        ),
-        (lambda scene: digiclay.step_response(scene, 1.0, 1e9), "ValveStep.duration must be at most 100 s"),
-        (
-            lambda scene: digiclay.step_response(None, 1.0),
-            "scene must be a Scene, as digiclay.scene returns it",
-        ),
-    ],
-)
-def test_the_device_is_not_asked_what_has_no_answer(tap, ask, message):
-    with refused_in_a_line(DigiclayError, f"^{re.escape(message)}"):
-        ask(tap)

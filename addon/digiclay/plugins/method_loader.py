@@ -10,7 +10,6 @@ import dataclasses
 import hashlib
 import importlib
 import importlib.util
-import marshal
 import re
 import sys
 from collections.abc import Callable, Mapping
@@ -19,8 +18,9 @@ from importlib.abc import ExecutionLoader
 from importlib.machinery import ModuleSpec
 from importlib.util import module_from_spec
 from pathlib import Path
-from types import FunctionType, ModuleType
+from types import ModuleType
 from typing import Any, NamedTuple, NoReturn
+from uuid import uuid4
 
 from ..core.base.errors import MethodError, ParameterError
 from ..core.base.quantity import Quantity
@@ -52,7 +52,7 @@ class MethodSource(NamedTuple):
     module: str
     """Name and version of the installed package, and what to import; empty for a file."""
     digest: str
-    """SHA-256 of the code: methods of one digest are the same."""
+    """SHA-256 of the code: methods of one digest are the same; of a class in memory a new number."""
 
 
 def is_file_word(word: str) -> bool:
@@ -253,36 +253,18 @@ def load_class(kind: type) -> str:
     """
     name = name_method(kind.__name__)
     row = list_methods().get(name)
-    if name in METHODS and METHODS[name].import_parameters() is kind:
-        return name
-    if isinstance(row, OwnRow) and row.kind is kind:
+    if row and row.import_parameters() is kind:
         return name
     if row and not (isinstance(row, OwnRow) and is_in_memory(row.source)):
-        raise MethodError(
-            f"{kind.__name__}: the method's name {name} must be its own (another method has it)."
-        )
-    add_class(name, MethodSource(kind.__name__, "", kind.__name__, "", "", "", hash_class(kind)), kind)
+        raise MethodError(f"{kind.__name__}: the name {name} must be its own (another method has it).")
+    # What its functions refer to can change: no two classes are known to be the same.
+    add_class(name, MethodSource(kind.__name__, "", kind.__name__, "", "", "", uuid4().hex), kind)
     return name
 
 
 def is_in_memory(source: MethodSource) -> bool:
     """Return whether a method has neither a file nor a package, but its class alone."""
     return not (source.text or source.module)
-
-
-def hash_class(kind: type) -> str:
-    """Return a number that identifies a class in memory by the code of its functions and its values."""
-    digest = hashlib.sha256()
-    owners = [owner for owner in kind.__mro__ if not owner.__module__.startswith(f"{PACKAGE}.")]
-    for name, value in (pair for owner in owners for pair in vars(owner).items()):
-        value = value.default if isinstance(value, dataclasses.Field) else value
-        if isinstance(value, FunctionType):
-            # Wherever it is written, and without references, whose number changes.
-            code = value.__code__.replace(co_filename="", co_firstlineno=1)
-            digest.update(name.encode() + marshal.dumps(code, 2))
-        elif isinstance(value, KINDS) or name == "blister":
-            digest.update(f"{name} {value!r}".encode())
-    return digest.hexdigest()
 
 
 def name_method(attribute: str) -> str:
@@ -436,7 +418,8 @@ def describe_origin(scene: Scene) -> dict[str, str]:
     source = find_code(scene)
     if source is None:
         return {}
-    return {"method": f"{source.package or source.label} sha256:{source.digest}"}
+    kind = "in memory" if is_in_memory(source) else "sha256"
+    return {"method": f"{source.package or source.label} {kind}:{source.digest}"}
 
 
 def write_code(scene: Scene, folder: Path) -> None:
