@@ -5,7 +5,7 @@ import functools
 import re
 import shlex
 import tomllib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from fnmatch import fnmatch
 from pathlib import Path
 from typing import Any
@@ -15,6 +15,8 @@ import yaml
 from digiclay.commands.parser import parser
 from digiclay.core.base.quantity import Quantity, list_quantities
 from digiclay.core.control.methods import METHODS
+from digiclay.core.mesh_io.mesh_reader import READERS
+from digiclay.core.mesh_io.mesh_writer import FORMATS
 from digiclay.core.scene.scene_source import list_samples
 from digiclay.core.scene.schema import SECTIONS, import_parameters
 
@@ -207,6 +209,76 @@ def test_the_page_of_the_package_lists_every_extra_that_is_for_its_users() -> No
     page = (ROOT / project["readme"]).read_text(encoding="utf-8")
     assert sorted(re.findall(r"^\| `digiclay\[(\w+)\]` \|", page, re.MULTILINE)) == sorted(
         project["optional-dependencies"].keys() - {"dev"}
+    )
+
+
+#: Section of a page that names all entries of a table of the code: page, heading, entries, their form there.
+NAMED = {
+    "mesh formats that are written": ("docs/export.md", "## Formats", FORMATS, "`{}`"),
+    "mesh formats that are read": (
+        "docs/shapes.md",
+        "### Meshes",
+        [ending[1:].upper() for ending in READERS],
+        "{}",
+    ),
+}
+
+
+@pytest.mark.parametrize(("page", "heading", "entries", "form"), NAMED.values(), ids=list(NAMED))
+def test_a_page_names_each_entry_of_a_table(
+    page: str, heading: str, entries: Iterable[str], form: str
+) -> None:
+    before, _, rest = (ROOT / page).read_text(encoding="utf-8").partition(f"\n{heading}\n")
+    section = rest.partition("\n#")[0]
+    lacking = [name for name in entries if form.format(name) not in section.replace("glTF", "GLTF")]
+    assert lacking == [], f"{page}, line {before.count(chr(10)) + 2}, '{heading}', needs {', '.join(lacking)}"
+
+
+#: A symbol with an index, in the text of a page or in a formula of a plot.
+SYMBOL = re.compile(r"(?<![\w`./])(?:Δ?[A-Za-zα-ω]|Re)_\{?[A-Za-z]{1,8}\}?(?:\^[A-Za-z]+)?(?![\w(.])")
+#: Those that pages define themselves, each for what stands around it.
+LOCAL = """
+F_a F_com F_j F_max F_n F_set F_trig H_VM H_j H_own H_rest K_v T_a U_f a_i d_j e_j f_di g_down g_up h_p r_j
+t_i t_j u_i u_j v_free w_i w_j w_max w_min ΔP_c β_i ν_i
+"""
+
+
+def read_prose(path: Path) -> str:
+    """Return the lines of a file without what is no prose: code of a page, names in Python."""
+    text = path.read_text(encoding="utf-8")
+    if path.suffix == ".py":
+        kept = {
+            line
+            for node in ast.walk(ast.parse(text))
+            if isinstance(node, ast.Constant)
+            and isinstance(node.value, str)
+            and re.search(r"[ $]", node.value)
+            for line in range(node.lineno, (node.end_lineno or 0) + 1)
+        }
+        return "\n".join(line if n in kept else "" for n, line in enumerate(text.splitlines(), 1))
+    return "\n".join("" if code else re.sub(r"`[^`]*`", "", line) for line, code in _lines(text))
+
+
+def test_every_symbol_of_pages_and_of_the_paper_is_declared() -> None:
+    """A parameter whose symbol has changed leaves its former one behind."""
+    page = (ROOT / "docs" / "nomenclature.md").read_text(encoding="utf-8")
+    declared = {
+        quantity.symbol
+        for section in SECTIONS
+        for method in METHODS
+        for quantity in list_quantities(import_parameters(section, method)).values()
+    }
+    variables = set(re.findall(r"[^\s|,]+", " ".join(re.findall(r"^\| ([^|]+) \|", page, re.MULTILINE))))
+    files = [*PAGES, *(ROOT / "digiclay_paper").glob("*.py"), ROOT / "digiclay_paper" / "paper.md"]
+    unknown = [
+        f"{path.relative_to(ROOT)}:{number}: {symbol}"
+        for path in files
+        for number, line in enumerate(read_prose(path).splitlines(), 1)
+        for symbol in re.sub(r"[{}]", "", " ".join(SYMBOL.findall(line))).split()
+        if symbol not in declared | variables | set(LOCAL.split())
+    ]
+    assert unknown == [], (
+        "symbols of no parameter: write the present one, or add it to LOCAL in tests/form/test_pages.py"
     )
 
 

@@ -73,7 +73,8 @@ def test_every_name_that_python_offers_has_its_entry_by_subject(site: Path) -> N
 
 def list_public(module: griffe.Object) -> Iterator[str]:
     for name, member in module.members.items():
-        if name[0] != "_" and not isinstance(member, griffe.Alias):
+        exported = module.exports is None or name in module.exports or not isinstance(member, griffe.Attribute)
+        if name[0] != "_" and exported and not isinstance(member, griffe.Alias):
             yield member.path
             if isinstance(member, griffe.Module | griffe.Class):
                 yield from list_public(member)

@@ -12,7 +12,7 @@ import pytest
 import trimesh
 from digiclay.core.base.errors import ParameterError
 from digiclay.core.mesh_io import mesh_limits, mesh_writer
-from digiclay.core.mesh_io.mesh_reader import read
+from digiclay.core.mesh_io.mesh_reader import READERS, read
 from digiclay.core.surface.formed import Body
 
 from tests.assemble import assert_near
@@ -101,6 +101,10 @@ def test_bytes_beside_a_gltf_are_read_and_materials_and_pictures_are_not_opened(
     path = gltf(tmp_path, with_uri("a%20folder/bytes.bin"))
     (tmp_path / "bytes.bin").rename(tmp_path / "a folder" / "bytes.bin")
     np.testing.assert_array_equal(read(path).vertices, PLACES)
+
+
+def test_every_format_that_is_read_is_tested_below():
+    assert {f".{kind.partition('_')[0]}" for kind in KINDS} == READERS.keys(), "KINDS, above, must name each"
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -8,7 +8,7 @@ from pathlib import Path
 from ..core.base.errors import OutputError
 from ..core.files.run_folder import claim_files
 from ..core.mesh_io.export_model import KINDS, Model, find_features, make_bodies
-from ..core.mesh_io.mesh_writer import FORMATS, UNITS, find_suffix, write
+from ..core.mesh_io.mesh_writer import FORMATS, UNITS, Format, find_suffix, write
 from ..core.mesh_io.obj_reader import AXES, UP, make_axes
 from ..core.scene.schema import Scene
 from ..core.session.finished_run import find_row, read_run, require_surface
@@ -20,7 +20,7 @@ from .arguments import RUN, command, formats, millimeters, say, seconds, told_as
 from .progress import table as aligned
 
 
-def list_choices(choices: Mapping[str, str], form: str = "{}: {}", separator: str = "; ") -> str:
+def list_choices(choices: Mapping[str, str | Format], form: str = "{}: {}", separator: str = "; ") -> str:
     """Write choices with their meanings."""
     return separator.join(form.format(*choice) for choice in choices.items())
 
@@ -85,7 +85,7 @@ STEMS = {"solid": "surface", "surface": "skin", "pins": "pins", "features": "fea
 
 OPTIONS = {
     **RUN,
-    "--format F,...": (formats, f"{list_choices(FORMATS, '{} ({})', ', ')}; default stl", ["stl"]),
+    "--format F,...": (formats, f"{list_choices(FORMATS, '{} ({[0]})', ', ')}; default stl", ["stl"]),
     "--kind": (KINDS, f"{list_choices(KINDS)}; default solid", "solid"),
     **SURFACE,
     "--base-thickness L": (

@@ -104,7 +104,7 @@ and method.py, the code of a method of your own. Ctrl-C keeps the computed rows,
 OPTIONS: dict[str, Any] = {
     "--out DIR": (Path, "folder; default: the scene's name in the working folder"),
     "--overwrite": "replace an older run at the end",
-    "--export F,...": (formats, "also meshes: stl,obj,ply,glb,3mf", []),
+    "--export F,...": (formats, "also meshes, in formats of 'digiclay export'", []),
     "--budget E": (
         length,
         "omit parts of the model that change no height by more than this, such as 20um, and report them",

@@ -220,12 +220,14 @@ class ExportMesh(SurfaceOptions, Operator):
     filepath: bpy.props.StringProperty(subtype="FILE_PATH", options={"SKIP_PRESET"})
     check_existing: bpy.props.BoolProperty(default=True, options={"HIDDEN", "SKIP_PRESET"})
     filter_glob: bpy.props.StringProperty(
-        default="*.stl;*.obj;*.ply;*.glb;*.3mf", options={"HIDDEN", "SKIP_PRESET"}
+        default=";".join(f"*{find_suffix(kind)}" for kind in FORMATS), options={"HIDDEN", "SKIP_PRESET"}
     )
     file_format: choice(
         "Format",
         "Format of the file",
-        items=[(name, name.upper().replace("_", " "), sentence(words)) for name, words in FORMATS.items()],
+        items=[
+            (name, name.upper().replace("_", " "), sentence(kind.meaning)) for name, kind in FORMATS.items()
+        ],
         default="stl",
     )
     unit: choice(

@@ -6,7 +6,7 @@ import zipfile
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
-from typing import IO, BinaryIO
+from typing import IO, BinaryIO, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -221,22 +221,24 @@ def write_3mf(file: BinaryIO, bodies: Sequence[Body], factor: float) -> None:
             part.write(f"</resources>\n<build>\n{items}</build>\n</model>\n".encode())
 
 
-#: File formats, by name, with their lines in the help.
-FORMATS: dict[str, str] = {
-    "stl": "STL, binary",
-    "stl_ascii": "STL as text",
-    "obj": "Wavefront OBJ, with a group for each feature; y up as in Blender's, other axes by option",
-    "ply": "Stanford PLY, binary, with height, force and mode of each vertex",
-    "glb": "binary glTF, in meters and y up as its standard says",
-    "3mf": "3MF, which names its unit",
-}
-WRITERS: dict[str, Callable[[BinaryIO, Sequence[Body], float], None]] = {
-    "stl": write_binary,
-    "stl_ascii": write_ascii,
-    "obj": write_obj,
-    "ply": write_ply,
-    "glb": write_glb,
-    "3mf": write_3mf,
+class Format(NamedTuple):
+    """Format of a mesh file."""
+
+    meaning: str
+    """Line in the help."""
+    write: Callable[[BinaryIO, Sequence[Body], float], None]
+
+
+#: File formats, by name; help, dialogs and their filters of file names are made of this table.
+FORMATS: dict[str, Format] = {
+    "stl": Format("STL, binary", write_binary),
+    "stl_ascii": Format("STL as text", write_ascii),
+    "obj": Format(
+        "Wavefront OBJ, with a group for each feature; y up as in Blender's, other axes by option", write_obj
+    ),
+    "ply": Format("Stanford PLY, binary, with height, force and mode of each vertex", write_ply),
+    "glb": Format("binary glTF, in meters and y up as its standard says", write_glb),
+    "3mf": Format("3MF, which names its unit", write_3mf),
 }
 
 #: Units of length of a file, per meter.
@@ -267,7 +269,9 @@ def write(
     """Write bodies to a file in a unit of `UNITS`, and return it; it replaces an older one when complete."""
     target = Path(path)
     format_name = find_format(target.suffix if kind is None else kind)
-    writer = partial(write_obj, up=up, forward=forward) if format_name == "obj" else WRITERS[format_name]
+    writer = (
+        partial(write_obj, up=up, forward=forward) if format_name == "obj" else FORMATS[format_name].write
+    )
     make_axes(up, forward)  # refuses axes before the file is opened
     if unit not in UNITS:
         raise ParameterError("Export", "unit", f"must be one of {', '.join(UNITS)}", repr(unit))

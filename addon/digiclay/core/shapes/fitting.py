@@ -20,7 +20,7 @@ from ..files.formats import map_array
 from ..files.run_folder import find_file, list_files
 from ..mesh_io import mesh_reader
 from ..mesh_io.mesh_limits import make_refusal
-from ..mesh_io.mesh_reader import MESHES
+from ..mesh_io.mesh_reader import READERS
 from ..model.actuator import Actuator
 from ..model.layout import Grid
 from .heightmap import GRIDS, PICTURES, HeightMap, make_height_map, read_grid, read_pixels
@@ -34,7 +34,7 @@ SAMPLES = Path(__file__).parents[2] / "sample_shapes" / "shapes"
 ARRAY = ".npy"
 UNREADABLE = "must be a file that can be read"
 #: Extensions of a shape's file.
-KINDS = (*MESHES, *PICTURES, ARRAY, *GRIDS)
+KINDS = (*READERS, *PICTURES, ARRAY, *GRIDS)
 
 
 def list_shapes() -> list[str]:
@@ -250,7 +250,7 @@ def _array(path: Path) -> HeightMap:
 
 def _mesh(path: Path, shape: Shape) -> ShapeMesh:
     """Read a mesh."""
-    if path.suffix.lower() not in MESHES:
+    if path.suffix.lower() not in READERS:
         rule = f"must be a mesh, a picture or an array ({', '.join(KINDS)})"
         raise ParameterError("shape", "file", rule, str(path))
     mesh = mesh_reader.read(path)
