@@ -1,8 +1,8 @@
 """The pages made at the build have every command, parameter, public name, sample, array and metric."""
 
 import argparse
+import ast
 import html
-import inspect
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -65,16 +65,18 @@ def test_every_parameter_is_on_its_page_with_its_unit(site: Path) -> None:
 
 def test_every_name_that_python_offers_has_its_entry_by_subject(site: Path) -> None:
     text = (site / "reference" / "python.html").read_text(encoding="utf-8")
-    entries = set(re.findall(r"doc-object-name[^>]*>digiclay\.(\w+)<", text))
-    functions = (name for name, value in vars(digiclay).items() if inspect.isfunction(value))
-    offered = {*(name for name in functions if name[0] != "_"), *digiclay.__all__}
+    headings = " ".join(re.findall(r"<h3 .*?</h3>", text, re.DOTALL))
+    entries = set(re.findall(r">\s*digiclay\.(\w+)\s*<", headings))
+    tree = ast.parse(Path(digiclay.__file__).read_text(encoding="utf-8"))
+    functions = [node.name for node in tree.body if isinstance(node, ast.FunctionDef) and node.name[0] != "_"]
+    offered = {*functions, *digiclay.__all__}
     assert offered - entries == set(), "PYTHON in tools/site_pages.py needs a ':::' entry of each"
 
 
 def list_public(module: griffe.Object) -> Iterator[str]:
     for name, member in module.members.items():
-        exported = module.exports is None or name in module.exports or not isinstance(member, griffe.Attribute)
-        if name[0] != "_" and exported and not isinstance(member, griffe.Alias):
+        hidden = module.exports and name not in module.exports and isinstance(member, griffe.Attribute)
+        if name[0] != "_" and not hidden and not isinstance(member, griffe.Alias):
             yield member.path
             if isinstance(member, griffe.Module | griffe.Class):
                 yield from list_public(member)
