@@ -84,7 +84,7 @@ def relief(results: Results) -> Evidence:
             missed += [one.name] if method == TWO and not one.meets(LIMITS) else []
         levels.append(f"{SHORT[method]} {', '.join(parts.values())}")
     evidence.why = (
-        f"A section holds when its shape is {LIMITS}. Asked for is the method's own blister carried along "
+        f"A section holds when its shape is {LIMITS}. Nominal is the method's own blister carried along "
         "the fingertip's path, at the level that was formed: beyond the fingertip's lowest point by "
         f"{'; '.join(levels)}."
     )
@@ -260,7 +260,7 @@ def trade(results: Results) -> Evidence:
             continue
         (low, slow), (high, end) = calm[0], calm[-1]
         best, quick = min(calm, key=lambda one: one[1])
-        ends = "and goes on for ever beyond" if len(calm) < len(row) else "the highest tried"
+        ends = "and oscillates beyond" if len(calm) < len(row) else "the highest tried"
         times = f"{slow:.2f} s at K_f = {low:g}, {quick:.2f} s at {best:g}, {end:.2f} s at {high:g} 1/N"
         evidence.add(name, f"{times}, {ends}", len(calm) < len(row), quick < QUICKER * slow)
     slowest = [row[0].settling for row in results.sweeps.values()]

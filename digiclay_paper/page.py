@@ -9,8 +9,6 @@ from pathlib import Path
 from typing import Any
 
 from digiclay import __version__
-from digiclay.core.base.modes import MEANINGS, Mode
-from digiclay.core.control.cell_states import BY_FORCE, BY_PLACE, VIRTUAL_SPRING, Arrow
 from digiclay.core.files.run_folder import format_json, write_whole
 from digiclay.core.files.tables import Record
 from digiclay.core.studies.speed_limits import Follows
@@ -65,8 +63,6 @@ def format_page(results: Results, judged: list[Claim], pictures: Mapping[str, st
     figures = [
         f"![{caption}]({name}.svg)\n\n*{caption}.* [Data]({name}.csv)" for name, caption in pictures.items()
     ]
-    arrows = [_row(arrow, "its own force") for arrow in BY_FORCE]
-    arrows += [_row(arrow, "the nearest cell under the fingertip") for arrow in BY_PLACE]
     return (
         Path(__file__)
         .with_name("paper.md")
@@ -78,24 +74,8 @@ def format_page(results: Results, judged: list[Claim], pictures: Mapping[str, st
             claims="\n".join(rows),
             figures="\n\n".join(figures),
             methods="\n".join(compare_methods(results)),
-            arrows="\n".join(arrows),
-            spring="; ".join(f"{_word(mode)} ({MEANINGS[mode]})" for mode in VIRTUAL_SPRING),
         )
     )
-
-
-def _row(arrow: Arrow, by: str) -> str:
-    """Return an arrow as a row of the table."""
-    source = list(arrow.source)
-    if set(VIRTUAL_SPRING) <= set(source):
-        words = ["virtual spring", *(_word(mode) for mode in source if mode not in VIRTUAL_SPRING)]
-    else:
-        words = [_word(mode) for mode in source]
-    return f"| {', '.join(words)} | {_word(arrow.goal)} | {arrow.condition.replace('_', ' ')} | {by} |"
-
-
-def _word(mode: Mode) -> str:
-    return mode.name.lower().replace("_", " ")
 
 
 #: The figure whose data are heights of pins, and no curves; and the one of a session that was slowed.

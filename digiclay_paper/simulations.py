@@ -191,9 +191,9 @@ def _run_third(results: Results, extent: Extent, announce: Announce) -> None:
         _track(results, THIRD, wider, announce)
     announce(f"the paper's session, {THIRD}")
     scene = _load(THIRD)
-    results.printed[THIRD] = results.session[THIRD] = _boiled_down(_run(scene))
+    results.printed[THIRD] = results.session[THIRD] = _boil_down(scene)
     if results.slow > 1.0:
-        results.session[THIRD] = _boiled_down(_run(scenes.slowed(scene, results.slow)))
+        results.session[THIRD] = _boil_down(scenes.slowed(scene, results.slow))
 
 
 def _go_wild(results: Results, announce: Announce) -> None:
@@ -203,7 +203,7 @@ def _go_wild(results: Results, announce: Announce) -> None:
         announce(f"the paper's session, K_f {first:g} 1/N")
         scene = _load(METHODS[0], Setting("control.force_gain", f"{first!r}"))
         shorter = replace(scene.simulation, duration=DETAIL)
-        results.wild = _boiled_down(_run(replace(scene, simulation=shorter)))
+        results.wild = _boil_down(replace(scene, simulation=shorter))
 
 
 def _track(results: Results, method: str, extent: Extent, announce: Announce) -> None:
@@ -253,7 +253,7 @@ def sessions(results: Results, announce: Announce, session: str = SESSION) -> No
     """Run the paper's session at its times, and again slowly where a method loses the fingertip."""
     for method in METHODS:
         announce(f"the paper's session, {method}")
-        results.printed[method] = _boiled_down(_run(_load(method, session=session)))
+        results.printed[method] = _boil_down(_load(method, session=session))
     results.session = dict(results.printed)
     if not any(done.lost for done in results.printed.values()):
         return
@@ -264,7 +264,7 @@ def sessions(results: Results, announce: Announce, session: str = SESSION) -> No
     for method in METHODS:
         announce(f"the paper's session, {results.slow:g} times as long, {method}")
         slowly = scenes.slowed(results.printed[method].scene, results.slow)
-        results.session[method] = _boiled_down(_run(slowly))
+        results.session[method] = _boil_down(slowly)
 
 
 def _load(method: str, *settings: Setting, session: str = SESSION) -> Scene:
@@ -277,8 +277,9 @@ def _run(scene: Scene) -> Result:
     return run(replace(scene, recorder=Recorder()))
 
 
-def _boiled_down(done: Result) -> Session:
-    """Return what is drawn and judged of a session: its whole history takes a hundred megabytes."""
+def _boil_down(scene: Scene) -> Session:
+    """Run a session, and return what is drawn and judged: its whole history takes a hundred megabytes."""
+    done = _run(scene)
     follow = np.sum(done.history["mode"] == Mode.FORCE_FOLLOW, axis=1)
     rows = {name: done.history[name] for name in ("time", "height", "total_force", "fingertip")}
     rows |= {"set_point": find_set_point(done.scene.set_point, follow), "following": follow}

@@ -203,7 +203,8 @@ def test_a_force_that_may_be_noise_moves_no_spring_but_counts_where_a_cell_follo
     assert memory.x - BED.x[MIDDLE] == pytest.approx(1.5e-3, abs=1e-12)
 
 
-#: Fig. 5, written down from the paper: from, to, when. VS is any cell on a virtual spring.
+#: Fig. 5, written down from the paper and drawn in docs/pictures/method_2.svg: from, to, when. VS is any cell
+#: on a virtual spring.
 FIGURE_5 = [
     ("VS", "FF", "above_spring_trigger"),
     ("blister", "FF", "above_blister_trigger"),
