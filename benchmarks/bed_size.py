@@ -116,9 +116,9 @@ def measure(arguments: Namespace, steps: Steps) -> Report:
 
 def formed(side: int) -> Formed:
     """Return a bed of side x side pins with bosses and creases everywhere: waves 100 mm long, 10 mm high."""
-    place = make_grid(Layout(rows=side, columns=side)).positions
-    wave = np.sin(place[:, 0] * 63.0) * np.cos(place[:, 1] * 63.0)
-    return Formed.of(place, 0.04 + 0.01 * wave, 0.04, 0.0, 0)
+    positions = make_grid(Layout(rows=side, columns=side)).positions
+    wave = np.sin(positions[:, 0] * 63.0) * np.cos(positions[:, 1] * 63.0)
+    return Formed.of(positions, 0.04 + 0.01 * wave, 0.04, 0.0, 0)
 
 
 def export(side: int, kind: str, file: str) -> Record:
@@ -129,7 +129,7 @@ def export(side: int, kind: str, file: str) -> Record:
         path = Path(folder) / f"bed{find_suffix(file)}"
         started = time.perf_counter()
         bodies = make_bodies(bed, Model(kind=kind), finding)
-        made = time.perf_counter()
+        bodies_at = time.perf_counter()
         write(bodies, path, kind=file)
         done = time.perf_counter()
         triangles = sum(len(body.faces) for body in bodies)
@@ -145,8 +145,8 @@ def export(side: int, kind: str, file: str) -> Record:
             "kind": kind,
             "file": file,
             "triangles": triangles,
-            "made": made - started,
-            "written": done - made,
+            "made": bodies_at - started,
+            "written": done - bodies_at,
             "size": path.stat().st_size / 1e6,
             "peak": peak / 1e6,
         }
@@ -160,5 +160,5 @@ def measure_export(arguments: Namespace, steps: Steps) -> Report:
     ]
     exports = [export(*job) for job in steps.through(jobs)]
     title = "\nA bed of waves, written to a temporary folder; memory besides the bed itself\n"
-    rows = [{**one, "bytes_a_pin": one["peak"] * 1e6 / one["pins"]} for one in exports]
+    rows = [{**row, "bytes_a_pin": row["peak"] * 1e6 / row["pins"]} for row in exports]
     return Report([title, *tabulate(rows, EXPORT, left=2)], exports)

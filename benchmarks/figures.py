@@ -60,16 +60,18 @@ def read_figures(page: str | None = None) -> list[Row]:
         for label, where in row["rows"] or [[row["after"], {}]]:
             rest = rest.partition(label)[2]
             numbers = NUMBER.findall(THOUSANDS.sub("", rest))
-            for place, (metric, unit, *own) in enumerate(row["metrics"], row["number"]):
+            for place, (metric, unit, *conditions) in enumerate(row["metrics"], row["number"]):
                 if len(numbers) < place:
                     raise OutputError(f"{row['page']} has no number {place} behind {label!r}.")
-                found = {
+                figure = {
                     "of": metric,
                     "unit": unit,
                     "behind": " ".join(label.split()),
                     "text": numbers[place - 1],
                 }
-                figures += [{**row, **found, "where": row["where"] | where | dict(*own)}] if metric else []
+                figures += (
+                    [{**row, **figure, "where": row["where"] | where | dict(*conditions)}] if metric else []
+                )
     return figures
 
 

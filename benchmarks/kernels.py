@@ -86,18 +86,18 @@ def measure(arguments: argparse.Namespace, steps: Steps) -> Report:
             run_python(ROOT, f"kernels: {name}", *words, python=python, **change)
             files = sorted(folders[name].iterdir(), key=lambda file: int(file.stem))
             for file in files if name != REFERENCE else ():
-                found = _compare(file, folders[REFERENCE] / file.name)
-                rows.append({"kernel": name, "run": names[int(file.stem)], **found})
+                differences = _compare(file, folders[REFERENCE] / file.name)
+                rows.append({"kernel": name, "run": names[int(file.stem)], **differences})
                 file.unlink()
     kinds = [[row for row in rows if row["kernel"] == name] for name in kernels if name != REFERENCE]
     shown = [
         {
-            "kernel": own[0]["kernel"],
-            "runs": len(own),
-            **{key: max(row[key] for row in own) for key in ("height", "force", "modes")},
-            "run": max(own, key=lambda row: row["height"])["run"],
+            "kernel": kernel[0]["kernel"],
+            "runs": len(kernel),
+            **{key: max(row[key] for row in kernel) for key in ("height", "force", "modes")},
+            "run": max(kernel, key=lambda row: row["height"])["run"],
         }
-        for own in kinds
+        for kernel in kinds
     ]
     columns = {
         "kernel": "kernel",
@@ -119,10 +119,11 @@ def _find_numpy(python: str) -> str:
 
 def _compare(file: Path, other: Path) -> Row:
     """Return the largest differences of two recorded runs, m and N, and of how many pins' modes at once."""
-    one, two = dict(np.load(file)), dict(np.load(other))
-    force = np.abs(one["force"] - two["force"]).max(), np.abs((one["force"] - two["force"]).sum(1)).max()
-    modes = np.count_nonzero(one["mode"] != two["mode"], axis=1).max()
-    height = np.abs(one["height"] - two["height"]).max()
+    first, second = dict(np.load(file)), dict(np.load(other))
+    away = first["force"] - second["force"]
+    force = np.abs(away).max(), np.abs(away.sum(1)).max()
+    modes = np.count_nonzero(first["mode"] != second["mode"], axis=1).max()
+    height = np.abs(first["height"] - second["height"]).max()
     return {"height": float(height), "force": float(max(force)), "modes": int(modes)}
 
 

@@ -60,22 +60,30 @@ def _read_folder(text: str) -> Path:
 
 BENCHMARKS = {
     "session": Benchmark(
-        "session_parts.measure", "time of one session and of its parts, on one core",
+        "session_parts.measure",
+        "time of one session and of its parts, on one core",
         ("", "--scene tap --repeats 9", "--calls"),
         {
             "--repeats N": (
-                whole_number(1, 1000), "number of runs, of which the median counts; default: 3", 3
+                whole_number(1, 1000),
+                "number of runs, of which the median counts; default: 3",
+                3,
             ),
             "--calls": "count numpy's calls",
         },
-        PAPER, quick=False, out=False,
+        PAPER,
+        quick=False,
+        out=False,
     ),
     "stiff": Benchmark(
-        "stiff.measure", "errors of the steppers in stiff and extreme cases", ("", "--full --out results"),
+        "stiff.measure",
+        "errors of the steppers in stiff and extreme cases",
+        ("", "--full --out results"),
         {"--full": "also the adaptive stepper, which takes longer than all others"},
     ),
     "peers": Benchmark(
-        "pinbench.run.measure", "engines on eight problems, by their adapters: error against run time",
+        "pinbench.run.measure",
+        "engines on eight problems, by their adapters: error against run time",
         ("", "mine.py --out results"),
         {
             "files FILE": {"nargs": "*", "help": "more adapters: Python files, see benchmarks/README.md"},
@@ -84,25 +92,31 @@ BENCHMARKS = {
         needs="scipy",
     ),
     "terms": Benchmark(
-        "session_parts.measure_terms", "cost and effect of each part of the model",
-        ("tap", "ridge_mound_valley --out results"), scene="",
+        "session_parts.measure_terms",
+        "cost and effect of each part of the model",
+        ("tap", "ridge_mound_valley --out results"),
+        scene="",
     ),
     "scale": Benchmark("bed_size.measure", "a control period from 625 pins to a million"),
     "export": Benchmark("bed_size.measure_export", "writing a bed as a mesh, from 625 pins to a million"),
     "viewport": Benchmark(
-        "tick_times.measure_viewport", "a tick of a live session in Blender, part by part (needs bpy)",
+        "tick_times.measure_viewport",
+        "a tick of a live session in Blender, part by part (needs bpy)",
         needs="bpy",
     ),
     "ticks": Benchmark(
-        "tick_times.measure", "how the time of a tick of a live session is distributed (needs bpy)",
+        "tick_times.measure",
+        "how the time of a tick of a live session is distributed (needs bpy)",
         needs="bpy",
     ),
     "stack": Benchmark(
-        "runs_together.measure", "sessions a second, one at a time and many in one call",
+        "runs_together.measure",
+        "sessions a second, one at a time and many in one call",
         scene=PAPER,
     ),
     "serve": Benchmark(
-        "processes.measure_serve", "deadlines of digiclay serve, and poses to pins, with a client",
+        "processes.measure_serve",
+        "deadlines of digiclay serve, and poses to pins, with a client",
         ("", "--fingers 10 --rate 200"),
         {
             "--rate HZ": (whole_number(1, 1000), "control periods a second; default: 1000", 1000),
@@ -114,17 +128,20 @@ BENCHMARKS = {
         "several_fingers.measure", "what several fingertips cost, and two near each other feel"
     ),
     "kernels": Benchmark(
-        "kernels.measure", "sessions on other kernels of numpy's library: what the last bit changes",
+        "kernels.measure",
+        "sessions on other kernels of numpy's library: what the last bit changes",
         ("--quick", "--python other/bin/python --out results"),
         {"--python FILE": {"action": "append", "default": [], "help": "also this Python, with its numpy"}},
     ),
     "figures": Benchmark(
-        "figures.measure", "figures of the pages beside those of now; exit code 1 where one is stale",
+        "figures.measure",
+        "figures of the pages beside those of now; exit code 1 where one is stale",
         ("", "docs/accuracy.md --quick"),
         {"page PAGE": {"nargs": "?", "help": "one page; default: all"}},
     ),
     "commits": Benchmark(
-        "processes.measure_commits", "time of a control period at two commits",
+        "processes.measure_commits",
+        "time of a control period at two commits",
         ("v0.1.0", "v0.1.0 main --turns 9"),
         {
             "old": {"help": "commit, branch or tag"},
@@ -132,7 +149,7 @@ BENCHMARKS = {
             "--turns N": (int, "runs of each commit, default 5", 5),
         },
     ),
-}  # fmt: skip
+}
 
 
 def parser() -> argparse.ArgumentParser:

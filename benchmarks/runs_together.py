@@ -57,8 +57,8 @@ def _compare(scene: Scene, name: str, count: int, repeats: int) -> list[Row]:
     }
     rows: list[Row] = []
     for what, pair in works.items():
-        one, all_runs = time_by_turns(pair, repeats)
-        speeds = {"alone": 1.0 / one, "together": count / all_runs, "times": count * one / all_runs}
+        single, all_runs = time_by_turns(pair, repeats)
+        speeds = {"alone": 1.0 / single, "together": count / all_runs, "times": count * single / all_runs}
         rows.append({"study": name, "runs": count, "what": what, **speeds})
     return rows
 

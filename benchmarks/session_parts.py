@@ -110,9 +110,9 @@ def _plain(value: Any) -> Any:
     if isinstance(value, Counted):
         return value.view(np.ndarray)
     if isinstance(value, (tuple, list)):
-        return type(value)(_plain(one) for one in value)
+        return type(value)(_plain(part) for part in value)
     if isinstance(value, dict):
-        return {key: _plain(one) for key, one in value.items()}
+        return {key: _plain(part) for key, part in value.items()}
     return value
 
 
@@ -121,7 +121,7 @@ def _counted(value: Any) -> Any:
     if isinstance(value, np.ndarray):
         return value.view(Counted)
     if isinstance(value, (tuple, list)) and not hasattr(value, "_fields"):
-        return type(value)(_counted(one) for one in value)
+        return type(value)(_counted(part) for part in value)
     if is_dataclass(value) and not isinstance(value, type):
         names = [field.name for field in fields(value) if field.name not in ("cell", "segments")]
         return replace(value, **{name: _counted(getattr(value, name)) for name in names})
@@ -332,7 +332,7 @@ def _compare(scene: Scene, full: list[Floats], repeats: int) -> Record:
     calls = period_calls(system, scene.trajectories(), min(scene.periods, 400))[0]
     (spent,) = time_by_turns([partial(simulate, system, scene, scene.periods)], repeats)
     replayed, live = (
-        [float(np.abs(found - exact).max()) for found, exact in zip(run[:2], full, strict=False)]
+        [float(np.abs(values - exact).max()) for values, exact in zip(run[:2], full, strict=False)]
         for run in (solve(scene, full[2]), solve(scene))
     )
     return {

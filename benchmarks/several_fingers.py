@@ -133,7 +133,7 @@ def make_scene(method: str, ways: list[Way], size: int = 40, turn: float = TURN)
 def feel(scene: Scene) -> list[Row]:
     """Return the metrics of each fingertip of a scene, from when on all have touched down."""
     judged = select_rows(run(scene).history, JUDGED, math.inf)
-    return [compute_metrics(own, scene.set_point) for own in split_fingers(judged)]
+    return [compute_metrics(finger, scene.set_point) for finger in split_fingers(judged)]
 
 
 def measure_near(method: str, name: str, turn: float = TURN) -> tuple[list[Row], list[Row]]:
@@ -182,19 +182,24 @@ def measure(arguments: argparse.Namespace, steps: Steps) -> list[Report]:
     costs: list[Row] = []
     near: list[Row] = []
     for method in METHODS:
-        one, *others = measure_cost(method, count, repeats)
-        ratios = {f"times_{count}": own / one for count, own in zip(COUNTS[1:], others, strict=True)}
-        costs.append({"method": method or "no control", "one_s": one, **ratios})
+        single, *others = measure_cost(method, count, repeats)
+        ratios = {
+            f"times_{count}": several / single for count, several in zip(COUNTS[1:], others, strict=True)
+        }
+        costs.append({"method": method or "no control", "one_s": single, **ratios})
         steps(method or "no control")
     for name in cases:
         for method in METHODS[1:]:
             together, alone = measure_near(method, name)
             names = "together_N", "together_other_N", "alone_N", "alone_other_N"
-            rfd = dict(zip(names, (one["rfd"] for one in together + alone), strict=True))
-            largest = max(one["max_total_force"] or 0.0 for one in together)
+            rfd = dict(zip(names, (metrics["rfd"] for metrics in together + alone), strict=True))
+            largest = max(metrics["max_total_force"] or 0.0 for metrics in together)
             # The RFD leaves out the time without contact: one that is lost has a small one.
             both = zip(together, alone, strict=True)
-            contact = min((own["contact_share"] or 0.0) / (one["contact_share"] or 1.0) for own, one in both)
+            contact = min(
+                (metrics["contact_share"] or 0.0) / (reference["contact_share"] or 1.0)
+                for metrics, reference in both
+            )
             near.append({"case": name, "method": method, **rfd, "force_N": largest, "contact": contact})
         steps(name)
     return [

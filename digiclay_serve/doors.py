@@ -79,8 +79,8 @@ class LatestSlot:
 
 def make_slot(size: int) -> tuple[LatestSlot, Path]:
     """Return a new slot for values of a multiple of 8 bytes, and its file for the other process to open."""
-    place = MEMORY if MEMORY.is_dir() else None
-    with tempfile.NamedTemporaryFile(prefix="digiclay_", dir=place, delete=False) as file:
+    folder = MEMORY if MEMORY.is_dir() else None
+    with tempfile.NamedTemporaryFile(prefix="digiclay_", dir=folder, delete=False) as file:
         file.write(bytes(HEAD + size))
         file.flush()
         return LatestSlot(mmap.mmap(file.fileno(), HEAD + size)), Path(file.name)
@@ -114,8 +114,8 @@ class Order(NamedTuple):
         """Return the order after fingers were named, and how many there are beyond `most`."""
         newest = {**dict(self.fingers), **dict(request.fingers)}
         alive = set(request.alive)
-        there = [one for one in newest if one in alive]
-        fingers = tuple((one, newest[one]) for one in there[:most])
+        there = [identity for identity in newest if identity in alive]
+        fingers = tuple((identity, newest[identity]) for identity in there[:most])
         order = self._replace(pose=None, number=request.number, named=self.named + 1, fingers=fingers)
         return order, len(there) - len(fingers)
 

@@ -91,15 +91,15 @@ def carry_out(arguments: Namespace) -> int:
 async def _pass_on(arguments: Namespace, source: Any, token: str, stop: Stop) -> None:
     """Pass what comes on to the server; fingers that rest are named again and again."""
     packets = read_packets(arguments.play) if arguments.play else None
-    came, told = asyncio.Event(), -math.inf
+    came, told_at = asyncio.Event(), -math.inf
     file: Any = None
     async with AsyncExitStack() as stack:
 
         def tell(line: object) -> None:
-            nonlocal told
-            if time.monotonic() - told >= 1.0:
+            nonlocal told_at
+            if time.monotonic() - told_at >= 1.0:
                 print(line, flush=True)
-                told = time.monotonic()
+                told_at = time.monotonic()
 
         def take(data: bytes) -> None:
             nonlocal source, file
@@ -204,7 +204,7 @@ async def _connect(address: str, token: str, tell: Callable[[object], None]) -> 
         transport, _ = await asyncio.get_running_loop().create_datagram_endpoint(Answers, remote_addr=where)
 
         async def send_datagram(fingers: Mapping[int, Floats]) -> None:
-            values = [value for one, place in fingers.items() for value in (one, *place.tolist())]
+            values = [value for identity, place in fingers.items() for value in (identity, *place.tolist())]
             transport.sendto(format_osc("poses", "si" + "hddd" * len(fingers), token, 0, *values))
 
         try:
@@ -214,7 +214,7 @@ async def _connect(address: str, token: str, tell: Callable[[object], None]) -> 
         return
 
     async def send(fingers: Mapping[int, Floats]) -> None:
-        places = [{"id": one, "position": place.tolist()} for one, place in fingers.items()]
+        places = [{"id": identity, "position": place.tolist()} for identity, place in fingers.items()]
         await server.send(json.dumps({"type": "poses", "fingers": places}))
 
     async def take_answers() -> None:

@@ -160,13 +160,13 @@ class _OscDoor(asyncio.DatagramProtocol):
     def _subscribe(self, address: Any, request: Subscription) -> None:
         """Begin or renew a subscription."""
         now = asyncio.get_running_loop().time()
-        kept = {where: each for where, each in self._subscribers.items() if now < each.until}
-        if address not in kept and len(kept) >= MOST_SUBSCRIBERS:
+        subscribers = {where: each for where, each in self._subscribers.items() if now < each.until}
+        if address not in subscribers and len(subscribers) >= MOST_SUBSCRIBERS:
             rule = f"must be one of {MOST_SUBSCRIBERS} at most"
-            raise ParameterError("subscriber", "", rule, f"{len(kept) + 1}")
+            raise ParameterError("subscriber", "", rule, f"{len(subscribers) + 1}")
         every = max(1, round(1.0 / (self._link.bed.period * request.rate)))
-        kept[address] = _Subscriber(request.part, every, now + LASTS)
-        self._subscribers = kept
+        subscribers[address] = _Subscriber(request.part, every, now + LASTS)
+        self._subscribers = subscribers
 
     async def send_frames(self) -> None:
         """Send frames to the subscribers, each at its rate."""

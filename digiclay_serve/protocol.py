@@ -218,13 +218,13 @@ def check_pose(values: Sequence[object]) -> tuple[float, ...]:
             numbers.append(float(value))
         except (ValueError, OverflowError):
             raise ParameterError("pose", "", "must be numbers", repr(value)[:40]) from None
-    place, turn = numbers[:3], numbers[3:] or list(LEVEL)
+    position, turn = numbers[:3], numbers[3:] or list(LEVEL)
     length = math.hypot(*turn)
     if not all(map(math.isfinite, numbers)) or not math.isfinite(length):
         raise ParameterError("pose", "", "must be finite numbers, in m and 1", str(numbers)[:80])
     if length < SHORTEST:
         raise ParameterError("pose", "", "must have a quaternion of length 1", str(turn))
-    return (*place, *(part / length for part in turn))
+    return (*position, *(part / length for part in turn))
 
 
 def check_fingers(given: Sequence[tuple[object, Sequence[object]]], alive: object, number: int) -> Poses:
@@ -246,7 +246,7 @@ def check_fingers(given: Sequence[tuple[object, Sequence[object]]], alive: objec
         except ParameterError as error:
             faults.append(f"Finger {str(name)[:12]}: {error}")
     living = seen if alive is None else alive
-    if not isinstance(living, list) or any(type(one) is not int for one in living):
+    if not isinstance(living, list) or any(type(identity) is not int for identity in living):
         raise ParameterError("poses", "alive", "must be a list of identities", repr(alive)[:40])
     more = f" And {len(faults) - 1} more." if len(faults) > 1 else ""
     return Poses(tuple(fingers.items()), tuple(dict.fromkeys(living)), number, "".join(faults[:1]) + more)
@@ -277,21 +277,21 @@ def read_json(text: str) -> Pose | Poses | Reset | Status:
             values += value
         return Pose(check_pose(values), number)
     fingers = message.get("fingers")
-    if not isinstance(fingers, list) or not all(isinstance(one, dict) for one in fingers):
+    if not isinstance(fingers, list) or not all(isinstance(finger, dict) for finger in fingers):
         rule = 'must be a list such as [{"id": 1, "position": [0, 0, 0.05]}]'
         raise ParameterError("poses", "fingers", rule, repr(fingers)[:40])
     for finger in fingers:
         _check_keys(finger, {"id", "position", "orientation"})
     return check_fingers(
-        [(one.get("id"), _list_numbers(one)) for one in fingers], message.get("alive"), number
+        [(finger.get("id"), _list_numbers(finger)) for finger in fingers], message.get("alive"), number
     )
 
 
 def _list_numbers(finger: Record) -> list[object]:
     """Return what a finger has for numbers of a pose, as it stands: `check_fingers` refuses it alone."""
-    place, turn = finger.get("position", []), finger.get("orientation", [])
-    whole = isinstance(place, list) and isinstance(turn, list) and len(place) in (0, 3)
-    return [*place, *turn] if whole else [place]
+    position, turn = finger.get("position", []), finger.get("orientation", [])
+    whole = isinstance(position, list) and isinstance(turn, list) and len(position) in (0, 3)
+    return [*position, *turn] if whole else [position]
 
 
 #: Keys of requests beside type and version.

@@ -69,21 +69,21 @@ class TimeCounts:
 
     def count_above(self, time: float) -> int:
         """Return how many times exceed a limit, by whole bins. `time`, s."""
-        return sum(count for place, count in self.bins.items() if place >= round(time / self.width))
+        return sum(count for number, count in self.bins.items() if number >= round(time / self.width))
 
     def find_share(self, share: float) -> float:
         """Return the time that a share of the times does not exceed, by whole bins, s; 0 without any."""
         left = math.ceil(share * self.bins.total())
-        for place, count in sorted(self.bins.items()):
+        for number, count in sorted(self.bins.items()):
             left -= count
-            if left <= 0 and place < int(LONGEST / self.width):
-                return min((place + 1) * self.width, self.longest)
+            if left <= 0 and number < int(LONGEST / self.width):
+                return min((number + 1) * self.width, self.longest)
         return self.longest
 
     def describe(self) -> Record:
         """Return the figures for a report: shares and longest, s; and the bins that hold something."""
         shares = {f"p{100 * share:g}": self.find_share(share) for share in SHARES}
-        table = [[round(place * self.width, 9), count] for place, count in sorted(self.bins.items())]
+        table = [[round(number * self.width, 9), count] for number, count in sorted(self.bins.items())]
         return {**shares, "longest": self.longest, "bin": self.width, "bins": table}
 
 

@@ -50,15 +50,19 @@ def add(commands: Any) -> None:
         "--osc-port N": (port, f"of OSC, 0: any; default: {OSC_PORT}", OSC_PORT),
         "--token T": f"token of the clients; default: {VARIABLE}, or one at random",
         "--most-force N": (
-            _within(1e-3, 1e3, "N"), f"largest force of a finger handed out, N; default: {force:g}", force,
+            _within(1e-3, 1e3, "N"),
+            f"largest force of a finger handed out, N; default: {force:g}",
+            force,
         ),
         "--most-speed MM/S": (
             _within(1.0, 1e4, "mm/s"),
-            f"largest speed of the fingertip, mm/s; default: {most_speed:g}", most_speed,
+            f"largest speed of the fingertip, mm/s; default: {most_speed:g}",
+            most_speed,
         ),
         "--silence S": (
             _within(0.01, 1e6, "s"),
-            f"lift the fingertip after this time without a pose; default: {LIMITS.silence:g}", LIMITS.silence,
+            f"lift the fingertip after this time without a pose; default: {LIMITS.silence:g}",
+            LIMITS.silence,
         ),
         "--fingers N": (whole_number(1, MOST_FINGERS), "number of fingertips, all as the scene's first"),
         "--lift MS": (_within(1.0, 1e4, "ms"), "lift fingers not named for this time; default: 100", 100.0),
@@ -68,13 +72,14 @@ def add(commands: Any) -> None:
         "--out DIR": (Path, "record a take into this folder"),
         "--part S": (
             _within(0.1, 600.0, "s"),
-            "seconds of a take that a killed process loses at most; default: 10", 10.0,
+            "seconds of a take that a killed process loses at most; default: 10",
+            10.0,
         ),
         "--report FILE": (Path, "write times and counts as JSON in the end"),
         "--seconds S": (_within(0.0, 1e9, "s"), "stop after this time; default: Ctrl-C"),
         "--overwrite": "replace the takes in that folder",
         "--quiet": "print addresses, errors and a random token",
-    }  # fmt: skip
+    }
     purpose = "run a session for other programs"
     parser = add_command(commands, "serve", purpose, EXAMPLES, description, carry_out=carry_out)
     add_scene(parser, optional=True)
@@ -88,7 +93,7 @@ def carry_out(arguments: argparse.Namespace) -> int:
         raise OutputError("digiclay serve runs on Linux and macOS: it needs pipes that do not wait.")
     if arguments.report is not None:
         refuse_unwritable(arguments.report.resolve().parent)
-    token, made = choose_token(arguments.token)
+    token, is_new = choose_token(arguments.token)
     if arguments.rate is not None:
         arguments.settings.append(Setting("simulation.control_period", repr(1.0 / arguments.rate), "--rate"))
     arguments.scene = arguments.scene or SCENE
@@ -109,7 +114,7 @@ def carry_out(arguments: argparse.Namespace) -> int:
         _tell(f"{scene.name or scene.method}: {scene.cells} pins, {rate:g} control periods a second")
         _tell(f"WebSocket ws://{shown}:{doors.port}")
         _tell(f"OSC       {shown}:{doors.osc_port} (UDP)")
-        if made:
+        if is_new:
             _tell(f"token     {token}")
         if exposure := describe_exposure(host, "the token is"):
             _tell(exposure)
@@ -165,6 +170,6 @@ def _summary(figures: Table) -> Iterator[str]:
     yield f"{figures['simulated']:.1f} s simulated since the last reset; {describe_errors(figures)}"
     counts = dict(sorted(figures["counts"].items()))
     flagged = {f"frames {name.replace('_', ' ')}": count for name, count in figures["flagged"].items()}
-    for found in (flagged, counts):
-        if found:
-            yield ", ".join(f"{name}: {count}" for name, count in found.items())
+    for words in (flagged, counts):
+        if words:
+            yield ", ".join(f"{name}: {count}" for name, count in words.items())

@@ -181,10 +181,10 @@ def follow(session: Session, targets: Floats, number: int, count: int, clear: fl
     if session.refused is not None and np.array_equal(targets, session.refused):
         targets = session.poses
     goals = live_session.clamp_pose(targets, system.cell.actuator.stroke)
-    way = session.limits.speed * system.period * count
+    reach = session.limits.speed * system.period * count
     start = session.poses
     ends = np.array(
-        [_limit_way(*each, way, clear) for each in zip(start.tolist(), goals.tolist(), strict=True)]
+        [_limit_way(*each, reach, clear) for each in zip(start.tolist(), goals.tolist(), strict=True)]
     )
     path = np.array([start, ends]) if count == 1 else live_session.interpolate_path(start, ends, count)
     try:
@@ -217,10 +217,10 @@ def _limit_way(start: list[float], goal: list[float], most: float, clear: float)
         start = [*goal[:2], clear, *goal[3:]]
     # Lists of 7 are faster than arrays.
     cosine = abs(sum(map(operator.mul, start[3:], goal[3:])))
-    way = math.dist(start[:3], goal[:3]) + ARM * 2.0 * math.acos(min(1.0, cosine))
-    if way <= most * (1.0 + 1e-9):  # rounding
+    distance = math.dist(start[:3], goal[:3]) + ARM * 2.0 * math.acos(min(1.0, cosine))
+    if distance <= most * (1.0 + 1e-9):  # rounding
         return goal
-    return [*interpolate_poses(np.array([[start], [goal]]), np.array([most / way]))[0, 0, 0]]
+    return [*interpolate_poses(np.array([[start], [goal]]), np.array([most / distance]))[0, 0, 0]]
 
 
 def reset(session: Session) -> Session:

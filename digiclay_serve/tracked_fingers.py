@@ -111,23 +111,24 @@ def name_fingers(tracks: Tracks, named: Sequence[tuple[int, Sequence[float]]]) -
     """
     given = np.array([pose for _, pose in named]).reshape(-1, 7)
     given[:, :3] = given[:, :3].clip(-FAR, FAR)
-    rows, ids = {one: row for row, (one, _) in enumerate(named)}, tracks.identities.copy()
+    rows, ids = {identity: row for row, (identity, _) in enumerate(named)}, tracks.identities.copy()
     unnamed, tracked, fresh = tracks.unnamed.copy(), tracks.tracked.copy(), np.zeros(len(ids), bool)
     most = np.minimum(JUMP + PACE * unnamed, APART)
     _put_back_exchanged(ids, tracked, rows, given)
     _hand_over(ids, tracked, rows, given, most)
-    known = {identity: slot for slot, identity in enumerate(ids.tolist())}
+    slots_of = {identity: slot for slot, identity in enumerate(ids.tolist())}
     free = iter(np.flatnonzero(ids < 0).tolist())
-    taken = {one: known[one] if one in known else next(free, None) for one in rows}
+    taken = {identity: slots_of[identity] if identity in slots_of else next(free, None) for identity in rows}
     here, there = given[:, :2].tolist(), tracked[:, :2].tolist()
     found = {
-        one: slot
-        for one, slot in taken.items()
-        if slot is not None and (one not in known or math.dist(here[rows[one]], there[slot]) <= most[slot])
+        identity: slot
+        for identity, slot in taken.items()
+        if slot is not None
+        and (identity not in slots_of or math.dist(here[rows[identity]], there[slot]) <= most[slot])
     }
     slots = [*found.values()]
     fresh[slots] = ids[slots] < 0
-    ids[slots], unnamed[slots], tracked[slots] = [*found], 0.0, given[[rows[one] for one in found]]
+    ids[slots], unnamed[slots], tracked[slots] = [*found], 0.0, given[[rows[identity] for identity in found]]
     was = fresh[:, None]
     return replace(
         tracks,
@@ -144,32 +145,38 @@ def name_fingers(tracks: Tracks, named: Sequence[tuple[int, Sequence[float]]]) -
 
 def _put_back_exchanged(ids: Indices, tracked: Floats, rows: Mapping[int, int], given: Floats) -> None:
     """Put back identities (f,) that have changed places in a message: their rows in what is given."""
-    known = np.array([slot for slot, identity in enumerate(ids.tolist()) if identity in rows], np.intp)
-    now = given[[rows[identity] for identity in ids[known].tolist()], :3]
-    own = np.linalg.norm(now - tracked[known, :3], axis=1)
-    if own.max(initial=0.0) <= JUMP:
+    named_slots = np.array([slot for slot, identity in enumerate(ids.tolist()) if identity in rows], np.intp)
+    now = given[[rows[identity] for identity in ids[named_slots].tolist()], :3]
+    moved = np.linalg.norm(now - tracked[named_slots, :3], axis=1)
+    if moved.max(initial=0.0) <= JUMP:
         return
-    way = np.linalg.norm(now[:, None] - tracked[known, :3], axis=2)
+    distance = np.linalg.norm(now[:, None] - tracked[named_slots, :3], axis=2)
     # Fingers go on where they were: what is far nearer to another's place has its name. Those that go around
     # in a ring of such places have exchanged theirs.
-    place = np.where((2.0 * way.min(1) < own) & (own > JUMP), way.argmin(1), np.arange(known.size))
-    ring = place
-    for _ in place:
-        ring = place[ring]
-    ids[known[place[ring]]] = ids[known[ring]]
+    nearest = np.where(
+        (2.0 * distance.min(1) < moved) & (moved > JUMP), distance.argmin(1), np.arange(named_slots.size)
+    )
+    ring = nearest
+    for _ in nearest:
+        ring = nearest[ring]
+    ids[named_slots[nearest[ring]]] = ids[named_slots[ring]]
 
 
 def _hand_over(ids: Indices, tracked: Floats, rows: Mapping[int, int], given: Floats, most: Floats) -> None:
     """Give identities (f,) that are not named to new ones that are nearest to them, `most` (f,) m away."""
     held = np.flatnonzero(ids >= 0)
     named = set(ids.tolist())
-    new = [one for one in rows if one not in named]
+    new = [identity for identity in rows if identity not in named]
     if not (new and held.size):
         return
-    way = np.linalg.norm(given[[rows[one] for one in new], None, :3] - tracked[held, :3], axis=2)
-    for row, place in enumerate(way.argmin(axis=1).tolist()):
-        slot = held[place]
-        if int(ids[slot]) not in rows and way[row, place] <= min(most[slot], way[:, place].min()):
+    distance = np.linalg.norm(
+        given[[rows[identity] for identity in new], None, :3] - tracked[held, :3], axis=2
+    )
+    for row, nearest in enumerate(distance.argmin(axis=1).tolist()):
+        slot = held[nearest]
+        if int(ids[slot]) not in rows and distance[row, nearest] <= min(
+            most[slot], distance[:, nearest].min()
+        ):
             ids[slot] = new[row]
 
 

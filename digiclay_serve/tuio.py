@@ -43,18 +43,24 @@ class Pad:
         """Return the lowest points (3,), m, of the fingers that are there at a time, s, by identity."""
         corner, scale = (-0.5 * self.size, 0.5 * self.size, self.height), (self.size, -self.size, -self.depth)
         there, usual = self.contacts.items() if now - self.heard <= GONE else (), not self.senses and USUAL
-        return {one: corner + np.add(touch, (0.0, 0.0, usual)) * scale for one, touch in there if touch}
+        return {
+            identity: corner + np.add(touch, (0.0, 0.0, usual)) * scale for identity, touch in there if touch
+        }
 
 
 def _take_message(contacts: dict[int, Any], address: str, values: list[Any]) -> dict[int, Any]:
     """Return the contacts after a message; raise an error of any kind over anything that is none."""
     kind = values[0] if address == "/tuio/2Dcur" else address
     if kind in ("alive", "/tuio2/alv"):
-        return {int(one) % 2**32: contacts.get(int(one) % 2**32) for one in values if one != "alive"}
+        return {
+            int(identity) % 2**32: contacts.get(int(identity) % 2**32)
+            for identity in values
+            if identity != "alive"
+        }
     if kind not in ("set", "/tuio2/ptr"):
         return contacts
-    one, *touch = [*values[1:4], 0.0] if kind == "set" else [*values[:1], *values[3:5], values[8]]
+    name, *touch = [*values[1:4], 0.0] if kind == "set" else [*values[:1], *values[3:5], values[8]]
     x, y, pressure = np.clip(touch, 0.0, 1.0).tolist()
     if len(contacts) > MOST or not np.isfinite(touch).all():
         raise ValueError
-    return {**contacts, int(one) % 2**32: [x, y, pressure]}
+    return {**contacts, int(name) % 2**32: [x, y, pressure]}

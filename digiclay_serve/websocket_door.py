@@ -131,9 +131,9 @@ class _WebSocketDoor:
 
     def connect(self, *arguments: Any, **options: Any) -> ServerConnection:
         """Make a connection of this door."""
-        made = _Connection(*arguments, **options)
-        made.door = self
-        return made
+        connection = _Connection(*arguments, **options)
+        connection.door = self
+        return connection
 
     def admit(self, connection: ServerConnection, request: Request) -> Response | None:
         """Refuse a client without the token, or with an address that makes no sense."""

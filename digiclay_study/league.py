@@ -105,7 +105,7 @@ def show_digits(value: float, digits: int = 3) -> str:
 
 def list_values(table: Table, method: str, trajectory: str, measure: str) -> list[float]:
     """Return a measure of a method on a trajectory, a value a seed that has one."""
-    trials = (figures for (own, name, _), figures in table.items() if (own, name) == (method, trajectory))
+    trials = (figures for (other, name, _), figures in table.items() if (other, name) == (method, trajectory))
     return [value for figures in trials if (value := figures.get(measure)) is not None]
 
 
@@ -122,22 +122,22 @@ def find_league(table: Table, methods: Sequence[str]) -> list[Row]:
         costs = [
             [_reduce(table, each, "period_cost", seed) for each in (method, methods[0])] for seed in seeds
         ]
-        measures["cost_ratio"] = find_interval([own / first for own, first in costs if own and first])
+        measures["cost_ratio"] = find_interval([cost / first for cost, first in costs if cost and first])
         for limit in LIMITS:
             speeds = [table.get((method, limit, seed), {}).get("speed_limit") for seed in seeds]
             measures[limit] = find_interval(speeds)
-        searched = frozenset(name for own, name, _ in table if own == method and name in LIMITS)
+        searched = frozenset(name for other, name, _ in table if other == method and name in LIMITS)
         rows.append(Row(method, measures, *worse[method], searched))
     return sorted(rows, key=lambda row: math.inf if row.measures["rfd"] is None else row.measures["rfd"].mean)
 
 
 def count_worse(table: Table, methods: Sequence[str]) -> dict[str, tuple[int | None, int]]:
     """Return on how many trajectories, of how many, a method has a greater mean RFD than the first one."""
-    found: dict[str, dict[str, list[float]]] = {method: {} for method in methods}
+    values: dict[str, dict[str, list[float]]] = {method: {} for method in methods}
     for (method, name, _), figures in table.items():
         if (rfd := figures.get("rfd")) is not None:
-            found[method].setdefault(name, []).append(rfd)
-    first, *others = ({name: fmean(rfd) for name, rfd in found[method].items()} for method in methods)
+            values[method].setdefault(name, []).append(rfd)
+    first, *others = ({name: fmean(rfd) for name, rfd in values[method].items()} for method in methods)
     counted: dict[str, tuple[int | None, int]] = {methods[0]: (None, len(first))}
     for method, means in zip(methods[1:], others, strict=True):
         both = means.keys() & first.keys()
@@ -148,9 +148,9 @@ def count_worse(table: Table, methods: Sequence[str]) -> dict[str, tuple[int | N
 def _reduce(table: Table, method: str, name: str, seed: int) -> float | None:
     """Return a measure over all trajectories of a seed: as `REDUCED` has it, or the mean."""
     groups: dict[str, list[float]] = {}
-    for (own, trajectory, number), figures in table.items():
+    for (tried, trajectory, number), figures in table.items():
         value = figures.get(name)
-        if (own, number) == (method, seed) and value is not None and math.isfinite(value):
+        if (tried, number) == (method, seed) and value is not None and math.isfinite(value):
             # The random drags together count as one trajectory of a mean.
             random = trajectory.startswith(f"{RANDOM}-")
             groups.setdefault(RANDOM if random else trajectory, []).append(value)

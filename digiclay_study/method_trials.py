@@ -253,9 +253,9 @@ def place_trial(scene: Scene, trajectory: str, *, errors: bool = False) -> tuple
     """Return a scene with a trajectory, and what measures it, perhaps with estimates of its errors."""
     measure = partial(measure_trial, errors=errors)
     if trajectory in LIMITS:
-        way = LIMITS[trajectory]
-        make_trial(scene, way, HIGH)
-        return scene, partial(search_limit, way=way)
+        motion = LIMITS[trajectory]
+        make_trial(scene, motion, HIGH)
+        return scene, partial(search_limit, way=motion)
     if trajectory in PHASES:
         placed, start, end = make_trial(scene, *PHASES[trajectory])
         return lift_off(placed), partial(measure, phase=(start, end))
@@ -285,9 +285,9 @@ def measure_trial(
     figures["losses"] = float(len(find_unintended_losses(done)))
     if phase is not None:
         judged, part = judge(done, *phase, 0.0), select_rows(done.history, *phase)
-        own = compute_metrics(part, scene.set_point)
-        figures |= {name: own[name] for name in ("lag_mean", "lag_max", "max_total_force")}
-        figures |= {"rfd": own["rfd_session"], "losses": float(judged.losses)}
+        metrics = compute_metrics(part, scene.set_point)
+        figures |= {name: metrics[name] for name in ("lag_mean", "lag_max", "max_total_force")}
+        figures |= {"rfd": metrics["rfd_session"], "losses": float(judged.losses)}
         figures["contact_loss_share"] = judged.loss_share
         figures |= perceive(figures["rfd"], figures["set_point"], figures["ridge_unevenness"])
     relief = measure_relief(scene, done.history, figures["ridge_offset"])

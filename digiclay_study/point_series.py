@@ -189,9 +189,10 @@ class Subject:
 
         `extra`: metrics beside those of the subject.
         """
-        own = tuple(axes.find_value(self.scene, key, "") for key in self.keys)
+        values = tuple(axes.find_value(self.scene, key, "") for key in self.keys)
         rows = [
-            (point.index, *(tuple(map(Range.convert, self.ranges, point.words)) or own)) for point in points
+            (point.index, *(tuple(map(Range.convert, self.ranges, point.words)) or values))
+            for point in points
         ]
         varied = [("point", ""), *((each.key, each.si) for each in self.ranges)]
         results = [records[point.index] for point in points]

@@ -277,7 +277,7 @@ def _rank(order: tuple[Floats, Floats], part: Any = slice(None)) -> list[int]:
     return places
 
 
-def _format(indices: Indices, order: str, place: Any) -> str:
+def _format(indices: Indices, order: str, row: Any) -> str:
     """Return an index and half its interval."""
-    index, interval = (part[place] for part in indices[order])
+    index, interval = (part[row] for part in indices[order])
     return f"{round(float(index), 2) + 0.0:.2f} ± {interval:.2f}"  # no minus before a zero

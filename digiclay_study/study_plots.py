@@ -66,11 +66,11 @@ def draw_front(
         f"{name} ({unit})" if unit else name for name, (_, unit) in zip(names, units, strict=True)
     )
     trials = np.arange(1, len(shown))
-    kept, lost = trials[sound[1:]], trials[~sound[1:]]
+    followed, lost = trials[sound[1:]], trials[~sound[1:]]
     lost = lost[np.isfinite(shown[lost]).all(axis=1)]
     edge = {"edgecolors": INK, "linewidths": 0.8, "zorder": 4}
     marks: list[tuple[Any, dict[str, Any]]] = [
-        (kept, {"marker": "o", "color": "#B9C7D3", "s": 22, "label": f"{len(kept)} trials"}),
+        (followed, {"marker": "o", "color": "#B9C7D3", "s": 22, "label": f"{len(followed)} trials"}),
         (lost, {"marker": "x", "color": "#D9C3B5", "s": 24, "label": f"{len(lost)} without the fingertip"}),
         ([0], {"marker": "D", "color": LINES[1], "s": 75, "label": "unchanged scene", **edge}),
         ([chosen], {"marker": "*", "color": LINES[2], "s": 260, "label": "chosen", **edge}),
@@ -116,14 +116,14 @@ BARS = (
 )
 
 
-def draw_indices(keys: Sequence[str], found: Mapping[str, Indices | None], title: str) -> Figure:
+def draw_indices(keys: Sequence[str], outputs: Mapping[str, Indices | None], title: str) -> Figure:
     """Draw first-order and total indices of each output, those with the largest totals at the top."""
-    totals = [indices["total"][0] for indices in found.values() if indices is not None]
+    totals = [indices["total"][0] for indices in outputs.values() if indices is not None]
     order = np.argsort(-np.max(totals, axis=0)) if totals else np.arange(len(keys))
     rows, whisker = -np.arange(len(keys)), {"ecolor": INK, "elinewidth": 1.1, "capsize": 2.5}
-    size = 1.5 + 3.4 * len(found), 1.8 + 0.52 * len(keys)
-    with panels(title, *size, 1, len(found)) as (figure, axes):
-        for panel, (name, indices) in zip(axes, found.items(), strict=True):
+    size = 1.5 + 3.4 * len(outputs), 1.8 + 0.52 * len(keys)
+    with panels(title, *size, 1, len(outputs)) as (figure, axes):
+        for panel, (name, indices) in zip(axes, outputs.items(), strict=True):
             for each, side, color, hatch, label in BARS:
                 values, interval = (part[order] for part in indices[each]) if indices else (rows * 0.0, None)
                 look = {
@@ -170,7 +170,9 @@ def draw_rfd(table: Table, methods: Sequence[str]) -> Figure:
     """
     from matplotlib.ticker import LogFormatter
 
-    names = list(dict.fromkeys(name for (_, name, _), found in table.items() if found.get("rfd") is not None))
+    names = list(
+        dict.fromkeys(name for (_, name, _), figures in table.items() if figures.get("rfd") is not None)
+    )
     size = 11.0, 0.27 * max(len(names), 1) + 1.7
     with panels("Reference force deviation by trajectory", *size, 1, 1) as (figure, (axes,)):
         for number, method in enumerate(methods):
@@ -183,7 +185,9 @@ def draw_rfd(table: Table, methods: Sequence[str]) -> Figure:
                     small = {"linestyle": "", "markersize": 3, "alpha": 0.6, **look}
                     axes.plot(1e3 * np.array(values), np.full(len(values), row), **small)
                     label = None
-        points = [found.get("set_point") for (own, _, _), found in table.items() if own == methods[0]]
+        points = [
+            figures.get("set_point") for (method, _, _), figures in table.items() if method == methods[0]
+        ]
         set_point = next((value for value in points if value is not None), None)
         if set_point is not None:
             edges = [share * set_point / 1e-3 for share in find_weber_fractions(set_point)]

@@ -212,18 +212,18 @@ def _list_cells(row: Row, names: Sequence[str]) -> list[str]:
     cells = [row.method]
     for name in names:
         factor = MEASURES[name].factor
-        found = row.measures[name]
-        end = describe_end(found and found.mean, LOW, HIGH) if name in row.searched else ""
-        cells.append(end or _format(found, factor))
+        interval = row.measures[name]
+        end = describe_end(interval and interval.mean, LOW, HIGH) if name in row.searched else ""
+        cells.append(end or _format(interval, factor))
     return [*cells, "–" if row.worse is None else f"{row.worse} of {row.trajectories}"]
 
 
-def _format(found: Interval | None, factor: float) -> str:
+def _format(interval: Interval | None, factor: float) -> str:
     """Write a mean and its interval in the unit shown."""
-    if found is None:
+    if interval is None:
         return "–"
-    half = "" if found.half is None else f" ± {show_digits(found.half * factor, 2)}"
-    return f"{show_digits(found.mean * factor)}{half}"
+    half = "" if interval.half is None else f" ± {show_digits(interval.half * factor, 2)}"
+    return f"{show_digits(interval.mean * factor)}{half}"
 
 
 def _list_trajectories(table: Table) -> list[str]:

@@ -77,8 +77,8 @@ def carry_out(arguments: Namespace) -> int:
     def evaluate(evaluation: Evaluation) -> None:
         _evolve(arguments, subject, evaluation, points)
         if len(points) + 1 == total:
-            found = find_outcome(subject, points, evaluation.collect(), choice)
-            ends = [found.every[index] for index in {found.front[0], found.front[-1], found.chosen}]
+            outcome = find_outcome(subject, points, evaluation.collect(), choice)
+            ends = [outcome.every[index] for index in {outcome.front[0], outcome.front[-1], outcome.chosen}]
             evaluation.judge([*find_ends(points, subject.keys), *ends], subject.keys)
 
     opened = subject.open_folder(arguments.out, "tuning", plan)
@@ -123,8 +123,8 @@ def _refuse_others(
 ) -> None:
     """Refuse records of other points, as another version of optuna would have proposed them."""
     for point in points:
-        own = dict(zip(subject.keys, point.words, strict=True))
-        if records.get(point.index, {}).get("values", own) != own:
+        values = dict(zip(subject.keys, point.words, strict=True))
+        if records.get(point.index, {}).get("values", values) != values:
             rule = "holds points of another version of optuna"
             raise OutputError(f"{folder} {rule}: choose another folder with --out.")
 
@@ -157,14 +157,14 @@ def _write(
     figure = draw_front(subject.names, trials.values, trials.sound, front, chosen, title)
     save(figure, out / "front.png")
     worse = np.all(trials.values[front] <= trials.values[UNCHANGED], axis=1) & (front != UNCHANGED)
-    own = _describe(subject.names, trials.values[UNCHANGED])
+    unchanged = _describe(subject.names, trials.values[UNCHANGED])
     values = ", ".join(
         f"{key} = {word}" for key, word in zip(subject.keys, every[chosen].words, strict=False)
     )
     lost = int(np.count_nonzero(~trials.sound[1:]))
     return [
         f"{len(points)} runs, {lost} of them failed or lost the fingertip; on the front: {len(front)}",
-        f"unchanged scene: {own}; better in both: {np.count_nonzero(worse)} of the front",
+        f"unchanged scene: {unchanged}; better in both: {np.count_nonzero(worse)} of the front",
         f"chosen ({choice}): {outputs}; {values or 'the unchanged scene'}",
         describe_effort(records),
     ]
@@ -222,8 +222,8 @@ class Trials(NamedTuple):
     @property
     def sound(self) -> Flags:
         """Which runs keep the fingertip, shape (points,)."""
-        kept: Flags = self.violation <= 0.0
-        return kept
+        allowed: Flags = self.violation <= 0.0
+        return allowed
 
     def find_front(self) -> Cells:
         """Return the runs on the front, ordered by the first output."""

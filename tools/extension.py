@@ -55,8 +55,8 @@ def carry_out(command: list[str | Path], what: str) -> str:
 def blender_scripts() -> Path:
     """Return the folder of scripts of this Python's Blender module."""
     spec = importlib.util.find_spec("bpy")
-    places = [Path(place) for place in (spec.submodule_search_locations or [])] if spec else []
-    scripts = [tool.parents[3] for place in places for tool in place.glob(f"*/scripts/{TOOL}")]
+    places = [Path(folder) for folder in (spec.submodule_search_locations or [])] if spec else []
+    scripts = [tool.parents[3] for folder in places for tool in folder.glob(f"*/scripts/{TOOL}")]
     if not scripts:
         stop(f"{sys.executable} has no Blender module with its tool {TOOL}.")
     return scripts[0]
@@ -120,8 +120,8 @@ def read_instant() -> int:
 def repack_zip(archive: Path, instant: int) -> None:
     """Write a zip or a wheel again in a fixed form: order, modes and one time, s since 1970 UTC."""
     when = time.gmtime(max(instant, EARLIEST))[:6]
-    made = archive.with_name(f"{archive.name}.new")
-    with zipfile.ZipFile(archive) as old, zipfile.ZipFile(made, "w") as new:
+    packed = archive.with_name(f"{archive.name}.new")
+    with zipfile.ZipFile(archive) as old, zipfile.ZipFile(packed, "w") as new:
         # The metadata of a wheel stand last, as its specification recommends.
         for part in sorted(old.infolist(), key=lambda part: (".dist-info/" in part.filename, part.filename)):
             entry = zipfile.ZipInfo(part.filename, when)
@@ -129,7 +129,7 @@ def repack_zip(archive: Path, instant: int) -> None:
             entry.create_system = 3  # Unix, wherever it is built: the modes are Unix's
             entry.external_attr = ZIPPED_FOLDER if part.is_dir() else ZIPPED_FILE
             new.writestr(entry, old.read(part), compresslevel=9)
-    made.replace(archive)
+    packed.replace(archive)
 
 
 def build(out: Path) -> Path:
@@ -139,15 +139,15 @@ def build(out: Path) -> Path:
     tags = ["--valid-tags", scripts / TAGS]
     (ROOT / "build").mkdir(exist_ok=True)
     with tempfile.TemporaryDirectory(dir=ROOT / "build") as scratch:
-        staged, made = Path(scratch) / "digiclay", Path(scratch) / "made"
+        staged, built = Path(scratch) / "digiclay", Path(scratch) / "made"
         staged.mkdir()
-        made.mkdir()
+        built.mkdir()
         stage(staged)
         carry_out(
-            [*tool, "build", "--source-dir", staged, "--output-dir", made, *tags],
+            [*tool, "build", "--source-dir", staged, "--output-dir", built, *tags],
             "Blender's tool for building",
         )
-        (archive,) = made.glob("*.zip")
+        (archive,) = built.glob("*.zip")
         repack_zip(archive, read_instant())
         output = carry_out([*tool, "validate", *tags, archive], "Blender's tool for validating")
         if re.search(r"\b(warning|error)\b", output, re.IGNORECASE):

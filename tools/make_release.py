@@ -122,7 +122,7 @@ def build(source: Path, out: Path, instant: int, added: dict[str, str], umask: i
 
 def build_twice(scratch: Path, commit: str, instant: int) -> Path:
     """Build a commit twice under different circumstances, compare the files; return their folder."""
-    made = []
+    folders = []
     extension.wheels()  # fetched once
     for name, umask, touched, added in BUILDS:
         source, out = scratch / name, scratch / f"files of {name}"
@@ -134,12 +134,12 @@ def build_twice(scratch: Path, commit: str, instant: int) -> Path:
                 os.utime(path, (touched, touched))
         shutil.copytree(extension.FETCHED, source / extension.FETCHED.relative_to(ROOT))
         build(source, out, instant, added, umask)
-        made.append(out)
-    first, second = ({path.name: path.read_bytes() for path in out.iterdir()} for out in made)
+        folders.append(out)
+    first, second = ({path.name: path.read_bytes() for path in out.iterdir()} for out in folders)
     differing = sorted(name for name in first.keys() | second.keys() if first.get(name) != second.get(name))
     if differing:
         raise ReleaseError(f"two builds of the same commit differ in {', '.join(differing)}.")
-    return made[0]
+    return folders[0]
 
 
 def check_files(folder: Path, version: str) -> None:
@@ -175,13 +175,13 @@ def write_texts(folder: Path, version: str) -> None:
         path.chmod(0o644)
 
 
-def publish(made: Path, folder: Path, version: str, commit: str) -> None:
+def publish(built: Path, folder: Path, version: str, commit: str) -> None:
     """Move the files to their folder and tag the commit, both or neither."""
     for number in SIGNALS:  # it takes an instant, and is not to be stopped between the two
         signal.signal(number, signal.SIG_IGN)
     refuse_stopped()
     folder.parent.mkdir(exist_ok=True)
-    made.rename(folder)
+    built.rename(folder)
     notes = str(folder / "release-notes.md")
     done = git(ROOT, "tag", "--annotate", "--cleanup=verbatim", "--file", notes, tag_of(version), commit)
     if done.returncode:
@@ -205,12 +205,12 @@ def release(version: str) -> Path:
     scratch.mkdir(exist_ok=True)
     print(f"building {version} of commit {commit[:7]} twice ...", flush=True)
     with tempfile.TemporaryDirectory(prefix="release-", dir=scratch, ignore_cleanup_errors=True) as temporary:
-        made = build_twice(Path(temporary), commit, instant)
-        check_files(made, version)
-        write_texts(made, version)
+        built = build_twice(Path(temporary), commit, instant)
+        check_files(built, version)
+        write_texts(built, version)
         if _head() != commit or git(ROOT, "status", "--porcelain").stdout:
             raise ReleaseError("the checkout was changed during the build.")
-        publish(made, folder, version, commit)
+        publish(built, folder, version, commit)
     return folder
 
 

@@ -64,7 +64,7 @@ def list_mutants(path: Path) -> Iterator[tuple[str, MutationSpec]]:
     tree, silent, lines = get_ast(source), find_silent(source), source.splitlines()
     for name in filter(OPERATORS.fullmatch, operator_names()):
         operator = get_operator(name)()
-        places = (place for node in ast_nodes(tree) for place in operator.mutation_positions(node))
+        places = (position for node in ast_nodes(tree) for position in operator.mutation_positions(node))
         for occurrence, (start, end) in enumerate(places):
             if any(first <= start and end <= last for first, last in silent):
                 continue

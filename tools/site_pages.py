@@ -361,11 +361,11 @@ def on_files(files: Any, config: Any) -> None:
     for page, source in ELSEWHERE.items():
         made[page] = (ROOT / source).read_text(encoding="utf-8")
     for path in (ROOT / "benchmarks" / "results").iterdir():
-        place = find_place(path.relative_to(ROOT).as_posix())
-        if place:
-            made[place] = path.read_bytes()
-    for place, content in made.items():
-        files.append(File.generated(config, place, content=content))
+        address = find_place(path.relative_to(ROOT).as_posix())
+        if address:
+            made[address] = path.read_bytes()
+    for address, content in made.items():
+        files.append(File.generated(config, address, content=content))
 
 
 def on_page_markdown(markdown: str, page: Any, config: Any, files: Any) -> str:

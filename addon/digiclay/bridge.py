@@ -34,11 +34,11 @@ ATTRIBUTES = {"mode": ("INT", "value", np.int32), "force": ("FLOAT", "value", np
 def mesh(name: str, shape: tuple[Floats, list[tuple[int, ...]]], smooth_below: float = 0.6) -> Mesh:
     """Make a mesh of a shape in Blender units, smooth where faces meet at less than an angle, rad."""
     vertices, faces = shape
-    made = bpy.data.meshes.new(name)
-    made.from_pydata(vertices.tolist(), [], faces)
-    made.shade_smooth()
-    made.set_sharp_from_angle(angle=smooth_below)
-    return made
+    mesh = bpy.data.meshes.new(name)
+    mesh.from_pydata(vertices.tolist(), [], faces)
+    mesh.shade_smooth()
+    mesh.set_sharp_from_angle(angle=smooth_below)
+    return mesh
 
 
 def points(name: str, count: int) -> Mesh:
@@ -118,7 +118,7 @@ def move_fingertips(
     for above, tips in parts.items():
         role, stood = above and above.get(ROLE), np.array(above.matrix_world if above else np.eye(4))
         if role == PALM and len(tips) == sum(tip.parent == above for tip in every.values()):
-            ways = [whole @ place @ np.linalg.pinv(tip.matrix_world) for tip, place in tips]
+            ways = [whole @ pose @ np.linalg.pinv(tip.matrix_world) for tip, pose in tips]
             if np.ptp(ways, axis=0).max() < STRAY:
                 stood = ways[0] @ stood
                 above.matrix_world = stood.T.tolist()
@@ -132,10 +132,10 @@ def move_fingertips(
 
 def _place(at: Floats, finger: Fingertip) -> Floats:
     """Return the matrix (4, 4) of a fingertip at a pose (7,) in the space of its bed."""
-    place = np.eye(4)
-    place[:3, :3] = make_matrices(at[None, 3:])[0]
-    place[:3, 3] = finger.outline(np.asarray(at, np.float64)[None])[0, :3] * SCALE
-    return place
+    matrix = np.eye(4)
+    matrix[:3, :3] = make_matrices(at[None, 3:])[0]
+    matrix[:3, 3] = finger.outline(np.asarray(at, np.float64)[None])[0, :3] * SCALE
+    return matrix
 
 
 def resize_fingertip(tip: Object, finger: Fingertip) -> None:
@@ -163,8 +163,8 @@ def finger_of(tip: Object) -> Fingertip:
 
 def pose(tip: Object) -> Floats:
     """Return the pose (7,) of a fingertip in its bed's space: lowest point, m, and quaternion."""
-    (found,) = _read_poses(owner_of(tip), [tip])
-    return np.asarray(found)
+    (pose,) = _read_poses(owner_of(tip), [tip])
+    return np.asarray(pose)
 
 
 def poses(bed: Object) -> Floats:
@@ -176,16 +176,16 @@ def poses(bed: Object) -> Floats:
 def _read_poses(bed: Object, tips: Sequence[Object]) -> Floats:
     """Return the poses (f, 7) of fingertips in the space of their bed."""
     uniform(bed)
-    inverse, found = bed.matrix_world.inverted(), np.empty((len(tips), 7))
-    for row, tip in zip(found, tips, strict=True):
+    inverse, poses = bed.matrix_world.inverted(), np.empty((len(tips), 7))
+    for row, tip in zip(poses, tips, strict=True):
         # The world's matrix is live while the user drags the fingertip by whatever means.
         center, turn, _ = (inverse @ tip.matrix_world).decompose()
         row[:3], row[3:] = center, turn.normalized()
-    turns, squares = make_matrices(found[:, 3:]), np.array([tip[AXES] for tip in tips]) ** 2
+    turns, squares = make_matrices(poses[:, 3:]), np.array([tip[AXES] for tip in tips]) ** 2
     # How the center is above the lowest point: as in `Fingertip.outline`.
     above = np.einsum("fij,fj,fj->fi", turns, squares, turns[:, 2])
-    found[:, :3] = found[:, :3] / SCALE - above / np.sqrt(above[:, 2:])
-    return found
+    poses[:, :3] = poses[:, :3] / SCALE - above / np.sqrt(above[:, 2:])
+    return poses
 
 
 def uniform(bed: Object) -> float:

@@ -101,8 +101,8 @@ def node_setting(modifier: Modifier, name: str) -> Any:
 def read_stored(owner: ID, name: str) -> dict[str, Any]:
     """Return all that is stored in a property group of an object, nested; what was never set is not in it."""
     # From 5.0 on these values are kept apart from the custom properties.
-    kept = owner.bl_system_properties_get() if hasattr(owner, "bl_system_properties_get") else owner
-    group = kept.get(name) if kept is not None else None
+    properties = owner.bl_system_properties_get() if hasattr(owner, "bl_system_properties_get") else owner
+    group = properties.get(name) if properties is not None else None
     return group.to_dict() if group is not None else {}
 
 
@@ -128,8 +128,8 @@ def keyframe_node_setting(modifier: Modifier, name: str, frame: int) -> None:
 def _identifier(modifier: Modifier, name: str) -> str:
     """Return the identifier of an input of a geometry nodes modifier's tree, also of an older file's tree."""
     inputs = modifier.node_group.interface.items_tree
-    found: str = inputs[name if name in inputs else FORMER_INPUTS[name]].identifier
-    return found
+    identifier: str = inputs[name if name in inputs else FORMER_INPUTS[name]].identifier
+    return identifier
 
 
 def curves(owner: ID) -> list[Any]:
@@ -155,13 +155,13 @@ def own_curves(owner: ID) -> None:
     slot = getattr(data, "action_slot", None)  # up to 4.3 whoever has the action has all its curves
     if (data.action.users if slot is None else len(slot.users())) < 2:
         return
-    made = data.action.copy()
-    data.action = made
+    action = data.action.copy()
+    data.action = action
     if slot is None:
         return
-    data.action_slot = made.slots[slot.identifier]
-    for other in [one for one in made.slots if one.identifier != slot.identifier]:
-        made.slots.remove(other)
+    data.action_slot = action.slots[slot.identifier]
+    for other in [each for each in action.slots if each.identifier != slot.identifier]:
+        action.slots.remove(other)
 
 
 def has_denoiser() -> bool:
@@ -224,12 +224,12 @@ def scratch() -> Iterator[None]:
 def quiet() -> Iterator[None]:
     """Keep the lines Blender itself prints while rendering off the terminal."""
     sys.stdout.flush()
-    kept = os.dup(1)
+    former = os.dup(1)
     nowhere = os.open(os.devnull, os.O_WRONLY)
     try:
         os.dup2(nowhere, 1)
         yield
     finally:
-        os.dup2(kept, 1)
-        os.close(kept)
+        os.dup2(former, 1)
+        os.close(former)
         os.close(nowhere)

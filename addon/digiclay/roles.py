@@ -91,9 +91,9 @@ def owner_of(part: Object, role: str = BED) -> Object | None:
         return above
     # A palm is held by its fingertips, and a copy of a fingertip by the one that has its ellipsoid.
     ball = part.get(BALL)
-    own = {part, ball and ball.parent, *(part.get(name) for name in FINGERS)} - {None}
+    family = {part, ball and ball.parent, *(part.get(name) for name in FINGERS)} - {None}
     beds = (thing for scene in part.users_scene for thing in scene.objects if is_bed(thing))
-    held = [bed for bed in beds if own & {bed.get(name) for name in FINGERS}]
+    held = [bed for bed in beds if family & {bed.get(name) for name in FINGERS}]
     # A copy of the bed holds it as well, until it gets one of its own.
     return min(held, key=lambda bed: bed.session_uid, default=None)
 

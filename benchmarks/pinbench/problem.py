@@ -147,8 +147,8 @@ class Law:
         at_x, at_y, at_z = self.pose(time)
         across, along = self.across - at_x / self.tip["length"], self.along - at_y / self.tip["width"]
         inward = 1.0 - across * across - along * along
-        kept = np.maximum(inward, 1.0 - JOIN)
-        shape = np.sqrt(kept) + (inward - kept) * (0.5 / ROOT)
+        inside = np.maximum(inward, 1.0 - JOIN)
+        shape = np.sqrt(inside) + (inward - inside) * (0.5 / ROOT)
         under: Floats = (at_z + self.tip["height"]) - self.tip["height"] * shape
         return under
 

@@ -185,6 +185,6 @@ def compare(fit: Sequence[Answer]) -> str:
     if not fit:
         return "-"
     best = min(fit, key=lambda answer: answer.seconds)
-    ours, others = ([a.seconds for a in fit if (a.engine == "own") is own] for own in (True, False))
+    ours, others = ([a.seconds for a in fit if (a.engine == "own") is mine] for mine in (True, False))
     ratio = f" ({min(ours) / min(others):.2f})" if ours and others else ""
     return f"{best.method} {best.seconds * 1e6:.0f}{ratio}"

@@ -91,26 +91,29 @@ class JobProcess(Process):
 
 
 @command(
-    "run a job series in the background: scenes, exports, pictures and films", EXAMPLES,
-    OPTIONS, one_of(INSTEAD), FARM_OPTIONS,
-)  # fmt: skip
+    "run a job series in the background: scenes, exports, pictures and films",
+    EXAMPLES,
+    OPTIONS,
+    one_of(INSTEAD),
+    FARM_OPTIONS,
+)
 def carry_out(arguments: Namespace) -> int:
     """Do the jobs that are not done yet, and write the page about all."""
     for name in ("program", "chunk"):
         if getattr(arguments, name) is not None and arguments.submit is None:
             raise OutputError(f"--{name} must be given with --submit only.")
     methods = [load_by_option(word, "--method") for word in arguments.method]
-    made = read_jobs(find_jobs_file(arguments.file), list(dict.fromkeys(methods)))
-    sound = next((job.scene for job in made.jobs if job.scene is not None), None)
+    series = read_jobs(find_jobs_file(arguments.file), list(dict.fromkeys(methods)))
+    sound = next((job.scene for job in series.jobs if job.scene is not None), None)
     if sound is not None:  # outputs that cannot be had here at all are refused before any work
-        check_outputs(sound, made.outputs)
-    out: Path = arguments.out or Path(made.name)
-    with open_batch(out, made) as folder:
-        for job in made.jobs:
+        check_outputs(sound, series.outputs)
+    out: Path = arguments.out or Path(series.name)
+    with open_batch(out, series) as folder:
+        for job in series.jobs:
             folder.describe(job)
-        failed = {job.name: job.error for job in made.jobs if job.error}
+        failed = {job.name: job.error for job in series.jobs if job.error}
         if arguments.prepare:
-            say(arguments, f"{len(made.jobs) - len(failed)} jobs written to {out / 'jobs'}")
+            say(arguments, f"{len(series.jobs) - len(failed)} jobs written to {out / 'jobs'}")
         elif arguments.submit:
             say(arguments, *write_farm_files(folder, arguments.submit, arguments.program, arguments.chunk))
         elif not _finish(arguments, folder, failed):
@@ -118,25 +121,25 @@ def carry_out(arguments: Namespace) -> int:
     if not failed:
         return 0
     name, error = next(iter(failed.items()))
-    print(f"{len(failed)} of {len(made.jobs)} jobs failed; the first one: {name}: {error}", file=sys.stderr)
+    print(f"{len(failed)} of {len(series.jobs)} jobs failed; the first one: {name}: {error}", file=sys.stderr)
     return FAILED
 
 
 def _finish(arguments: Namespace, folder: Folder, failed: dict[str, str]) -> bool:
     """Run the jobs, add to `failed` why some failed, and report; return False after a stop."""
-    made, started = folder.batch, time.monotonic()
-    todo = [job for job in made.jobs if not job.error and not folder.is_done(job)]
-    before = len(made.jobs) - len(todo)
+    series, started = folder.batch, time.monotonic()
+    todo = [job for job in series.jobs if not job.error and not folder.is_done(job)]
+    before = len(series.jobs) - len(todo)
     for name, error in failed.items():
         say(arguments, f"failed: {name}: {error}")
     count = max(1, min(arguments.jobs or count_cores(), len(todo)))
     ended, due = before, started
-    with Stop() as stop, Counted(sys.stderr, made.name, "jobs", before) as bar:
+    with Stop() as stop, Counted(sys.stderr, series.name, "jobs", before) as bar:
 
         def draw() -> None:
             if not arguments.quiet:  # each reads its log
                 done = ended + sum(map(JobProcess.read_fraction, processes.alive))
-                bar(done, len(made.jobs), f", {len(failed)} failed" if failed else "")
+                bar(done, len(series.jobs), f", {len(failed)} failed" if failed else "")
 
         with Processes[JobProcess](stop, draw) as processes:
             for job, outcome in processes.finish(count, todo, partial(_start_job, folder)):
@@ -153,7 +156,7 @@ def _finish(arguments: Namespace, folder: Folder, failed: dict[str, str]) -> boo
                     due = time.monotonic() + max(PAUSE, REST * (time.monotonic() - began))
         stopped = stop()
     now = sum(folder.is_done(job) for job in todo)
-    done = before - sum(bool(job.error) for job in made.jobs) + now
+    done = before - sum(bool(job.error) for job in series.jobs) + now
     summary = folder.summarize(done, failed)
     took = time.monotonic() - started
     if todo:
@@ -164,7 +167,7 @@ def _finish(arguments: Namespace, folder: Folder, failed: dict[str, str]) -> boo
         summary += f"; a job's process takes {ready:.1f} s to start"
     index = folder.write_index(failed, f"{summary}.")
     say(arguments, f"{summary}.", f"written to {index}")
-    if stopped and done + len(failed) < len(made.jobs):
+    if stopped and done + len(failed) < len(series.jobs):
         say(arguments, "Stopped: what is done is kept, and the same command goes on from there.")
         return False
     return True
@@ -193,9 +196,9 @@ def write_farm_files(folder: Folder, form: str, program: str | None, chunk: int 
     series = os.path.abspath(folder.path)
     if not os.path.exists(series) or not os.path.samefile(series, folder.path):
         series = os.path.realpath(folder.path)
-    made = Submission(make_safe_name(folder.batch.name), series, tasks, find_start(program))
-    files, lines = FORMATS[form](made)
-    for word in (made.series, *made.program):
+    submission = Submission(make_safe_name(folder.batch.name), series, tasks, find_start(program))
+    files, lines = FORMATS[form](submission)
+    for word in (submission.series, *submission.program):
         try:
             word.encode()
         except UnicodeEncodeError:

@@ -246,10 +246,10 @@ def _refuse_others(versions_of: Table, here: Versions) -> None:
 
 def _describe_exposure(address: str) -> str:
     """Return a warning of an address that is neither encrypted nor of this machine alone."""
-    scheme, _, place = address.rpartition("://")
+    scheme, _, host = address.rpartition("://")
     if scheme in ENCRYPTED:
         return ""
-    exposure = describe_exposure(urlsplit(f"//{place}").hostname or "", "points, code and results are")
+    exposure = describe_exposure(urlsplit(f"//{host}").hostname or "", "points, code and results are")
     return exposure and f"{exposure} tls:// encrypts."
 
 

@@ -113,9 +113,13 @@ OPTIONS = {
 
 
 @command(
-    "compare control methods on the same input", EXAMPLES, partial(add_scene, optional=True), OPTIONS,
-    _add_suite, description="Run control methods on the same input, and compare their metrics.",
-)  # fmt: skip
+    "compare control methods on the same input",
+    EXAMPLES,
+    partial(add_scene, optional=True),
+    OPTIONS,
+    _add_suite,
+    description="Run control methods on the same input, and compare their metrics.",
+)
 def carry_out(arguments: Namespace) -> int:
     """Run every method, print the table, write the folder."""
     if arguments.suite and (suite := find_beside(*SUITE)):
@@ -150,8 +154,8 @@ def carry_out(arguments: Namespace) -> int:
     except KeyboardInterrupt:
         if not records:
             raise
-        kept = f"{len(records)} of {len(points)} methods are done and kept in {out}"
-        say(arguments, f"Stopped: {kept}. The same command goes on from there.")
+        done = f"{len(records)} of {len(points)} methods are done and kept in {out}"
+        say(arguments, f"Stopped: {done}. The same command goes on from there.")
         return STOPPED
     say(arguments, *table({name: record["figures"] for name, record in every.items()}), *notes)
     return 0
@@ -235,9 +239,9 @@ def _speeds(scene: Scene) -> tuple[Metrics, list[str]]:
     measured: Metrics = {}
     absent = []
     ways: tuple[Drag | Lift, ...] = Drag(), Lift()
-    for name, way in zip(SPEEDS, ways, strict=True):
+    for name, motion in zip(SPEEDS, ways, strict=True):
         try:
-            measured[name] = find_largest_speed(scene, way, Criterion())
+            measured[name] = find_largest_speed(scene, motion, Criterion())
         except ParameterError as error:
             absent.append(f"{name}: not measured, {error}")
     return measured, absent
@@ -256,5 +260,7 @@ def table(measured: dict[str, Metrics]) -> Iterator[str]:
             factor, unit = READ.get(metric.unit, (1.0, metric.unit))
             if name in ERRORS:
                 factor, unit = metric.factor, metric.shown
-            rows.append([name, unit, *(write(name, own.get(name), factor) for own in measured.values())])
+            rows.append(
+                [name, unit, *(write(name, values.get(name), factor) for values in measured.values())]
+            )
     yield from aligned(("metric", "unit", *measured), rows, left=2)

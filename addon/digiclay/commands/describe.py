@@ -43,9 +43,11 @@ READ = {"m": (1e3, "mm"), "s": (1e3, "ms"), "Pa": (1e-5, "bar"), "m2/s": (1e6, "
 
 
 @command(
-    "list the parts of a scene and their parameters", EXAMPLES, add_scene,
+    "list the parts of a scene and their parameters",
+    EXAMPLES,
+    add_scene,
     {"--parameters": "each key with its value, range, meaning and source instead"},
-)  # fmt: skip
+)
 def carry_out(arguments: argparse.Namespace) -> int:
     """Describe."""
     scene, _ = scene_of(arguments)
@@ -99,8 +101,8 @@ def description(scene: Scene, system: System) -> Iterator[str]:
     for place, section in PLACES:
         for fingers, part in _list_parts(scene, section):
             method = f"{scene.method}: " if section == "control" else ""
-            own = "left out" if part is None else method + _parameters(part)
-            yield _filled(place, f"of {fingers}: {own}" if fingers else own)
+            parameters = "left out" if part is None else method + _parameters(part)
+            yield _filled(place, f"of {fingers}: {parameters}" if fingers else parameters)
     if scene.shape:
         yield _filled("shape", fit_shape(scene.shape, system.grid, scene.actuator).describe())
     simulation = scene.simulation
@@ -123,8 +125,8 @@ def description(scene: Scene, system: System) -> Iterator[str]:
         yield f"  {len(points)} waypoints, {path.interpolation}, the last at {points[-1].time:g} s"
     sizes = scene.cells, scene.periods, count_busy_cells(scene)
     needed, free = count_bytes_needed(scene.recorder, system.rows, *sizes), measure_available_memory()
-    kept = f"{scene.recorder.rows(scene.periods)} rows kept" if scene.recorder else "no history kept"
-    yield f"  {kept}; {size(needed)} of memory needed, {size(free)} free"
+    extent = f"{scene.recorder.rows(scene.periods)} rows kept" if scene.recorder else "no history kept"
+    yield f"  {extent}; {size(needed)} of memory needed, {size(free)} free"
 
 
 def _pins(scene: Scene, system: System) -> Iterator[tuple[str, str]]:
@@ -146,9 +148,9 @@ def _pins(scene: Scene, system: System) -> Iterator[tuple[str, str]]:
     )
 
 
-def _lasting(way: float, speed: float) -> str:
+def _lasting(distance: float, speed: float) -> str:
     """Write how long a way takes, m and m/s; a reservoir may push the other way."""
-    return f"{way / speed:.3g} s" if speed > 0.0 else "never"
+    return f"{distance / speed:.3g} s" if speed > 0.0 else "never"
 
 
 def _rows(system: System) -> Iterator[tuple[str, int]]:
@@ -176,7 +178,7 @@ def _parameters(part: Parameters) -> str:
     for name, declared in list_quantities(part).items():
         value = getattr(part, name)
         values = value if isinstance(value, tuple) else (value,)
-        shown.append(f"{name.replace('_', ' ')} {' '.join(human(one, declared.unit) for one in values)}")
+        shown.append(f"{name.replace('_', ' ')} {' '.join(human(value, declared.unit) for value in values)}")
     return ", ".join(shown)
 
 

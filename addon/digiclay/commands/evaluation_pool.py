@@ -139,8 +139,8 @@ class Evaluation(ExitStack):
             record = self.records.get(point.index)
             return record is None or (point.errors and not has_errors(record))
 
-        def keep(bundle: Sequence[Point], found: Sequence[Record | None]) -> None:
-            for point, record in zip(bundle, found, strict=True):
+        def keep(bundle: Sequence[Point], evaluated: Sequence[Record | None]) -> None:
+            for point, record in zip(bundle, evaluated, strict=True):
                 if record is not None and lacks(point):
                     # What is there remains: in another bundle the last bit of a figure may be another one.
                     if there := self.records.get(point.index):
@@ -194,8 +194,8 @@ def run_series(
             evaluate(evaluation)
             records = evaluation.collect()
         if stop() and (len(records) < total or evaluation.unjudged):
-            kept = f"{len(records)} of {total} {noun} are done and kept in {folder.path}"
-            say(arguments, f"Stopped: {kept}. The same command goes on from there.")
+            done = f"{len(records)} of {total} {noun} are done and kept in {folder.path}"
+            say(arguments, f"Stopped: {done}. The same command goes on from there.")
             return STOPPED
         say(arguments, *write(records))
     return 0

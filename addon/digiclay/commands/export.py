@@ -103,16 +103,16 @@ OPTIONS = {
 
 def file_names(kinds: Iterable[str], kind: str = "solid") -> list[str]:
     """Return the names of the files of a kind of mesh in several formats."""
-    return [f"{STEMS[kind]}{find_suffix(one)}" for one in kinds]
+    return [f"{STEMS[kind]}{find_suffix(file_kind)}" for file_kind in kinds]
 
 
 def exported(
     scene: Scene, history: History, row: int, kinds: Sequence[str], folder: Path, model: Model | None = None
 ) -> list[Path]:
     """Write one row of a history in several formats, by default as the solid; return the files."""
-    made = model or Model(cap=scene.actuator.bore / 2.0)
-    parts = make_bodies(make_formed(history, row), made, Finding())
-    names = file_names(kinds, made.kind)
+    settings = model or Model(cap=scene.actuator.bore / 2.0)
+    parts = make_bodies(make_formed(history, row), settings, Finding())
+    names = file_names(kinds, settings.kind)
     return [write(parts, folder / name, "mm", kind) for name, kind in zip(names, kinds, strict=True)]
 
 
@@ -122,10 +122,10 @@ def carry_out(arguments: Namespace) -> int:
     if arguments.separate and arguments.kind != "features":
         raise OutputError("--separate needs --kind features.")
     scene, formed = read_formed(arguments, "export")
-    made = make_bodies(formed, model_of(arguments, scene, arguments.kind), finding_of(arguments))
-    files: list[tuple[str, list[Body]]] = [(STEMS[arguments.kind], made)]
+    bodies = make_bodies(formed, model_of(arguments, scene, arguments.kind), finding_of(arguments))
+    files: list[tuple[str, list[Body]]] = [(STEMS[arguments.kind], bodies)]
     if arguments.separate:
-        files = [(body.name, [body]) for body in made]
+        files = [(body.name, [body]) for body in bodies]
     with told_as_options("Export"):
         make_axes(arguments.up, arguments.forward)
     folder = arguments.out or arguments.run

@@ -53,10 +53,13 @@ OPTIONS = {
 
 
 @command(
-    "display a shape, form it with the fingertip, export it", EXAMPLES,
-    {"shape SHAPE": "a sample shape's name, or a file"}, partial(add_scene, default=SCENE), OPTIONS,
+    "display a shape, form it with the fingertip, export it",
+    EXAMPLES,
+    {"shape SHAPE": "a sample shape's name, or a file"},
+    partial(add_scene, default=SCENE),
+    OPTIONS,
     description="Display a mesh, a picture or an array of heights, form it with the fingertip, export it.",
-)  # fmt: skip
+)
 def carry_out(arguments: argparse.Namespace) -> int:
     """Fit, display, form, export, and print a summary."""
     file = find_shape(arguments.shape)
@@ -109,7 +112,7 @@ def _evaluate(result: Result, row: int, laid: Fitted) -> tuple[Result, list[str]
     stands = next(i for i in range(row + 1) if np.abs(height[i] - laid.heights).max() <= error + 1e-9)
     change = height[-1] - height[row]
     area = layout.pitch * layout.row_spacing
-    raised, lowered = (float(np.maximum(way, 0.0).sum() * area) for way in (change, -change))
+    raised, lowered = (float(np.maximum(rise, 0.0).sum() * area) for rise in (change, -change))
     figures = {"display_error": error, "raised_volume": raised, "lowered_volume": lowered}
     counts = {
         "shape_covered": laid.covered,

@@ -125,8 +125,8 @@ def _do_job(arguments: Namespace, stopped: Callable[[], bool], tell: Tell) -> st
     if frames is not None:
         drawn = work.make_frames(only, frames)
         return f"frames {frames} of {out / only}.mp4 {'drawn' if drawn else 'were there already'}"
-    made = work.make_film(only)
-    return f"{'written to' if made else 'was done already:'} {out / only}.mp4"
+    written = work.make_film(only)
+    return f"{'written to' if written else 'was done already:'} {out / only}.mp4"
 
 
 def _find_place(job: Path) -> Path:
@@ -180,9 +180,11 @@ It needs neither the JOBS file nor Blender. Exit code 0 also while jobs are miss
 
 
 @command(
-    "write the page of a job series from the runs that are done", PAGE_EXAMPLES,
-    {"series DIR": (Path, "the folder of the series"), "--quiet": "print errors only"}, listed=False,
-)  # fmt: skip
+    "write the page of a job series from the runs that are done",
+    PAGE_EXAMPLES,
+    {"series DIR": (Path, "the folder of the series"), "--quiet": "print errors only"},
+    listed=False,
+)
 def write_page(arguments: Namespace) -> int:
     """Write the page."""
     series = read_batch(arguments.series)

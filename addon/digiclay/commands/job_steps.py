@@ -69,10 +69,10 @@ def _read_code(folder: Path) -> bytes | None:
         return None
 
 
-def _is_same(one: Path, other: Path, read: Callable[[Path], object]) -> bool:
+def _is_same(first: Path, other: Path, read: Callable[[Path], object]) -> bool:
     """Return whether two files say the same; older versions wrote it otherwise."""
     try:
-        return one.read_bytes() == other.read_bytes() or read(one) == read(other)
+        return first.read_bytes() == other.read_bytes() or read(first) == read(other)
     except (OSError, DigiclayError):
         return False
 
@@ -273,8 +273,8 @@ class Work:
 
     def make_films(self, outputs: Outputs) -> bool:
         """Make those films of some outputs that the run lacks; return whether there were any."""
-        made = [self.make_film(kind) for kind in list_lacking(self.run, outputs)]
-        return any(made)
+        films = [self.make_film(kind) for kind in list_lacking(self.run, outputs)]
+        return any(films)
 
     def _find_looks(self, kind: str) -> Any:
         """Return the settings of a film; refuse one that the job does not have, or that has no run yet."""

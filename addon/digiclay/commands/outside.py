@@ -44,13 +44,13 @@ def _refuse(rule: str) -> NoReturn:
 def add(commands: Any) -> None:
     """Add the commands of other packages, or their install messages, and the place of the benchmarks."""
     for name, (package, module, extra, help) in COMMANDS.items():
-        if found := find_beside(package, module):
-            found.add(commands)
+        if entry := find_beside(package, module):
+            entry.add(commands)
         else:
             parser = _add_any(commands, name, help=f"{help} (not part of the extension)")
             parser.set_defaults(carry_out=lambda _, name=name, extra=extra: refuse_absent(name, extra))
-    place = _add_any(commands, "benchmark", description="Where the benchmarks are.")
-    place.set_defaults(carry_out=lambda _: _refuse(NO_BENCHMARK))
+    command = _add_any(commands, "benchmark", description="Where the benchmarks are.")
+    command.set_defaults(carry_out=lambda _: _refuse(NO_BENCHMARK))
 
 
 def _add_any(commands: Any, name: str, **listed: str) -> ArgumentParser:

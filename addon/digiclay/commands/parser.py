@@ -74,10 +74,10 @@ class Parser(ArgumentParser):
         if "--token" in given[:-1]:  # which may begin with a dash
             at = given.index("--token")
             given[at : at + 2] = ["=".join(given[at : at + 2])]
-        known, unknown = super().parse_known_args(given, namespace)
+        arguments, unknown = super().parse_known_args(given, namespace)
         if unknown:
             self.error(f"unrecognized arguments: {' '.join(unknown)}")
-        return known, unknown
+        return arguments, unknown
 
 
 def _asked(word: str, names: Sequence[str]) -> str:

@@ -77,9 +77,12 @@ OF_FILMS, OF_TURNTABLES = ("rate", "speed", "start", "stop", "strip"), ("rate", 
 
 
 @command(
-    "draw an instant of a run as a PNG, or a film of it; needs Blender's module, bpy", EXAMPLES,
-    RUN, one_of(KINDS), OPTIONS,
-)  # fmt: skip
+    "draw an instant of a run as a PNG, or a film of it; needs Blender's module, bpy",
+    EXAMPLES,
+    RUN,
+    one_of(KINDS),
+    OPTIONS,
+)
 def carry_out(arguments: Namespace) -> int:
     """Render."""
     with told_as_options("Still", "Film", "Turntable", width="size", height="size"):
@@ -111,18 +114,18 @@ def _draw(arguments: Namespace, looks: Still | Turntable | Film) -> int:
 def _looks(arguments: Namespace) -> Still | Turntable | Film:
     """Return what the picture is to look like; refuse options that mean nothing for it."""
     kind: type[Still | Turntable | Film] = Still
-    own: tuple[str, ...] = ()
+    options: tuple[str, ...] = ()
     if arguments.film:
-        kind, own = Film, OF_FILMS
+        kind, options = Film, OF_FILMS
     elif arguments.turntable:
-        kind, own = Turntable, OF_TURNTABLES
-    for name in {*OF_FILMS, *OF_TURNTABLES} - {*own}:
+        kind, options = Turntable, OF_TURNTABLES
+    for name in {*OF_FILMS, *OF_TURNTABLES} - {*options}:
         if getattr(arguments, name) is not None:
             wanted = "--film" if name in OF_FILMS else "--turntable"
             raise DigiclayError(f"--{name} must be given with {wanted} only.")
     if arguments.film and arguments.time is not None:
         raise DigiclayError("--time must not be given with --film: give --start and --stop.")
-    names = ("engine", "color", "arrows", *own)
+    names = ("engine", "color", "arrows", *options)
     given = {name: getattr(arguments, name) for name in names if getattr(arguments, name) is not None}
     if arguments.size is not None:
         given["width"], given["height"] = arguments.size
@@ -202,9 +205,11 @@ def plotted(scene: Scene, history: History, folder: Path) -> list[Path]:
 
 
 @command(
-    "draw heights and force of a run over time, and its final surface", PLOT_EXAMPLES,
-    RUN, {"--out DIR": (Path, "output folder; default: the run folder")},
-)  # fmt: skip
+    "draw heights and force of a run over time, and its final surface",
+    PLOT_EXAMPLES,
+    RUN,
+    {"--out DIR": (Path, "output folder; default: the run folder")},
+)
 def plot(arguments: Namespace) -> int:
     """Plot."""
     folder: Path = arguments.out or arguments.run

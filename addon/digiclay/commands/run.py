@@ -193,8 +193,8 @@ def plan_meshes(
 
     def later(run: Path) -> list[str]:
         instant = [] if row == -1 else ["--time", repr(float(history["time"][row]))]
-        place = ["--out", str(run / within)] if within else []
-        return ["export", str(run), "--format", ",".join(kinds), *instant, *place]
+        options = ["--out", str(run / within)] if within else []
+        return ["export", str(run), "--format", ",".join(kinds), *instant, *options]
 
     return Extra([f"{within}/{name}" if within else name for name in file_names(kinds)], make, later)
 

@@ -44,10 +44,11 @@ SYNTAX = "START:STOP:COUNT, START:STOP:COUNT:log or A,B,C"
 
 
 @command(
-    "run a scene over a grid of parameter values", EXAMPLES,
+    "run a scene over a grid of parameter values",
+    EXAMPLES,
     partial(add_series, syntax=SYNTAX, metrics="rfd,lag", varied="VALUES"),
     description="Run a scene at many points of its parameters.",
-)  # fmt: skip
+)
 def carry_out(arguments: argparse.Namespace) -> int:
     """Run what is not done yet, and write the table and the pictures."""
     names = read_metrics(arguments.metric)

@@ -167,7 +167,7 @@ class Processes(Generic[Started]):
                     yield piece, describe_error(error)
                 else:
                     running += [(piece, process)] if process else []
-            ended = [found for found in running if found[1].process.poll() is not None]
+            ended = [pair for pair in running if pair[1].process.poll() is not None]
             for piece, process in ended:
                 running.remove((piece, process))
                 self.wait(process)

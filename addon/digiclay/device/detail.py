@@ -59,7 +59,7 @@ def _regions(window: Window) -> Iterator[tuple[Region, RegionView3D]]:
     """Give the regions of a window's 3D views, with where each looks from."""
     for area in window.screen.areas:
         if area.type == "VIEW_3D":
-            region = next(one for one in area.regions if one.type == "WINDOW")
+            region = next(part for part in area.regions if part.type == "WINDOW")
             yield region, area.spaces.active.region_3d
 
 

@@ -50,8 +50,8 @@ class Instant:
     def __post_init__(self) -> None:
         for name in ARRAYS:
             array = np.array(getattr(self, name), np.int8 if name == "mode" else np.float64)
-            one = name == "fingertip" and array.shape == (1, 7)
-            object.__setattr__(self, name, array[0] if one else array)
+            single = name == "fingertip" and array.shape == (1, 7)
+            object.__setattr__(self, name, array[0] if single else array)
 
     @classmethod
     def of(cls, history: Mapping[str, Any], index: int = -1, **sizes: Any) -> Instant:

@@ -40,24 +40,24 @@ def node(
     **settings: object,
 ) -> Node:
     """Add a node at a place of a coarse grid; each input gets a value, an output, or a list of outputs."""
-    made = tree.nodes.new(kind)
-    made.location = (220.0 * column, -180.0 * row)
+    node = tree.nodes.new(kind)
+    node.location = (220.0 * column, -180.0 * row)
     for name, value in settings.items():
-        setattr(made, name, value)
+        setattr(node, name, value)
     for name, value in (inputs or {}).items():
-        link(tree, value, enabled(made.inputs, name))
-    return made
+        link(tree, value, enabled(node.inputs, name))
+    return node
 
 
-def link(tree: NodeTree, value: Value, place: NodeSocket) -> None:
+def link(tree: NodeTree, value: Value, target: NodeSocket) -> None:
     """Give an input a value, an output, or a list of outputs in the order in which they are to be linked."""
     if isinstance(value, list):
         for each in value:
-            tree.links.new(each, place)
+            tree.links.new(each, target)
     elif isinstance(value, bpy.types.NodeSocket):
-        tree.links.new(value, place)
+        tree.links.new(value, target)
     else:
-        place.default_value = value
+        target.default_value = value
 
 
 def enabled(sockets: NodeInputs | NodeOutputs, name: str) -> NodeSocket:
@@ -75,23 +75,23 @@ def new_tree(name: str) -> NodeTree:
 
 def socket(tree: NodeTree, name: str, kind: str, default: Value, description: str) -> None:
     """Add a setting to a tree, which each object that uses the tree has for itself."""
-    made = tree.interface.new_socket(name, in_out="INPUT", socket_type=kind)
-    made.default_value = default
-    made.description = description
+    setting = tree.interface.new_socket(name, in_out="INPUT", socket_type=kind)
+    setting.default_value = default
+    setting.description = description
 
 
 def attribute(tree: NodeTree, name: Value, kind: str, column: float, row: float) -> NodeSocket:
     """Add a node that reads an attribute of the vertices of a name or text of nodes; return its output."""
-    made = node(tree, "GeometryNodeInputNamedAttribute", column, row, {"Name": name}, data_type=kind)
-    return enabled(made.outputs, "Attribute")
+    reader = node(tree, "GeometryNodeInputNamedAttribute", column, row, {"Name": name}, data_type=kind)
+    return enabled(reader.outputs, "Attribute")
 
 
 def number(tree: NodeTree, operation: str, column: float, row: float, *values: Value) -> NodeSocket:
     """Add a node that reckons with numbers or with outputs of other nodes; return its output."""
-    made = node(tree, "ShaderNodeMath", column, row, operation=operation)
-    for place, value in zip(made.inputs, values, strict=False):
-        link(tree, value, place)
-    return made.outputs["Value"]
+    math_node = node(tree, "ShaderNodeMath", column, row, operation=operation)
+    for target, value in zip(math_node.inputs, values, strict=False):
+        link(tree, value, target)
+    return math_node.outputs["Value"]
 
 
 def switch(
@@ -110,8 +110,8 @@ def combine(tree: NodeTree, column: float, row: float, **parts: Value) -> NodeSo
 
 def read_height(tree: NodeTree, row: float) -> NodeSocket:
     """Add the nodes that read the height of a vertex; return their output."""
-    place = node(tree, "GeometryNodeInputPosition", 0, row).outputs["Position"]
-    return node(tree, "ShaderNodeSeparateXYZ", 1, row, {"Vector": place}).outputs["Z"]
+    position = node(tree, "GeometryNodeInputPosition", 0, row).outputs["Position"]
+    return node(tree, "ShaderNodeSeparateXYZ", 1, row, {"Vector": position}).outputs["Z"]
 
 
 def mesh_of(tree: NodeTree, thing: Object, column: float, row: float) -> NodeSocket:
@@ -124,8 +124,8 @@ def sample(
 ) -> NodeSocket:
     """Add the node that reads a value of other vertices, by their place; return its output."""
     given = {"Geometry": table, "Value": value, "Index": index}
-    made = node(tree, "GeometryNodeSampleIndex", column, row, given, data_type=kind, domain="POINT")
-    return enabled(made.outputs, "Value")
+    sampler = node(tree, "GeometryNodeSampleIndex", column, row, given, data_type=kind, domain="POINT")
+    return enabled(sampler.outputs, "Value")
 
 
 def store(
@@ -133,8 +133,8 @@ def store(
 ) -> NodeSocket:
     """Add the node that stores a value at every vertex; return its geometry."""
     given = {"Geometry": table, "Name": name, "Value": value}
-    made = node(tree, "GeometryNodeStoreNamedAttribute", column, row, given, data_type=kind, domain="POINT")
-    return made.outputs["Geometry"]
+    writer = node(tree, "GeometryNodeStoreNamedAttribute", column, row, given, data_type=kind, domain="POINT")
+    return writer.outputs["Geometry"]
 
 
 def bed_nodes(sources: Sources, deck: float, length: float, unit: float) -> NodeTree:
@@ -329,7 +329,7 @@ def _sum(tree: NodeTree, table: NodeSocket, names: list[NodeSocket], column: flo
         weight = attribute(tree, name, "FLOAT_VECTOR", column, row + 8 + step)
         there = sample(tree, table, pair, "FLOAT_VECTOR", at, column + 1, row + 5 + step)
         dot = node(tree, "ShaderNodeVectorMath", column + 2, row + 5 + step, operation="DOT_PRODUCT")
-        for place, value in zip(dot.inputs, (there, weight), strict=False):
-            link(tree, value, place)
+        for target, value in zip(dot.inputs, (there, weight), strict=False):
+            link(tree, value, target)
         parts.append(dot.outputs["Value"])
     return number(tree, "ADD", column + 3, row + 5, *parts)

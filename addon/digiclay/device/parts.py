@@ -47,12 +47,12 @@ def marked(
     data: ID | None, name: str, role: str, *collections: Collection, parent: Object | None = None
 ) -> Object:
     """Make an object of data (None: an empty) in some collections, marked with its role."""
-    made = bpy.data.objects.new(name, data)
-    made[roles.ROLE] = role
-    made.parent = parent
+    thing = bpy.data.objects.new(name, data)
+    thing[roles.ROLE] = role
+    thing.parent = parent
     for collection in collections:
-        collection.objects.link(made)
-    return made
+        collection.objects.link(thing)
+    return thing
 
 
 def material(name: str, color: tuple[float, float, float], roughness: float, alpha: float = 1.0) -> Material:
@@ -60,15 +60,15 @@ def material(name: str, color: tuple[float, float, float], roughness: float, alp
     existing = next((m for m in bpy.data.materials if m.get(roles.ROLE) == name), None)
     if existing is not None:
         return existing
-    made = bpy.data.materials.new(f"Digital Clay {name.replace('_', ' ')}")
-    made[roles.ROLE] = name
-    made.diffuse_color = bridge.linear(color, alpha)
-    made.roughness = roughness
-    shader = next(node for node in shader_nodes(made).nodes if node.type == "BSDF_PRINCIPLED")
+    material = bpy.data.materials.new(f"Digital Clay {name.replace('_', ' ')}")
+    material[roles.ROLE] = name
+    material.diffuse_color = bridge.linear(color, alpha)
+    material.roughness = roughness
+    shader = next(node for node in shader_nodes(material).nodes if node.type == "BSDF_PRINCIPLED")
     shader.inputs["Base Color"].default_value = bridge.linear(color)
     shader.inputs["Roughness"].default_value = roughness
     shader.inputs["Alpha"].default_value = alpha
-    return made
+    return material
 
 
 class SkinMeshes(NamedTuple):
@@ -171,9 +171,9 @@ def make_meshes(lattice: SkinLattice, deck: float, materials: Sequence[Material]
 
 def _points(name: str, count: int) -> Mesh:
     """Make a mesh of loose vertices."""
-    made = bpy.data.meshes.new(name)
-    made.vertices.add(count)
-    return made
+    mesh = bpy.data.meshes.new(name)
+    mesh.vertices.add(count)
+    return mesh
 
 
 def _write_neighbors(mesh: Mesh, step: Pass) -> None:
@@ -188,8 +188,8 @@ def _write_weights(mesh: Mesh, step: Pass) -> None:
         mesh.attributes.new(name, "INT", "POINT").data.foreach_set("value", values)
     for kind, weights in step.weights.items():
         for name, share in zip(WEIGHTS, weights, strict=True):
-            made = mesh.attributes.new(name + kind, "FLOAT2", "POINT")
-            made.data.foreach_set("vector", share.astype(np.float32).ravel())
+            attribute = mesh.attributes.new(name + kind, "FLOAT2", "POINT")
+            attribute.data.foreach_set("vector", share.astype(np.float32).ravel())
 
 
 def make_fingertip(bed: Object, number: int = 1, palm: Object | None = None) -> Object:
@@ -197,20 +197,20 @@ def make_fingertip(bed: Object, number: int = 1, palm: Object | None = None) -> 
     homes = bed.users_collection
     # The empty carries the pose alone. Its scale is locked: the fingertip's size is a parameter
     # of the device, kept in the ellipsoid's scale.
-    made = marked(None, name_fingertip(number), roles.FINGERTIP, *homes, parent=palm or bed)
-    hold_fingertip(bed, number, made)
-    made.empty_display_type, made.show_in_front = "PLAIN_AXES", True
-    made.rotation_mode = "QUATERNION"
-    made.lock_scale = (True, True, True)
+    tip = marked(None, name_fingertip(number), roles.FINGERTIP, *homes, parent=palm or bed)
+    hold_fingertip(bed, number, tip)
+    tip.empty_display_type, tip.show_in_front = "PLAIN_AXES", True
+    tip.rotation_mode = "QUATERNION"
+    tip.lock_scale = (True, True, True)
     mesh = bridge.mesh("Digital Clay Ellipsoid", primitives.ball())
     mesh.materials.append(None)
-    ball = marked(mesh, mesh.name, roles.ELLIPSOID, *homes, parent=made)
-    made[roles.BALL] = ball
-    made[roles.OWNED] = ball[roles.OWNED] = True
+    ball = marked(mesh, mesh.name, roles.ELLIPSOID, *homes, parent=tip)
+    tip[roles.BALL] = ball
+    tip[roles.OWNED] = ball[roles.OWNED] = True
     lock_in_place(ball)
     ball.material_slots[0].link = "OBJECT"
-    color_fingertip(made, number, clear=False)
-    return made
+    color_fingertip(tip, number, clear=False)
+    return tip
 
 
 def name_fingertip(number: int) -> str:
@@ -238,10 +238,10 @@ def hold_fingertip(bed: Object, number: int, tip: Object) -> None:
 
 def make_palm(bed: Object) -> Object:
     """Make the palm of a hand over a bed: an empty that moves its fingertips as one."""
-    made = marked(None, "Digital Clay Hand", roles.PALM, *bed.users_collection, parent=bed)
-    made[roles.OWNED] = True
-    made.empty_display_type, made.empty_display_size = "CUBE", PALM_SIZE * SCALE
-    return made
+    palm = marked(None, "Digital Clay Hand", roles.PALM, *bed.users_collection, parent=bed)
+    palm[roles.OWNED] = True
+    palm.empty_display_type, palm.empty_display_size = "CUBE", PALM_SIZE * SCALE
+    return palm
 
 
 def lock_in_place(ball: Object) -> None:
@@ -254,7 +254,7 @@ def color_fingertip(tip: Object, number: int, *, clear: bool) -> None:
     """Give the ellipsoid of a fingertip the color of its number, opaque, or clear so that arrows are seen."""
     ball = roles.ellipsoid(tip)
     if ball is not None:
-        place = (number - 1) % len(FINGER_COLORS)
-        kind, color = (f"fingertip_{place + 1}", FINGER_COLORS[place]) if place else ("fingertip", SKIN)
+        index = (number - 1) % len(FINGER_COLORS)
+        kind, color = (f"fingertip_{index + 1}", FINGER_COLORS[index]) if index else ("fingertip", SKIN)
         name, alpha = (f"{kind}_clear", CLEAR) if clear else (kind, 1.0)
         ball.material_slots[0].material = material(name, color, roughness=0.4, alpha=alpha)

@@ -82,10 +82,10 @@ def find_faults(known: frozenset[int], mended: frozenset[int] = frozenset()) -> 
     tips = _standing(FINGERTIP)
     bare += [tip for tip in tips if _lacks_part(tip, BALL, known, mended)]
     beds = _standing(BED)
-    held, own = {bed.get(name) for bed in beds for name in FINGERS}, {tip for _, _, tip in _tips()}
+    held, tips_of_beds = {bed.get(name) for bed in beds for name in FINGERS}, {tip for _, _, tip in _tips()}
     # Held, but by another bed: it was given to this one.
     come = [tip for tip in tips if (tip in held) == (tip.session_uid in known - mended)]
-    loose = [(tip, bed) for tip in come if tip not in own and (bed := owner_of(tip)) in beds]
+    loose = [(tip, bed) for tip in come if tip not in tips_of_beds and (bed := owner_of(tip)) in beds]
     mine = [thing for thing in bpy.data.objects if thing.get(OWNED) and not thing.library]
     # Deleted along with its bed a fingertip may stand nowhere, and have no user any more.
     left = [thing for thing in mine if not thing.users or (is_linked(thing) and _is_orphan(thing))]
@@ -94,18 +94,18 @@ def find_faults(known: frozenset[int], mended: frozenset[int] = frozenset()) -> 
     return Faults(bare, loose, left, strewn)
 
 
-def repair(found: Faults) -> None:
+def repair(faults: Faults) -> None:
     """Put right what was found."""
-    for thing in found.strewn:
+    for thing in faults.strewn:
         _unlink(thing)
-    for owner in found.bare:
+    for owner in faults.bare:
         if owner.get(ROLE) == FINGERTIP:
             _copy(owner, BALL)
         else:
             _complete(owner)
-    for tip, bed in found.loose:
+    for tip, bed in faults.loose:
         _adopt(tip, bed)
-    _remove(found.left)
+    _remove(faults.left)
 
 
 def give_fingertip(bed: Object, scene: Scene) -> str:
@@ -168,11 +168,11 @@ def _tips() -> Iterator[tuple[Object, int, Object]]:
 
 def _lacking(owner: Object, known: frozenset[int], mended: frozenset[int]) -> Iterator[str]:
     """Give the properties of a bed or a palm whose fingertips it is to get."""
-    own = fingertips_of(owner)
-    if not own and owner.get(ROLE) == BED and _lacks_part(owner, FINGER, known, mended):
+    tips = fingertips_of(owner)
+    if not tips and owner.get(ROLE) == BED and _lacks_part(owner, FINGER, known, mended):
         yield FINGER
     for number, name in enumerate(FINGERS, 1):
-        part = owner.get(name) if number not in own else None
+        part = owner.get(name) if number not in tips else None
         if part is not None and is_linked(part) and _lacks_part(owner, name, known, mended):
             yield name
 
@@ -212,14 +212,14 @@ def _is_orphan(part: Object) -> bool:
 
 def _complete(owner: Object) -> None:
     """Give a bed, or a palm, fingertips: copies of those it holds and does not own, or a new one."""
-    bed, own = owner if owner[ROLE] == BED else owner_of(owner), fingertips_of(owner)
+    bed, tips = owner if owner[ROLE] == BED else owner_of(owner), fingertips_of(owner)
     for number, name in enumerate(FINGERS, 1):
         tip = owner.get(name)
-        if tip is None or number in own or bed is None:
+        if tip is None or number in tips or bed is None:
             continue
         if _holder(tip, owner) == owner:
             _stand(bed, tip)
-        elif is_linked(tip) or (number == 1 and not own):
+        elif is_linked(tip) or (number == 1 and not tips):
             above = owner if owner != bed else _find_palm(bed, name)
             if owner_of(tip) is not None and tip not in fingertips_of(owner_of(tip)).values():
                 tip.parent = above  # it was copied along
@@ -249,10 +249,10 @@ def _find_palm(bed: Object, name: str) -> Object | None:
     palm = owner_of(tip, PALM)
     if palm is None or tip.parent != palm:
         return bed
-    mine = (one for one in _standing(PALM) if one.parent == bed and one.get(name) is not None)
-    own = [one for one in mine if one[name].parent == palm]
-    if own:
-        return own[0]
+    mine = (palm for palm in _standing(PALM) if palm.parent == bed and palm.get(name) is not None)
+    copies = [one for one in mine if one[name].parent == palm]
+    if copies:
+        return copies[0]
     return _duplicate(palm, bed, bed)
 
 
@@ -284,22 +284,22 @@ def _copy(owner: Object, held: str, parent: Object | None = None) -> None:
 
 def _duplicate(thing: Object, parent: Object, owner: Object) -> Object:
     """Return a copy of an object below another, its animation its own, that stands where its owner does."""
-    made = thing.copy()
-    own_curves(made)
-    made.parent = parent
+    copy = thing.copy()
+    own_curves(copy)
+    copy.parent = parent
     if thing.parent is None or ROLE not in thing.parent:  # it stands on its bed as the other one on its own
-        made.matrix_parent_inverse.identity()
+        copy.matrix_parent_inverse.identity()
         home = owner_of(thing) or parent
-        made.matrix_basis = home.matrix_world.inverted() @ thing.matrix_world
+        copy.matrix_basis = home.matrix_world.inverted() @ thing.matrix_world
     for collection in owner.users_collection:
-        collection.objects.link(made)
-    return made
+        collection.objects.link(copy)
+    return copy
 
 
-def _remove(found: list[Object]) -> None:
+def _remove(left: list[Object]) -> None:
     """Remove parts; what is still held by another stands nowhere from then on, and can be had back."""
-    for part in found:
-        for child in [one for one in part.children if ROLE not in one]:
+    for part in left:
+        for child in [thing for thing in part.children if ROLE not in thing]:
             # What the user has hung on a part stays where it is.
             where = child.matrix_world.copy()
             child.parent = None
@@ -307,7 +307,7 @@ def _remove(found: list[Object]) -> None:
         for collection in part.users_collection:
             collection.objects.unlink(part)
     # Also what Blender has kept of things deleted before, since those still held it.
-    bpy.data.batch_remove([one for one in bpy.data.objects if one.get(OWNED) and not one.users])
+    bpy.data.batch_remove([thing for thing in bpy.data.objects if thing.get(OWNED) and not thing.users])
 
 
 def _unlink(thing: Object) -> None:
@@ -315,7 +315,9 @@ def _unlink(thing: Object) -> None:
     for scene in bpy.data.scenes:
         for owner in (scene.collection, *scene.collection.children_recursive):
             for child in list(owner.children):
-                if thing.name in child.objects and all(one.get(ROLE) in (PIN, BAKE) for one in child.objects):
+                if thing.name in child.objects and all(
+                    part.get(ROLE) in (PIN, BAKE) for part in child.objects
+                ):
                     owner.children.unlink(child)
             if thing.name in owner.objects and owner.objects[thing.name] == thing:
                 owner.objects.unlink(thing)

@@ -122,11 +122,11 @@ def find_modifier(bed: Object) -> Modifier | None:
 
 def require_modifier(bed: Object) -> Modifier:
     """Return the modifier that draws the pins, or refuse a bed without. Raises DigiclayError."""
-    found = find_modifier(bed)
-    if found is None:
+    modifier = find_modifier(bed)
+    if modifier is None:
         rule = "must have the geometry nodes modifier that draws its pins (got none)"
         raise DigiclayError(f"{bed.name} {rule}. Undo its removal.")
-    return found
+    return modifier
 
 
 def is_drawn(bed: Object) -> bool:
@@ -223,11 +223,11 @@ def sources_of(bed: Object) -> Collection | None:
     return _read_node(bed, SOURCES, "Collection")
 
 
-def _read_node(bed: Object, name: str, place: str) -> ID | None:
+def _read_node(bed: Object, name: str, input_name: str) -> ID | None:
     """Return what an input of one of a bed's geometry nodes is set to; None without."""
     modifier = find_modifier(bed)
     drawn = modifier.node_group.nodes.get(name) if modifier else None
-    return None if drawn is None else drawn.inputs[place].default_value
+    return None if drawn is None else drawn.inputs[input_name].default_value
 
 
 def underside(bed: Object) -> float:

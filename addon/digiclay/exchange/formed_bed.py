@@ -33,9 +33,9 @@ def read_formed(bed: Object) -> Formed:
     cells = bridge.read_cells(bed.data) | _of_session(bed)
     before: float | Floats = _scene(bed).actuator.rest_height
     if has_reference(bed):
-        kept = np.empty(len(cells["height"]), np.float32)
-        bed.data.attributes[FORMER].data.foreach_get("value", kept)
-        before = kept.astype(np.float64)
+        former = np.empty(len(cells["height"]), np.float32)
+        bed.data.attributes[FORMER].data.foreach_get("value", former)
+        before = former.astype(np.float64)
     return Formed.of(cells["position"], cells["height"], before, cells["force"], cells["mode"])
 
 
@@ -109,11 +109,11 @@ UPWARDS = 1e-6
 
 def make_object(body: Body, name: str, *, smooth: bool) -> Object:
     """Return a new object, in no collection yet, of a body that has values; `smooth` shades its skin."""
-    made = bpy.data.objects.new(name, _mesh(body, name, smooth=smooth))
+    thing = bpy.data.objects.new(name, _mesh(body, name, smooth=smooth))
     for number, group in enumerate(body.groups, 1):
         members = np.flatnonzero(body.vertex_group == number).tolist()
-        made.vertex_groups.new(name=group).add(members, 1.0, "REPLACE")
-    return made
+        thing.vertex_groups.new(name=group).add(members, 1.0, "REPLACE")
+    return thing
 
 
 def _mesh(body: Body, name: str, *, smooth: bool) -> Mesh:

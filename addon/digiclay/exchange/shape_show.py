@@ -53,8 +53,8 @@ def read_relief(thing: Object, bed: Object, depsgraph: Depsgraph) -> ShapeMesh:
         mesh.loop_triangles.foreach_get("vertices", faces)
     finally:
         evaluated.to_mesh_clear()
-    way = np.array(bed.matrix_world.inverted() @ thing.matrix_world, np.float64)
-    vertices = places.reshape(-1, 3) @ way[:3, :3].T + way[:3, 3]
+    matrix = np.array(bed.matrix_world.inverted() @ thing.matrix_world, np.float64)
+    vertices = places.reshape(-1, 3) @ matrix[:3, :3].T + matrix[:3, 3]
     triangles = faces.reshape(-1, 3).astype(np.int64)
     return make_shape_mesh(thing.name, vertices / bridge.SCALE, triangles, "z", 1.0)
 

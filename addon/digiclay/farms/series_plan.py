@@ -45,8 +45,8 @@ class Task:
 
     def list_arguments(self, series: str) -> list[str]:
         """Return the arguments of digiclay for a series in a folder."""
-        place = f"{series.rstrip('/')}/{self.folder}" if self.folder else series
-        return [self.command, place, *self.options]
+        folder = f"{series.rstrip('/')}/{self.folder}" if self.folder else series
+        return [self.command, folder, *self.options]
 
 
 def plan_series(series: JobSeries, chunk: int) -> tuple[Task, ...]:
@@ -67,15 +67,15 @@ def _plan_job(job: Job, outputs: Outputs, chunk: int) -> list[Task]:
     kinds = [kind for kind in MOVING if getattr(outputs, kind)]
     folder, first = f"jobs/{job.name}", f"{job.name}: run"
     word = find_word(job.scene)
-    own = ("--method", word) if word else ()
-    part = (*own, "--only", "run") if kinds else own
+    method = ("--method", word) if word else ()
+    part = (*method, "--only", "run") if kinds else method
     tasks = [Task(first, "runs", "job", folder, part, blender=outputs.still is not None)]
     for kind in kinds:
         try:
             count = getattr(outputs, kind).count(time)
         except DigiclayError as error:
             raise OutputError(f"{job.name}: {error}") from None
-        only, frames = (*own, "--only", kind), f"{job.name}: frames of {kind}"
+        only, frames = (*method, "--only", kind), f"{job.name}: frames of {kind}"
         tasks += [
             Task(frames, "frames", "job", folder, only, (first,), True, range(0, count, chunk)),
             Task(f"{job.name}: {kind}", "films", "job", folder, only, (frames,), True),
@@ -122,13 +122,13 @@ LONGEST, GRACE = 64, 30
 PROGRAMS = {"-m": "Python", "--background": "Blender", "": "Digiclay"}
 
 
-def write_openjd(made: Submission) -> Written:
+def write_openjd(submission: Submission) -> Written:
     """Return the job template of OpenJD."""
-    path, *leading = made.program
-    program, steps = PROGRAMS[leading[0] if leading else ""], _name_steps(made.tasks)
+    path, *leading = submission.program
+    program, steps = PROGRAMS[leading[0] if leading else ""], _name_steps(submission.tasks)
     template = {
         "specificationVersion": "jobtemplate-2023-09",
-        "name": made.name,
+        "name": submission.name,
         "description": "A series of digiclay: runs, frames, films and the page.",
         "parameterDefinitions": [
             {
@@ -147,12 +147,13 @@ def write_openjd(made: Submission) -> Written:
                 "description": f"The path of {program}; it is started with: {' '.join([*leading, 'job'])}",
             },
         ],
-        "steps": [_make_step(task, steps, program, leading) for task in made.tasks],
+        "steps": [_make_step(task, steps, program, leading) for task in submission.tasks],
     }
     name = "openjd.json"
+    file = submission.find(name)
     return {name: format_json(template).decode()}, [
-        f"check: {made.show('openjd', 'check', made.find(name))}",
-        f"run on this machine: {made.show('openjd', 'run', made.find(name), '-p', f'{program}={path}')}",
+        f"check: {submission.show('openjd', 'check', file)}",
+        f"run on this machine: {submission.show('openjd', 'run', file, '-p', f'{program}={path}')}",
     ]
 
 
@@ -189,9 +190,9 @@ SCRIPT = Path(__file__).with_name("digiclay_series.js")
 PLATFORMS = {"win32": "windows", "darwin": "darwin"}
 
 
-def write_flamenco(made: Submission) -> Written:
+def write_flamenco(submission: Submission) -> Written:
     """Return the job type of Flamenco, and the job as its Manager takes it."""
-    parts = split_frames(made.tasks)
+    parts = split_frames(submission.tasks)
     places = {part.name: number for number, part in enumerate(parts)}
     plan = [
         {
@@ -205,39 +206,40 @@ def write_flamenco(made: Submission) -> Written:
         for part in parts
     ]
     table = {
-        "name": made.name,
+        "name": submission.name,
         "type": SCRIPT.stem.replace("_", "-"),
         "priority": 50,
         "submitter_platform": PLATFORMS.get(sys.platform, "linux"),
         "metadata": {"project": "digiclay"},
         "settings": {
-            "program": made.program[0],
-            "program_args": json.dumps(made.program[1:], ensure_ascii=False),
-            "series": made.series,
+            "program": submission.program[0],
+            "program_args": json.dumps(submission.program[1:], ensure_ascii=False),
+            "series": submission.series,
             "tasks": json.dumps(plan, ensure_ascii=False),
         },
     }
     script, job = f"flamenco/{SCRIPT.name}", "flamenco/job.json"
-    post = ("curl", "--header", "Content-Type: application/json", "--data-binary", f"@{made.find(job)}")
+    post = ("curl", "--header", "Content-Type: application/json", "--data-binary", f"@{submission.find(job)}")
     return {script: SCRIPT.read_text(encoding="utf-8"), job: format_json(table).decode()}, [
-        f"once: put {made.find(script)} into the folder 'scripts' beside flamenco-manager, and restart it",
-        f"submit: {made.show(*post, 'http://MANAGER:8080/api/v3/jobs')}",
+        f"once: put {submission.find(script)} into the folder 'scripts' beside flamenco-manager, "
+        "and restart it",
+        f"submit: {submission.show(*post, 'http://MANAGER:8080/api/v3/jobs')}",
     ]
 
 
-def write_cuecmd(made: Submission) -> Written:
+def write_cuecmd(submission: Submission) -> Written:
     """Return lists of commands for OpenCue, in the order in which they are to be submitted."""
     depth: dict[str, int] = {}
     lists: dict[tuple[int, str], list[str]] = {}
-    for task in split_frames(made.tasks):
+    for task in split_frames(submission.tasks):
         depth[task.name] = 1 + max((depth[need] for need in task.needs), default=0)
-        line = made.show(*made.program, *task.list_arguments(made.series))
+        line = submission.show(*submission.program, *task.list_arguments(submission.series))
         lists.setdefault((depth[task.name], task.stage), []).append(line)
     files = {
         f"cuecmd/{number}-{stage}.txt": "\n".join(lines) + "\n"
         for (number, stage), lines in sorted(lists.items())
     }
-    submits = [made.show("cuecmd", made.find(name)) for name in files]
+    submits = [submission.show("cuecmd", submission.find(name)) for name in files]
     return files, ["submit each when the one before has ended:", *submits]
 
 

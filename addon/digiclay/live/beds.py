@@ -132,7 +132,7 @@ def write(bed: Object, running: Running, before: Running | None = None) -> None:
         return
     bed.data[TICK] = running.tick
     now, started = running.standing, running.stroke_start.tick if running.stroke_start else 0
-    ticks = [one.tick for one in running.gestures if one.tick < now.tick]
+    ticks = [gesture.tick for gesture in running.gestures if gesture.tick < now.tick]
     queue = json.dumps([started, ticks, list(map(drawn.dump, running.drawn))])
     names = bytes(name_fingers(running.numbers, len(now.poses)))
     values = (STATE, now.snapshot), (POSE, now.poses.tobytes()), (NUMBERS, names), (QUEUE, queue)

@@ -70,8 +70,8 @@ def read_fingers(data: bytes) -> dict[int, Floats] | None:
     head = _pad(FINGERS) + _pad(",h" + count * "hdddddddd")
     if not data.startswith(head) or len(data) != len(head) + 8 + count * FINGER.size:
         return None
-    found = {one: _check_pose(pose) for one, _, *pose in FINGER.iter_unpack(data[len(head) + 8 :])}
-    return {one: pose for one, pose in found.items() if pose is not None}
+    poses = {identity: _check_pose(pose) for identity, _, *pose in FINGER.iter_unpack(data[len(head) + 8 :])}
+    return {identity: pose for identity, pose in poses.items() if pose is not None}
 
 
 def _check_pose(values: Sequence[float]) -> Floats | None:
@@ -192,11 +192,11 @@ def place(uid: int, poses: Floats) -> Floats:
     """
     following, placed = SERVERS.by_bed[uid], poses.copy()
     before = (*following.seats, *[None] * len(poses))[: len(poses)]
-    seats = [one if one in following.fingers else None for one in before]
-    for one in following.fingers:
+    seats = [identity if identity in following.fingers else None for identity in before]
+    for name in following.fingers:
         free = [row for row, seat in enumerate(seats) if seat is None]
-        if one not in seats and free:
-            seats[min(free, key=lambda row: before[row] is None)] = one
+        if name not in seats and free:
+            seats[min(free, key=lambda row: before[row] is None)] = name
     for row, (was, now) in enumerate(zip(before, seats, strict=True)):
         if now is not None:
             placed[row] = following.fingers[now]

@@ -142,7 +142,7 @@ def take_up(context: Context, bed: Object, session: Running) -> Running:
 
 def has_strokes() -> bool:
     """Return whether a session has a stroke to finish that the hand has drawn, and is free to do so."""
-    free = (one for one in running.list_sessions() if not (one.paused or one.blocking_reason))
+    free = (session for session in running.list_sessions() if not (session.paused or session.blocking_reason))
     return any(session.strokes and not session.strokes[0].held for session in free)
 
 

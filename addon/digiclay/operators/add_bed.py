@@ -149,8 +149,8 @@ class AddBed(Placed, Action, Operator):
     def invoke(self, context: Context, event: Event) -> Result:
         """Add the bed to design on unless another is chosen."""
         if not self.properties.is_property_set("bed"):
-            own = self.properties.is_property_set
-            given = {name: getattr(self, name) for name in plan(FIRST) if own(name)}
+            is_set = self.properties.is_property_set
+            given = {name: getattr(self, name) for name in plan(FIRST) if is_set(name)}
             self.bed = FIRST
             for name, value in given.items():
                 setattr(self, name, value)
@@ -169,11 +169,13 @@ class AddBed(Placed, Action, Operator):
 
 
 @action(
-    "digiclay.rebuild", "Rebuild", cannot_change,
+    "digiclay.rebuild",
+    "Rebuild",
+    cannot_change,
     session_runs.reworded("Stop the session first: its pins cannot be exchanged"),
     baked.reworded("Free the bake in the Takes panel first: it moves the pins there are now"),
     edited.reworded("Leave Edit Mode first"),
-)  # fmt: skip
+)
 def rebuild_bed(operator: Operator, context: Context) -> None:
     """Make pins and housing from the settings; the formed surface is lost, the fingertip stays"""
     layout = rebuild(bed_of(context)).layout
@@ -250,10 +252,14 @@ def entry(menu: Menu, context: Context) -> None:
 
 
 @action(
-    "import_scene.digital_clay_run", "Import Digital Clay Run", no_collection, bases=(FileAction, Placed),
-    options=("REGISTER", "UNDO", "PRESET"), **file_of("*.npz", "SKIP_PRESET"),
+    "import_scene.digital_clay_run",
+    "Import Digital Clay Run",
+    no_collection,
+    bases=(FileAction, Placed),
+    options=("REGISTER", "UNDO", "PRESET"),
+    **file_of("*.npz", "SKIP_PRESET"),
     row=integer("Row", "Recorded row to show: 0 is the first, -1 the last", default=-1),
-)  # fmt: skip
+)
 def import_run(operator: Operator, context: Context) -> None:
     """Show one instant of a Digital Clay run as a bed of pins"""
     path = Path(bpy.path.abspath(operator.filepath))
@@ -309,14 +315,19 @@ class OpenScene(AddSceneAction, FileAction, Operator):
 
 
 @action(
-    "digiclay.add_sample", "Digital Clay Sample", inside_edit, no_collection, bases=(AddSceneAction,),
+    "digiclay.add_sample",
+    "Digital Clay Sample",
+    inside_edit,
+    no_collection,
+    bases=(AddSceneAction,),
     sample=choice(
-        "Sample", items=[
+        "Sample",
+        items=[
             *((f"session:{name}", title(name), "A session") for name in list_samples()),
             *((f"shape:{name}", title(name), "A shape on a bed of 25 × 25 pins") for name in list_shapes()),
         ],
     ),
-)  # fmt: skip
+)
 def add_sample(operator: Operator, context: Context) -> None:
     """Add a bed with a sample session or shape of Digital Clay"""
     kind, _, name = operator.sample.partition(":")

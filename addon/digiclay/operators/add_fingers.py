@@ -33,15 +33,17 @@ def add_fingertip(operator: Operator, context: Context) -> None:
     bed = bed_of(context)
     parts.find_free_number(bed)
     x, y = _find_place(bed, np.zeros((1, 2)))
-    (tip,) = made = _add(bed, np.array([[x, y, 0.0]]))
+    (tip,) = tips = _add(bed, np.array([[x, y, 0.0]]))
     select_only(context, tip)
-    reveal(context, bed, [tip[BALL] for tip in made])
+    reveal(context, bed, [tip[BALL] for tip in tips])
 
 
 @action(
-    "digiclay.add_hand", "Add Hand", cannot_form,
+    "digiclay.add_hand",
+    "Add Hand",
+    cannot_form,
     side=choice("Side", "Which hand", items=[("RIGHT", "Right", ""), ("LEFT", "Left", "")]),
-)  # fmt: skip
+)
 def add_hand(operator: Operator, context: Context) -> None:
     """Add the five fingertips of a hand to the bed, on an empty that moves them as one"""
     bed = bed_of(context)
@@ -56,9 +58,9 @@ def add_hand(operator: Operator, context: Context) -> None:
     palm.location = np.array([x, y, _find_top(bed)]) * bridge.SCALE
     palm.location.z += 2.0 * devices.read_finger(bed.digiclay).height * bridge.SCALE
     context.view_layer.update()
-    made = _add(bed, np.column_stack([places + np.array([x, y]), np.arctan2(away[:, 1], away[:, 0])]), palm)
+    tips = _add(bed, np.column_stack([places + np.array([x, y]), np.arctan2(away[:, 1], away[:, 0])]), palm)
     select_only(context, palm)
-    reveal(context, bed, [tip[BALL] for tip in made])
+    reveal(context, bed, [tip[BALL] for tip in tips])
 
 
 def _find_place(bed: Object, places: Floats) -> Floats:
@@ -88,7 +90,7 @@ def _find_top(bed: Object) -> float:
 
 def _add(bed: Object, places: Floats, palm: Object | None = None) -> list[Object]:
     """Add fingertips at places and headings (k, 3), m, rad, above the pins, on a palm; return them."""
-    made, top = [], _find_top(bed)
+    tips, top = [], _find_top(bed)
     for x, y, heading in places:
         number = parts.find_free_number(bed)
         tip = parts.make_fingertip(bed, number, palm)
@@ -98,9 +100,9 @@ def _add(bed: Object, places: Floats, palm: Object | None = None) -> list[Object
         if palm is not None:
             tip.location -= palm.location
         tip.rotation_quaternion = np.cos(heading / 2.0), 0.0, 0.0, np.sin(heading / 2.0)
-        made.append(tip)
+        tips.append(tip)
     view.hold_parts(bed)
-    return made
+    return tips
 
 
 def entries(menu: Menu, context: Context) -> None:

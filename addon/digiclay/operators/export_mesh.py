@@ -283,12 +283,12 @@ class ExportMesh(SurfaceOptions, Operator):
             self.file_format = _format_of(self.filepath) or self.file_format
         target = self._file()
         bed = chosen_bed(context)
-        made = make_bodies(formed_bed.read_formed(bed), self.model(bed), self.finding())
-        files = [(target, made)]
+        every = make_bodies(formed_bed.read_formed(bed), self.model(bed), self.finding())
+        files = [(target, every)]
         if self.separate and self.kind == "features":
             ending = find_suffix(self.file_format)
             stem = target.name.removesuffix(ending)
-            files = [(target.with_name(f"{stem}_{body.name}{ending}"), [body]) for body in made]
+            files = [(target.with_name(f"{stem}_{body.name}{ending}"), [body]) for body in every]
         for path, bodies in files:
             write(bodies, path, self.unit, self.file_format, *self._axes())
         many = len(files) > 1

@@ -107,12 +107,12 @@ class AdjustMixin(Drawing):
 
     def _move(self, context: Context, bed: Object, event: Event) -> None:
         """Follow the mouse sideways; a typed value has precedence."""
-        way, self.before = event.mouse_x - self.before, event.mouse_x
+        pixels, self.before = event.mouse_x - self.before, event.mouse_x
         if not self.text:
             share = PRECISE if event.shift else 1.0
             with context.temp_override(region=self.region):
                 rate = self.rate(bpy.context, bed)
-            self.value = min(max(self.value + way * share * rate, self.low), self.high)
+            self.value = min(max(self.value + pixels * share * rate, self.low), self.high)
 
     def _shown(self) -> float:
         """Return the number as it is shown, and would be set."""
@@ -235,9 +235,11 @@ class AdjustStrength(AdjustMixin, Operator):
 
 
 @action(
-    "digiclay.press_scale", "Scale Fingertip", no_finger,
+    "digiclay.press_scale",
+    "Scale Fingertip",
+    no_finger,
     scalar=number("Factor", "Factor of the size", default=1.1, min=0.1, max=10.0),
-)  # fmt: skip
+)
 def scale_size(operator: Operator, context: Context) -> None:
     """Scale the fingertip; its blister follows"""
     bed: Object = brush.bed_in_use(context)
@@ -279,10 +281,14 @@ def fingers(entries: Menu, context: Context) -> None:
 
 
 @action(
-    "digiclay.press_brush", "Brush Preset", no_tool_in_view, no_finger, options=("UNDO", "INTERNAL"),
+    "digiclay.press_brush",
+    "Brush Preset",
+    no_tool_in_view,
+    no_finger,
+    options=("UNDO", "INTERNAL"),
     filepath=bpy.props.StringProperty(subtype="FILE_PATH", options={"SKIP_SAVE"}),
     menu_idname=bpy.props.StringProperty(default="DIGICLAY_MT_brushes", options={"SKIP_SAVE"}),
-)  # fmt: skip
+)
 def apply_brush(operator: Operator, context: Context) -> None:
     """Set fingertip, brush, stroke and symmetry of the Press tool to those of a preset"""
     settings: OperatorProperties = brush.tool_settings(context)

@@ -447,8 +447,8 @@ def _lay_stroke(settings: OperatorProperties, path: Floats | list[Place], kind: 
     """Return the stroke along a path (k, 2), m, as the tool's settings have it."""
     share = float(settings.strength)
     depth = 1e-3 * share * getattr(settings, brush.amount_name(kind))
-    (x, y), images, kept = path[0], brush.find_images(settings), brush.find_stamp(settings, kind)
-    laid = start(0, x, y, depth, images, kind, share, accumulate=settings.accumulate, stamp=kept)
+    (x, y), images, stamp = path[0], brush.find_images(settings), brush.find_stamp(settings, kind)
+    laid = start(0, x, y, depth, images, kind, share, accumulate=settings.accumulate, stamp=stamp)
     return lay_path(laid, path)
 
 

@@ -145,7 +145,9 @@ class FinishStrokes(Ticking, Modal, Operator):
     def execute(self, context: Context) -> Result:
         """Finish them before anything else, as a script would have it; not what waits, for a hand say."""
         before: list[int] = []
-        while tick.has_strokes() and before != (now := [one.state.period for one in running.list_sessions()]):
+        while tick.has_strokes() and before != (
+            now := [session.state.period for session in running.list_sessions()]
+        ):
             before = now
             self.advance(context, time.perf_counter())
         return {"FINISHED"}
@@ -188,10 +190,10 @@ def _stop(operator: Operator, context: Context) -> bool:
 
 def _other_operators(context: Context) -> frozenset[int]:
     """Return the modal operators of all windows but those that drive sessions."""
-    own = ("DIGICLAY_OT_session", "DIGICLAY_OT_session_go_on")
+    loops = ("DIGICLAY_OT_session", "DIGICLAY_OT_session_go_on")
     windows = context.window_manager.windows
     every = (operator for window in windows for operator in window.modal_operators)
-    return frozenset(operator.as_pointer() for operator in every if operator.bl_idname not in own)
+    return frozenset(operator.as_pointer() for operator in every if operator.bl_idname not in loops)
 
 
 def _resume_later(token: int, window: Window) -> None:
@@ -315,12 +317,16 @@ def rewind_session(operator: Operator, context: Context) -> None:
 
 
 @action(
-    "digiclay.session_reset", "Reset", poll.nothing_to_reset, options=("UNDO",),
+    "digiclay.session_reset",
+    "Reset",
+    poll.nothing_to_reset,
+    options=("UNDO",),
     running_only=flag(
-        "Only While It Runs", "Exclude beds without a session, so that the key cannot reset them by accident",
+        "Only While It Runs",
+        "Exclude beds without a session, so that the key cannot reset them by accident",
         options={"HIDDEN", "SKIP_SAVE"},
     ),
-)  # fmt: skip
+)
 def reset_session(operator: Operator, context: Context) -> Result | None:
     """Return all pins to rest and lift the fingertip off them"""
     active = active_session(context)

@@ -106,17 +106,22 @@ def show_object(operator: Operator, context: Context) -> None:
 
 
 @action(
-    "digiclay.shape_from_file", "Shape from File", *NEEDS, bases=(Shaped, FileAction),
+    "digiclay.shape_from_file",
+    "Shape from File",
+    *NEEDS,
+    bases=(Shaped, FileAction),
     **file_of(";".join(f"*{kind}" for kind in KINDS)),
     up=choice(
-        "Up", "Upward direction of a mesh; automatic: y in a glTF file, else z",
-        items=[("auto", "Automatic", ""), *((way, way.upper(), "") for way in UPWARDS)],
+        "Up",
+        "Upward direction of a mesh; automatic: y in a glTF file, else z",
+        items=[("auto", "Automatic", ""), *((axis, axis.upper(), "") for axis in UPWARDS)],
     ),
     unit=choice(
-        "Unit", "Unit of length of a mesh; automatic: meters in a glTF file, else millimeters",
+        "Unit",
+        "Unit of length of a mesh; automatic: meters in a glTF file, else millimeters",
         items=[("auto", "Automatic", ""), *((unit, unit, "") for unit in LENGTHS)],
     ),
-)  # fmt: skip
+)
 def show_file(operator: Operator, context: Context) -> None:
     """Display a mesh, a picture (bright is high) or a .npy file of heights on the active bed"""
     bed, path = _updated_bed(context), str(Path(bpy.path.abspath(operator.filepath)))
@@ -125,9 +130,12 @@ def show_file(operator: Operator, context: Context) -> None:
 
 
 @action(
-    "digiclay.shape_sample", "Sample Shape", *NEEDS, bases=(Shaped,),
+    "digiclay.shape_sample",
+    "Sample Shape",
+    *NEEDS,
+    bases=(Shaped,),
     sample=choice("Shape", items=[(name, title(name), "") for name in list_shapes()]),
-)  # fmt: skip
+)
 def show_sample(operator: Operator, context: Context) -> None:
     """Display a sample shape of Digital Clay on the active bed"""
     bed = _updated_bed(context)

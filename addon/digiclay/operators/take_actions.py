@@ -55,9 +55,11 @@ def record_take(operator: Operator, context: Context) -> None:
 
 
 @action(
-    "digiclay.take_keep", "Keep Take", no_recording,
+    "digiclay.take_keep",
+    "Keep Take",
+    no_recording,
     name=text("Name", "Name of the take; empty: its number", maxlen=60),
-)  # fmt: skip
+)
 def keep_take(operator: Operator, context: Context) -> Result | None:
     """Stop recording and keep the take in this file"""
     handlers.clear_recovery()
@@ -103,8 +105,8 @@ class ExportTake(FileAction, Operator):
         scene = to_scene(take, entry.name)
         numbers = takes.list_fingers(bed_of(context), entry.number, len(take.scene.fingers))
         if len(numbers) > 1 and numbers[-1] > len(numbers):  # a scene file counts its own from 1 on
-            own = ", ".join(f"{place} = {number}" for place, number in enumerate(numbers, 1))
-            scene = replace(scene, description="Numbers of the fingers here = on the bed: " + own)
+            numbering = ", ".join(f"{row} = {number}" for row, number in enumerate(numbers, 1))
+            scene = replace(scene, description="Numbers of the fingers here = on the bed: " + numbering)
         write_whole(file, format_scene(scene).encode())
         self.report({"INFO"}, localize("{} written to {}", entry.name, file))
 
@@ -116,9 +118,14 @@ def remove_take(operator: Operator, context: Context) -> None:
 
 
 @action(
-    "digiclay.play_strokes", "Play Strokes", cannot_form, session_runs, baked, bases=(FileAction,),
+    "digiclay.play_strokes",
+    "Play Strokes",
+    cannot_form,
+    session_runs,
+    baked,
+    bases=(FileAction,),
     **file_of("*.toml"),
-)  # fmt: skip
+)
 def play(operator: Operator, context: Context) -> None:
     """Form recorded strokes of the Press tool on the bed, from a file, as fast as they can be simulated"""
     recorded = read_strokes(Path(bpy.path.abspath(operator.filepath)))

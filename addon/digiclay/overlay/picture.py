@@ -55,9 +55,9 @@ def choose_colors(back: Color, ink: Color) -> Look:
     )
 
 
-def contrast(one: Color, other: Color) -> float:
+def contrast(first: Color, other: Color) -> float:
     """Return the contrast of two colors, 1 to 21, by the Web Content Accessibility Guidelines."""
-    low, high = sorted((_luminance(one), _luminance(other)))
+    low, high = sorted((_luminance(first), _luminance(other)))
     return (high + 0.05) / (low + 0.05)
 
 
@@ -71,9 +71,9 @@ def make_legible(color: Color, back: Color, least: float) -> Color:
     return end
 
 
-def _mix(one: Color, other: Color, share: float) -> Color:
+def _mix(first: Color, other: Color, share: float) -> Color:
     """Return a color with a share of another."""
-    r, g, b = (a + (c - a) * share for a, c in zip(one, other, strict=True))
+    r, g, b = (a + (c - a) * share for a, c in zip(first, other, strict=True))
     return r, g, b
 
 

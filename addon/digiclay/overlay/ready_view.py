@@ -41,8 +41,8 @@ def light(context: Context) -> None:
     if shown is None or screen is None or not preferences.get(context).light_relief or screen.get(LIT):
         return
     shading = shown[0].spaces.active.shading
-    known = any(each.name == RELIEF["studio_light"] for each in context.preferences.studio_lights)
-    if known and all(getattr(shading, name) == value for name, value in FACTORY.items()):
+    lit = any(each.name == RELIEF["studio_light"] for each in context.preferences.studio_lights)
+    if lit and all(getattr(shading, name) == value for name, value in FACTORY.items()):
         for name, value in RELIEF.items():
             setattr(shading, name, value)
         screen[LIT] = True

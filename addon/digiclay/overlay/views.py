@@ -159,13 +159,13 @@ def find_taken(context: Context, bed: Object, room: Room) -> Room:
     session, numbers = running.find(bed), tuple(fingertips_of(bed))
     numbers, boxes = numbers if len(numbers) > 1 else (), []
     if session is not None:
-        told = replace(
+        readings = replace(
             read_session(bed, session, COLORS),
             fingers=tuple((number, BLACK) for number in numbers),
             finger_force=np.zeros((len(session.trace.time), len(numbers))),
         )
         content = FULL if bed.digiclay_display.overlay_full else COMPACT
-        boxes = lay_out(told, choose_colors(BLACK, WHITE), room, scale, content, corner).boxes
+        boxes = lay_out(readings, choose_colors(BLACK, WHITE), room, scale, content, corner).boxes
     return find_covered(room, scale, corner, boxes[0] if boxes else None, len(numbers))
 
 
@@ -202,7 +202,9 @@ def _mark(
     pins, boxes = list(session.trace.pins), tuple(picture.boxes)
     tops = np.column_stack([session.system.grid.positions[pins], session.state.row(0)[pins]])
     numbers = _list_numbers(session)
-    sizes = np.array([[own.length, own.width, own.height] for own in find_ellipsoids(session.scene)])
+    sizes = np.array(
+        [[finger.length, finger.width, finger.height] for finger in find_ellipsoids(session.scene)]
+    )
     middles = session.poses[: len(numbers), :3] + [0.0, 0.0, 1.0] * sizes[: len(numbers)]
     around = middles[:, None] + sizes[: len(numbers), None] * np.vstack([np.zeros(3), np.eye(3)])
     marks = [(color, 4.0, "") for _, color in zip(pins, colors.pins, strict=False)]

@@ -40,8 +40,8 @@ def declare(
     """Return a decorator that makes a class for Blender of its one method, the docstring included."""
 
     def make(function: Callable[..., Any]) -> Any:
-        own = {"bl_idname": idname, "bl_label": label, method: function, "__doc__": function.__doc__}
-        return type(function.__name__, bases, own | {"__module__": function.__module__} | entries)
+        attributes = {"bl_idname": idname, "bl_label": label, method: function, "__doc__": function.__doc__}
+        return type(function.__name__, bases, attributes | {"__module__": function.__module__} | entries)
 
     return make
 

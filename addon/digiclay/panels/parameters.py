@@ -34,10 +34,10 @@ def presets(entries: Menu, context: Context) -> None:
     """Presets of the core and of the user."""
     for name in PRESETS:
         entries.layout.operator("digiclay.preset_apply", text=title(name)).preset = name
-    own = own_presets.names()
-    if own:
+    names = own_presets.names()
+    if names:
         entries.layout.separator()
-    for name in own:
+    for name in names:
         entries.layout.operator("digiclay.preset_apply", text=name).preset = name
 
 
@@ -107,11 +107,11 @@ def section_panel(section: str, parent: str, order: int, words: str = "") -> typ
             group = part_group(settings, section)
             quantities = list_quantities(import_parameters(section, method_of(bed_of(context).digiclay)))
             for name in (WHOLE + name if quantity.whole else name for name, quantity in quantities.items()):
-                place = column.row(align=True)
+                row = column.row(align=True)
                 # A number's label stands in its field: beside it the sidebar would cut off the unit.
-                place.use_property_split = group.bl_rna.properties[name].type in BESIDE
-                place.use_property_decorate = False
-                place.prop(group, name)
+                row.use_property_split = group.bl_rna.properties[name].type in BESIDE
+                row.use_property_decorate = False
+                row.prop(group, name)
 
     Section.__name__ = Section.__qualname__ = Section.bl_idname
     return Section

@@ -17,8 +17,8 @@ def session_panel(sidebar: Sidebar, context: Context) -> None:
     bed = bed_of(context)
     session, column = running.find(bed), sidebar.layout.column(align=True)
     if session is None:
-        kept = beds.read_snapshot(bed) is not None
-        words = "Go On Sculpting" if kept else "Start Sculpting"
+        has_state = beds.read_snapshot(bed) is not None
+        words = "Go On Sculpting" if has_state else "Start Sculpting"
         row = column.row(align=True)
         row.scale_y = 1.4
         row.operator("digiclay.session", text=words, icon="PLAY")

@@ -68,9 +68,9 @@ def features(sidebar: Sidebar, context: Context) -> None:
             listed.label(text=line)
         if len(lines) > MOST:
             listed.label(text="...")
-    kept = formed_bed.has_reference(bed)
+    has_reference = formed_bed.has_reference(bed)
     column = layout.column(align=True)
-    column.label(text="Measured from the kept surface" if kept else "Measured from the bed at rest")
+    column.label(text="Measured from the kept surface" if has_reference else "Measured from the bed at rest")
     row = column.row(align=True)
     row.operator("digiclay.keep_surface")
     row.operator("digiclay.forget_surface")

@@ -239,9 +239,9 @@ def draw_force_plot(
     been = []
     for curve, ends in enumerate(zip(low, high, strict=True)):
         color, behind = palettes.finger_color(curve + 1) if several else BEEN, curve / len(high)
-        for name, own, layer in (("to come", TO_COME, 4), ("been", color, 3)):
+        for name, fill, layer in (("to come", TO_COME, 4), ("been", color, 3)):
             part = bpy.data.objects.new(name, bridge.mesh(name, (_area(place, *ends), faces)))
-            area = front.put(part, left, bottom, own, layer + behind)
+            area = front.put(part, left, bottom, fill, layer + behind)
         been.append(area)
     size = front.readable(0.80 * front.letter)
     above = bottom + rise + 0.35 * size

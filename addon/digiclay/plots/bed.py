@@ -83,9 +83,9 @@ def draw_path(axes: Axes, history: History) -> None:
     frame = axes.axis()
     dots: dict[str, Any] = {"color": "white", "linestyle": (0, (0.1, 2.2)), "dash_capstyle": "round"}
     dark, pale = withStroke(linewidth=3.6, foreground=INK), withStroke(linewidth=4.2, foreground="white")
-    for number, own in enumerate(split_fingers(history)):
-        touching = find_contact_rows(own["total_force"])[:, None]
-        finger = np.asarray(own["fingertip"])[:, :2] * MM
+    for number, one_finger in enumerate(split_fingers(history)):
+        touching = find_contact_rows(one_finger["total_force"])[:, None]
+        finger = np.asarray(one_finger["fingertip"])[:, :2] * MM
         lifted, pressed = np.where(touching, np.nan, finger).T, np.where(touching, finger, np.nan).T
         axes.plot(*lifted, label="_" * (number > 0) + "lifted", path_effects=[dark], **dots)
         line: dict[str, Any] = {"path_effects": [pale], "color": LINES[1], "linewidth": 2.4}

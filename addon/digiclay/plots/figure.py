@@ -71,9 +71,9 @@ def canvas(width: float, height: float, title: str = "") -> Iterator[tuple[Figur
         if title:
             figure.text(0.3 / width, 1.0 - 0.33 / height, title, fontsize=14, fontweight="bold")
 
-        def place(label: str, left: float, bottom: float, across: float, up: float, **known: Any) -> Any:
+        def place(label: str, left: float, bottom: float, across: float, up: float, **looks: Any) -> Any:
             box = (left / width, bottom / height, across / width, up / height)
-            return figure.add_axes(box, label=label, **known)
+            return figure.add_axes(box, label=label, **looks)
 
         yield figure, place
 

@@ -53,9 +53,9 @@ def session_cells(history: History) -> list[int]:
 def _find_middle_cells(history: History) -> list[int]:
     """Return the cell under each fingertip in the middle of its contact, or where it begins without any."""
     position, cells = array(history, "position"), []
-    for own in split_fingers(history):
-        touching = np.flatnonzero(find_contact_rows(own["total_force"]))
-        place = own["fingertip"][touching[len(touching) // 2] if len(touching) else 0, :2]
+    for finger in split_fingers(history):
+        touching = np.flatnonzero(find_contact_rows(finger["total_force"]))
+        place = finger["fingertip"][touching[len(touching) // 2] if len(touching) else 0, :2]
         cells.append(int(np.argmin(np.sum((position - place) ** 2, axis=1))))
     return cells
 
@@ -86,7 +86,7 @@ def session_figure(history: History, set_point: SetPoint | None) -> Figure:
         shade_contact(heights, history)
         wanted, label = None, ""
         if set_point is not None:
-            fingers = [set_point.total(sum_cells(own).following) for own in split_fingers(history)]
+            fingers = [set_point.total(sum_cells(finger).following) for finger in split_fingers(history)]
             wanted = np.fmax.reduce(fingers)  # the same of all fingers, where it does not depend on cells
             label = f"set point {set_point.force:g} N{' a cell' if set_point.per_cell else ''}"
         draw_force(force, history, wanted, label)
@@ -108,10 +108,10 @@ def draw_force(axes: Axes, history: History, wanted: ArrayLike | None, label: st
     time, asked = array(history, "time"), LINES[1]
     if "finger_force" in history:
         asked = INK
-        for number, own in enumerate(array(history, "finger_force").T):
+        for number, force in enumerate(array(history, "finger_force").T):
             again, color = divmod(number, len(LINES))
             look: dict[str, Any] = {"color": LINES[color], "linestyle": STYLES[again], "linewidth": 1.1}
-            axes.plot(time, own, label=str(number + 1) if again and not color else None, **look)
+            axes.plot(time, force, label=str(number + 1) if again and not color else None, **look)
     else:
         axes.plot(time, array(history, "total_force"), color=INK, linewidth=1.3, label="total force")
     if wanted is not None:
@@ -144,13 +144,13 @@ def surface_figure(history: History) -> Figure:
     return figure
 
 
-def _write_figures(axes: Axes, found: dict[str, float | None]) -> None:
+def _write_figures(axes: Axes, metrics: dict[str, float | None]) -> None:
     """Write the metrics of a session as text."""
     axes.set_axis_off()
     axes.set_title("In figures")
-    names = [name for name in FIGURES if found["set_point"] is not None or not name.startswith("rfd")]
+    names = [name for name in FIGURES if metrics["set_point"] is not None or not name.startswith("rfd")]
     for line, name in enumerate(names):
-        value, metric, y = found[name], METRICS[name], 0.92 - 0.158 * line
+        value, metric, y = metrics[name], METRICS[name], 0.92 - 0.158 * line
         text = "–" if value is None else f"{value * metric.factor:.3g} {metric.shown}"
         axes.text(0.0, y, metric.label, va="top")
         axes.text(1.0, y, text, va="top", ha="right")

@@ -61,14 +61,14 @@ def _draw_line(axes: Axes, column: Column, values: Floats, label: str) -> None:
     """Draw a line with a marker for each point."""
     shown, along = _shown(column)
     if column.numeric:
-        place, look = shown, "o-"
+        positions, look = shown, "o-"
         axes.set_xscale("log" if column.logarithmic else "linear")
     else:
-        place, look = np.arange(len(values)), "o"
-        axes.set_xticks(place, [str(value) for value in column.values])
+        positions, look = np.arange(len(values)), "o"
+        axes.set_xticks(positions, [str(value) for value in column.values])
         axes.set_xlim(-0.5, len(values) - 0.5)
-    order, missing = np.argsort(place), place[np.isnan(values)]
-    axes.plot(place[order], values[order], look, color=LINES[0], markersize=6 if column.numeric else 8)
+    order, missing = np.argsort(positions), positions[np.isnan(values)]
+    axes.plot(positions[order], values[order], look, color=LINES[0], markersize=6 if column.numeric else 8)
     if missing.size:
         across = axes.get_xaxis_transform()
         axes.plot(
@@ -143,7 +143,7 @@ PANELS = (
 
 
 def comparison(
-    found: Mapping[str, Mapping[str, float | None]],
+    metrics: Mapping[str, Mapping[str, float | None]],
     forces: Mapping[str, tuple[Any, Any, Any]],
     name: str,
     called: str = "total force",
@@ -152,9 +152,9 @@ def comparison(
 
     `forces`: time, s, force, N, and the one asked for, NaN where none is, by method.
     """
-    colors = {method: LINES[i % len(LINES)] for i, method in enumerate(found)}
+    colors = {method: LINES[i % len(LINES)] for i, method in enumerate(metrics)}
     bar = 0.3
-    high = bar * len(found) + 0.1
+    high = bar * len(metrics) + 0.1
     height = 4.2 + 2 * (high + 0.85)
     with canvas(12.5, height, name) as (figure, place):
         force = place("force", 0.85, height - 3.6, 11.3, 2.5)
@@ -171,7 +171,7 @@ def comparison(
             row, column = divmod(number, 4)
             bottom = 0.3 + (1 - row) * (high + 0.85)
             axes = place(key, 0.4 + 3.02 * column, bottom, 2.35, high)
-            _bars(axes, [found[method][key] for method in found], list(colors.values()), metric.factor)
+            _bars(axes, [metrics[method][key] for method in metrics], list(colors.values()), metric.factor)
             axes.set_title(metric.title, fontsize=11)
     return figure
 

@@ -222,8 +222,8 @@ class OwnRow(Method):
 
     def build(self, parameters: Any, device: Any) -> Guarded:
         """Return its controller for a device, guarded; MethodError when that cannot be built."""
-        source, own = self.source, copy.deepcopy(device)  # whatever it does to it, the bed's is another
-        return guard(lambda: parameters.build(own), source.label, source.file, own.period)
+        source, info = self.source, copy.deepcopy(device)  # whatever it does to it, the bed's is another
+        return guard(lambda: parameters.build(info), source.label, source.file, info.period)
 
 
 def load_method(word: str) -> str:
@@ -279,7 +279,9 @@ def add_source(name: str, source: MethodSource) -> OwnRow:
     module = _import(source)
     kind = getattr(module, source.attribute, None)
     if kind is None:
-        there = ", ".join(f"{source.label.partition(':')[0]}:{one.__name__}" for one in list_classes(module))
+        there = ", ".join(
+            f"{source.label.partition(':')[0]}:{kind.__name__}" for kind in list_classes(module)
+        )
         rule = f"must have the class {source.attribute}"
         raise MethodError(f"{source.label}: the file {rule} (it has {there or 'no control method'}).")
     return add_class(name, source, kind)
@@ -307,7 +309,7 @@ def add_class(name: str, source: MethodSource, kind: Any) -> OwnRow:
     )
 
     def reduce(parameters: ControlParameters) -> tuple[Callable[..., Any], tuple[Any, ...]]:
-        values = {one.name: getattr(parameters, one.name) for one in dataclasses.fields(parameters)}
+        values = {field.name: getattr(parameters, field.name) for field in dataclasses.fields(parameters)}
         return restore_parameters, (name, source, values)
 
     copyreg.pickle(kind, reduce)
@@ -391,9 +393,9 @@ def _import_for_methods(
         return builtins.__import__(name, namespace, local, wanted, level)
     full = f"{PACKAGE}.{rest}" if rest else PACKAGE
     module = importlib.import_module(full)
-    for one in wanted or ():
-        if one != "*" and not hasattr(module, one):
-            importlib.import_module(f"{full}.{one}")
+    for attribute in wanted or ():
+        if attribute != "*" and not hasattr(module, attribute):
+            importlib.import_module(f"{full}.{attribute}")
     return module if wanted else sys.modules[PACKAGE]
 
 

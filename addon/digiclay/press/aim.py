@@ -105,8 +105,8 @@ def _ray(context: Context, bed: Object, xy: Place) -> tuple[Floats, Floats]:
     lens = np.array(looking.window_matrix, np.float64)
     seen = np.array(looking.view_matrix, np.float64) @ np.array(bed.matrix_world, np.float64)
     screen = 2.0 * np.array(xy) / [region.width, region.height] - 1.0
-    origin, way = find_ray(lens, seen, screen)
-    return origin / SCALE, way
+    origin, direction = find_ray(lens, seen, screen)
+    return origin / SCALE, direction
 
 
 #: Objects that may have a surface.
@@ -126,7 +126,7 @@ def shown_stretch(context: Context, start: Floats, end: Floats) -> Place:
         planes += [np.array(plane, np.float64) for plane in looking.clip_planes]
     first, last = 0.0, np.inf
     for plane in planes:
-        before, after = (float(plane[:3] @ place + plane[3]) for place in (start, end))
+        before, after = (float(plane[:3] @ point + plane[3]) for point in (start, end))
         rising = after - before
         if rising:
             crossed = -before / rising
@@ -148,13 +148,13 @@ def find_hider(
         return None
     first, _ = shown_stretch(context, start, end)
     start = start + first * (end - start)
-    way = end - start
+    ray = end - start
     for thing, matrix in list_surfaces(context, bed) if surfaces is None else surfaces:
         # An object in front of others hides what is nearer too; one behind such a bed hides nothing.
         if bed.show_in_front and not thing.show_in_front:
             continue
         reach = np.inf if thing.show_in_front and not bed.show_in_front else 1.0 - NEAR
-        if _meets(thing, matrix, start, way, reach):
+        if _meets(thing, matrix, start, ray, reach):
             return thing
     return None
 
@@ -209,13 +209,13 @@ def _instances(thing: Object) -> bool:
     return thing.instance_type != "NONE" or any(modifier.type in makers for modifier in thing.modifiers)
 
 
-def _meets(thing: Object, matrix: Matrix, start: Floats, way: Floats, reach: float) -> bool:
+def _meets(thing: Object, matrix: Matrix, start: Floats, ray: Floats, reach: float) -> bool:
     """Return whether a ray in the world meets an object within a reach, in lengths of its way."""
     placed = np.array(matrix, np.float64)
     if not np.isfinite(placed).all() or abs(np.linalg.det(placed[:3, :3])) < np.finfo(np.float32).tiny:
         return False
     inverse = np.linalg.inv(placed)
-    origin, along = inverse[:3, :3] @ start + inverse[:3, 3], inverse[:3, :3] @ way
+    origin, along = inverse[:3, :3] @ start + inverse[:3, 3], inverse[:3, :3] @ ray
     length = float(np.linalg.norm(along))
     try:
         met = thing.ray_cast(origin.tolist(), along.tolist(), distance=min(reach * length, 1e30))

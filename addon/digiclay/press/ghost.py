@@ -68,12 +68,12 @@ def plan(uid: int, stroke: Stroke | None) -> None:
 def find_surface(session: Running) -> Floats | None:
     """Return the heights (n,), m, that the strokes of a session are to leave; None without any."""
     planned = [DRAWN.plan[1]] if DRAWN.plan and DRAWN.plan[0] == session.uid else []
-    strokes, kept = (*session.strokes, *planned), DRAWN.ghosts.get(session.uid, ())
+    strokes, drawn = (*session.strokes, *planned), DRAWN.ghosts.get(session.uid, ())
     if not strokes:
         DRAWN.ghosts.pop(session.uid, None)
         return None
     began = time.perf_counter()
-    ghosts = find_ghosts(strokes, find_device(session), session.state.row(0), kept)
+    ghosts = find_ghosts(strokes, find_device(session), session.state.row(0), drawn)
     DRAWN.ghosts[session.uid], took = ghosts, time.perf_counter() - began
     DRAWN.ready = began + REST * took
     return ghosts[-1].nominal.height if ghosts else None
@@ -88,13 +88,13 @@ def find_light(layout: Layout, surface: Floats) -> Floats:
     return SHADE + (1.0 - SHADE) * lit
 
 
-def find_colors(light: Floats, way: Floats) -> NDArray[np.float32]:
+def find_colors(light: Floats, rise: Floats) -> NDArray[np.float32]:
     """Return colors (n, 4), times opacity, of a lit surface (n,) to which pins have a way (n,), m."""
     # Times the opacity: from a pin that has no way its color does not reach those beside it.
-    opacity = (OPACITY / OPAQUE) * np.minimum(np.abs(way), OPAQUE)
-    color = np.empty((way.size, 4), np.float32)
+    opacity = (OPACITY / OPAQUE) * np.minimum(np.abs(rise), OPAQUE)
+    color = np.empty((rise.size, 4), np.float32)
     for part, (raised, lowered) in enumerate(zip(RAISED, LOWERED, strict=True)):
-        color[:, part] = np.where(way > 0.0, raised, lowered) * light * opacity
+        color[:, part] = np.where(rise > 0.0, raised, lowered) * light * opacity
     color[:, 3] = opacity
     return color
 
@@ -111,16 +111,16 @@ def _make_batch(grid: Grid, surface: Floats, light: Floats, height: Floats) -> A
     """Return the triangles of a lit surface (n,), m, where pins (n,), m, have a way to it; or None."""
     import gpu
 
-    triangles, way = _list_triangles(grid.layout), surface - height
-    moves = np.abs(way) > LEAST
+    triangles, rise = _list_triangles(grid.layout), surface - height
+    moves = np.abs(rise) > LEAST
     chosen = triangles[moves[triangles[:, 0]] | moves[triangles[:, 1]] | moves[triangles[:, 2]]]
     if not len(chosen):
         return None
     shader = gpu.shader.from_builtin("SMOOTH_COLOR")
     points = gpu.types.GPUVertBuf(shader.format_calc(), len(surface))
-    place = np.column_stack([grid.positions, surface]) * bridge.SCALE
-    points.attr_fill("pos", np.ascontiguousarray(place, np.float32))
-    points.attr_fill("color", find_colors(light, way))
+    corners = np.column_stack([grid.positions, surface]) * bridge.SCALE
+    points.attr_fill("pos", np.ascontiguousarray(corners, np.float32))
+    points.attr_fill("color", find_colors(light, rise))
     return gpu.types.GPUBatch(type="TRIS", buf=points, elem=gpu.types.GPUIndexBuf(type="TRIS", seq=chosen))
 
 

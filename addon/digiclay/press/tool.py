@@ -170,11 +170,11 @@ def _number(layout: UILayout, owner: OperatorProperties, name: str, units: float
 
 
 def touch_outline(
-    bed: Object, layout: Layout, place: Floats, depth: float, brush: Brush = Brush.LOWER
+    bed: Object, layout: Layout, middle: Floats, depth: float, brush: Brush = Brush.LOWER
 ) -> Floats:
     """Return the rim of what a brush would form at a place (2,), m, (k, 2), m."""
     tip = fingertip_of(bed)
-    return place + find_outline(bridge.finger_of(tip), bridge.pose(tip)[3:], depth, brush, layout)
+    return middle + find_outline(bridge.finger_of(tip), bridge.pose(tip)[3:], depth, brush, layout)
 
 
 def find_outline(finger: Fingertip, turn: Floats, depth: float, brush: Brush, layout: Layout) -> Floats:

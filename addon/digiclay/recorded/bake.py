@@ -49,10 +49,10 @@ def playback_nodes(bake: Object, moments: int) -> NodeTree:
     first = number(tree, "MULTIPLY_ADD", 5, 1, before, count, pin)
     second = number(tree, "MULTIPLY_ADD", 5, 2, after, count, pin)
 
-    place = node(tree, "GeometryNodeInputPosition", 5, -1).outputs["Position"]
+    position = node(tree, "GeometryNodeInputPosition", 5, -1).outputs["Position"]
     ends = {
-        "A": sample(tree, table, place, "FLOAT_VECTOR", first, 7, 0),
-        "B": sample(tree, table, place, "FLOAT_VECTOR", second, 7, 1),
+        "A": sample(tree, table, position, "FLOAT_VECTOR", first, 7, 0),
+        "B": sample(tree, table, position, "FLOAT_VECTOR", second, 7, 1),
     }
     blend = node(tree, "ShaderNodeMix", 8, 1, {"Factor": part, **ends}, data_type="VECTOR")
     moved = {"Geometry": cells, "Position": enabled(blend.outputs, "Result")}
@@ -184,7 +184,7 @@ def sample_path(scene: Scene, bed: Object, first: int, last: int, period: float)
         raise DigiclayError(f"The frames to bake {rule} (got {first} to {last}).")
     rate = read_rate(scene)
     count = int(np.floor((last - first) / rate / period + 1e-6))
-    kept = scene.frame_current, scene.frame_subframe
+    frame_before = scene.frame_current, scene.frame_subframe
     tips = len(fingertips_of(bed))
     if not tips:
         raise DigiclayError(f"{bed.name} has no fingertip: undo its removal.")
@@ -196,7 +196,7 @@ def sample_path(scene: Scene, bed: Object, first: int, last: int, period: float)
             poses[row] = bridge.poses(bed)
             yield row / count
     finally:
-        scene.frame_set(kept[0], subframe=kept[1])
+        scene.frame_set(frame_before[0], subframe=frame_before[1])
     yield poses
 
 
@@ -234,6 +234,6 @@ def _make_source(moments: BakedFrames) -> Object:
         mode=moments.mode.ravel(),
         force=moments.force.ravel(),
     )
-    made = bpy.data.objects.new(mesh.name, mesh)
-    made[ROLE] = BAKE
-    return made
+    bake = bpy.data.objects.new(mesh.name, mesh)
+    bake[ROLE] = BAKE
+    return bake

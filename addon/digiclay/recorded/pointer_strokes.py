@@ -55,7 +55,9 @@ class PointerStroke(Parameters):
     """Stroke of the pointer, and the settings of the Press tool during it."""
 
     brush: str = quantity(
-        Brush.LOWER.value.lower(), "effect on the surface", choices=tuple(one.value.lower() for one in Brush)
+        Brush.LOWER.value.lower(),
+        "effect on the surface",
+        choices=tuple(brush.value.lower() for brush in Brush),
     )
     ctrl: bool = quantity(False, "whether Ctrl is held, which inverts the brush")
     depth: float = quantity(4e-3, "depth of Lower", unit="m", at_least=SHALLOWEST, at_most=DEEPEST)
@@ -82,7 +84,11 @@ class PointerStroke(Parameters):
             rule = "must be lists of time, x and y, finite numbers"
             raise ParameterError("PointerStroke", "moves", rule, str(list(wrong[0])))
         times = [move[0] for move in self.moves]
-        late = [times[0]] if times[0] != 0.0 else [later for one, later in pairwise(times) if later < one]
+        late = (
+            [times[0]]
+            if times[0] != 0.0
+            else [later for earlier, later in pairwise(times) if later < earlier]
+        )
         if late:
             rule = "must begin at 0 s and be in the order of time"
             raise ParameterError("PointerStroke", "moves", rule, f"{late[0]:g} s")
@@ -131,10 +137,10 @@ def read_strokes(path: Path) -> Recorded:
         if bed not in BEDS:
             raise ParameterError("bed", "", f"must be one of {', '.join(BEDS)}", repr(bed))
         given = table.get("stroke", [])
-        if not isinstance(given, list) or not given or not all(isinstance(one, dict) for one in given):
+        if not isinstance(given, list) or not given or not all(isinstance(each, dict) for each in given):
             raise ParameterError("stroke", "", "must be a list of tables, [[stroke]]", show_value(given))
         strokes = tuple(
-            read_part(f"stroke #{number}", PointerStroke, {}, one) for number, one in enumerate(given, 1)
+            read_part(f"stroke #{number}", PointerStroke, {}, table) for number, table in enumerate(given, 1)
         )
     except ParameterError as error:
         raise SceneError(f"{path}: {error}") from None

@@ -51,55 +51,70 @@ STILL = 2e-6
 
 
 def begin_session(
-    uid: int, name: str, scene: Scene, pose: Floats, kept: bytes | None = None, tick: int = 0,
-    numbers: Numbers | None = None, was: Numbers | None = None,
-) -> tuple[Running, str]:  # fmt: skip
+    uid: int,
+    name: str,
+    scene: Scene,
+    pose: Floats,
+    stored: bytes | None = None,
+    tick: int = 0,
+    numbers: Numbers | None = None,
+    was: Numbers | None = None,
+) -> tuple[Running, str]:
     """Begin a session from a snapshot, at rest without one; return it, and what of the snapshot was lost.
 
     `numbers`: of the fingertips, behind those of the scene others like its first one; `was`: of those that
     the snapshot has.
     """
-    own = len(scene.fingers)
-    numbers = numbers or tuple(range(1, own + 1))
+    fingers = len(scene.fingers)
+    numbers = numbers or tuple(range(1, fingers + 1))
     whole = scene.with_fingers(len(numbers))
     system = assemble(whole)
-    state, lost = _load_state(system, _change_fingers(scene, system, kept, was or numbers, numbers))
+    state, lost = _load_state(system, _change_fingers(scene, system, stored, was or numbers, numbers))
     poses = live_session.clamp_pose(pose.reshape(-1, 7), system.cell.actuator.stroke)
     now = snapshot.dump(system, state)
     running = Running(
-        scene=scene, system=system, state=state, poses=poses, uid=uid, name=name, snapshot=now, tick=tick + 1,
-        numbers=numbers[:own], clock=live_session.Clock(), monitor=accuracy.start(whole),
-        trace=recent_trace.start(system.period, fingers=own),
+        scene=scene,
+        system=system,
+        state=state,
+        poses=poses,
+        uid=uid,
+        name=name,
+        snapshot=now,
+        tick=tick + 1,
+        numbers=numbers[:fingers],
+        clock=live_session.Clock(),
+        monitor=accuracy.start(whole),
+        trace=recent_trace.start(system.period, fingers=fingers),
         next_gesture=live_session.Moment(state.period, now, poses, tick),
-    )  # fmt: skip
+    )
     return running, lost
 
 
-def _load_state(system: System, kept: bytes | None) -> tuple[State, str]:
+def _load_state(system: System, stored: bytes | None) -> tuple[State, str]:
     """Return the state to continue from, and what could not be taken up."""
-    if kept is None:
+    if stored is None:
         return begin(system), ""
     # The state of other parts has heights at least; what has none is of no use.
     refused = ""
     for read, words in ((snapshot.load, ""), (snapshot.transfer_heights, CHANGED)):
         try:
-            return read(system, kept), words and localize(words)
+            return read(system, stored), words and localize(words)
         except StateError as error:
             refused = localize("The bed begins at rest. {}", error)
     return begin(system), refused
 
 
 def _change_fingers(
-    scene: Scene, system: System, kept: bytes | None, was: Numbers, numbers: Numbers
+    scene: Scene, system: System, stored: bytes | None, was: Numbers, numbers: Numbers
 ) -> bytes | None:
     """Return a snapshot of fingertips of some numbers as one of the fingertips that a system has."""
-    if kept is None or was == numbers:
-        return kept
+    if stored is None or was == numbers:
+        return stored
     former = assemble(replace(scene, fingers=scene.fingers[:1] * len(was)))
     try:
-        state = snapshot.load(former, kept)
+        state = snapshot.load(former, stored)
     except StateError:  # what is wrong with it will be said
-        return kept
+        return stored
     places = [was.index(number) if number in was else None for number in numbers]
     return snapshot.dump(system, snapshot.change_fingers(former, system, state, places))
 
@@ -111,9 +126,14 @@ def match_poses(poses: Floats, was: Numbers, others: Floats, numbers: Numbers) -
 
 
 def advance(
-    running: Running, pose: Floats, now: float, most: int, pins: Sequence[int] | None = None,
-    interval: float = INTERVAL, moment: float | None = None,
-) -> Running:  # fmt: skip
+    running: Running,
+    pose: Floats,
+    now: float,
+    most: int,
+    pins: Sequence[int] | None = None,
+    interval: float = INTERVAL,
+    moment: float | None = None,
+) -> Running:
     """Let a session follow the fingertip to a pose (7,) until `now`, s, monotonic; uses `running` up.
 
     Strokes do not wait for the clock: they take a share of the `interval` between two ticks, s.
@@ -195,14 +215,14 @@ def list_pressing(running: Running) -> list[int]:
 
 def _give_fingers(running: Running, count: int) -> Running:
     """Return the session with so many fingertips for a stroke, new ones where the first one's images are."""
-    own = len(running.numbers)
-    total = own + min(max(count, 1), MOST_FINGERS - own + 1) - 1
+    fingers = len(running.numbers)
+    total = fingers + min(max(count, 1), MOST_FINGERS - fingers + 1) - 1
     had = len(running.poses)
     if total == had or running.system.cell.touch is None:
         return running
     scene = running.scene.with_fingers(total)
     system = assemble(scene)
-    places = [place if place < had else None for place in range(total)]
+    places = [row if row < had else None for row in range(total)]
     state = snapshot.change_fingers(running.system, system, running.state, places)
     poses = np.concatenate([running.poses, np.empty((max(0, total - had), 7))])[:total]
     (x, y, z), above = poses[0, :3].tolist(), float(running.state.row(0).max()) + CLEARANCE
@@ -277,7 +297,7 @@ def _count_gesture(running: Running, *, ordered: bool) -> Running:
 
 
 def restore(
-    running: Running, kept: bytes | None, poses: Floats, tick: int | None = None, was: Numbers | None = None
+    running: Running, stored: bytes | None, poses: Floats, tick: int | None = None, was: Numbers | None = None
 ) -> Running:
     """Return the session with another snapshot, None: at rest; a recording is cut at `tick`, or ends.
 
@@ -287,13 +307,13 @@ def restore(
     if len(running.poses) > len(running.numbers):  # a stroke that is taken back takes its fingertips along
         system = assemble(running.scene)
         monitor = running.monitor and accuracy.start(running.scene)
-        own = running.poses[: len(running.numbers)]
-        running = replace(running, system=system, monitor=monitor, poses=own)
+        session_poses = running.poses[: len(running.numbers)]
+        running = replace(running, system=system, monitor=monitor, poses=session_poses)
     was = was or name_fingers(running.numbers, len(poses))
     if was != running.numbers:
-        kept = _change_fingers(running.scene, running.system, kept, was, running.numbers)
+        stored = _change_fingers(running.scene, running.system, stored, was, running.numbers)
         poses = match_poses(poses, was, running.poses, running.numbers)
-    state, _ = _load_state(running.system, kept)
+    state, _ = _load_state(running.system, stored)
     now = snapshot.dump(running.system, state)
     keep = running.recording
     if keep is not None:
@@ -301,12 +321,20 @@ def restore(
     gestures = tuple(gesture for gesture in running.gestures if gesture.period < state.period)
     free = recent_trace.measure_total_force(running.system, state) == 0.0
     return replace(
-        running, state=state, snapshot=now, clock=running.clock.stopped(), stale=0,
+        running,
+        state=state,
+        snapshot=now,
+        clock=running.clock.stopped(),
+        stale=0,
         poses=live_session.clamp_pose(poses.reshape(-1, 7), running.system.cell.actuator.stroke),
-        monitor=running.monitor and accuracy.reset(running.monitor), errors=None,
-        recording=keep, gestures=gestures, tick=running.tick + 1, rest_time=0.0,
+        monitor=running.monitor and accuracy.reset(running.monitor),
+        errors=None,
+        recording=keep,
+        gestures=gestures,
+        tick=running.tick + 1,
+        rest_time=0.0,
         next_gesture=live_session.Moment(state.period, now, poses, running.tick) if free else None,
-    )  # fmt: skip
+    )
 
 
 def change_scene(
@@ -320,22 +348,28 @@ def change_scene(
         running = drop_strokes(running)
     was, others = running.numbers, running.poses if poses is None else poses
     images = running.names[len(was) :]
-    kept = match_poses(running.poses, running.names, others, numbers)
+    matched = match_poses(running.poses, running.names, others, numbers)
     other, lost = begin_session(
-        running.uid, running.name, scene, np.concatenate([kept, running.poses[len(was) :]]), running.snapshot,
-        running.tick, (*numbers, *images), running.names,
-    )  # fmt: skip
+        running.uid,
+        running.name,
+        scene,
+        np.concatenate([matched, running.poses[len(was) :]]),
+        running.snapshot,
+        running.tick,
+        (*numbers, *images),
+        running.names,
+    )
 
     def change(moment: Any) -> Any:
         had = name_fingers(was, len(moment.poses))
-        kept = _change_fingers(scene, plain, moment.snapshot, had, numbers)
-        assert kept is not None
-        return replace(moment, snapshot=kept, poses=match_poses(moment.poses, had, others, numbers))
+        stored = _change_fingers(scene, plain, moment.snapshot, had, numbers)
+        assert stored is not None
+        return replace(moment, snapshot=stored, poses=match_poses(moment.poses, had, others, numbers))
 
     plain = assemble(scene) if images else other.system
     # What a stroke has formed, it has with the parameters before.
     for name in ("gestures", "undone"):
-        some = (replace(one, stroke="") for one in getattr(running, name))
+        some = (replace(gesture, stroke="") for gesture in getattr(running, name))
         carried: dict[str, Any] = {name: tuple(some if numbers == was else map(change, some))}
         running = replace(running, **carried)
     if numbers != was:

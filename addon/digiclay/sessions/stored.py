@@ -11,7 +11,7 @@ from .sculpting import Numbers, drop_strokes, queue_stroke, restore
 
 def take_up(
     running: Running,
-    kept: bytes | None,
+    stored: bytes | None,
     poses: Floats,
     was: Numbers,
     tick: int,
@@ -23,21 +23,25 @@ def take_up(
     `ticks`: of its gestures. `lines`: strokes to be formed from there, by `strokes.drawn`. Those that the
     session has formed so stand at once, and the one that it is forming goes on.
     """
-    known, start = {one.tick: one for one in (*running.undone, *running.gestures)}, running.stroke_start
+    gestures = {gesture.tick: gesture for gesture in (*running.undone, *running.gestures)}
     formed: dict[tuple[str, bytes | None], tuple[Gesture, Moment]] = {
-        (one.stroke, one.snapshot): (one, one.end) for one in known.values() if one.end
+        (gesture.stroke, gesture.snapshot): (gesture, gesture.end)
+        for gesture in gestures.values()
+        if gesture.end
     }
-    while lines and (lines[0], kept) in formed:
-        one, end = formed[lines[0], kept]
-        kept, poses, tick, ticks, lines = end.snapshot, end.poses, end.tick, [*ticks, one.tick], lines[1:]
+    while lines and (lines[0], stored) in formed:
+        gesture, end = formed[lines[0], stored]
+        stored, poses, tick = end.snapshot, end.poses, end.tick
+        ticks, lines = [*ticks, gesture.tick], lines[1:]
         was = name_fingers(running.numbers, len(poses))
-    if start and lines and start.snapshot == kept and drawn.dump(running.strokes[0]) == lines[0]:
+    start = running.stroke_start
+    if start and lines and start.snapshot == stored and drawn.dump(running.strokes[0]) == lines[0]:
         back, ticks = replace(running, strokes=running.strokes[:1], stale=0), [*ticks, start.tick]
         lines = lines[1:]
     else:
-        back = restore(drop_strokes(running), kept, poses, tick, was)
-    gestures = tuple(known.pop(one) for one in ticks if one in known)
-    return add_strokes(replace(back, gestures=gestures, undone=tuple(known.values())), lines)
+        back = restore(drop_strokes(running), stored, poses, tick, was)
+    done = tuple(gestures.pop(tick) for tick in ticks if tick in gestures)
+    return add_strokes(replace(back, gestures=done, undone=tuple(gestures.values())), lines)
 
 
 def add_strokes(running: Running, lines: list[str]) -> Running:

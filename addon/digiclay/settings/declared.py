@@ -170,9 +170,9 @@ def write(group: PropertyGroup, part: Parameters) -> Notes:
     for name, field in _fields(type(part)).items():
         value = getattr(part, name)
         assign(group, type(part), name, value)
-        kept = getattr(group, name)
-        if _meant(kept, field) != value:
-            notes[name] = (kept, value)
+        stored = getattr(group, name)
+        if _meant(stored, field) != value:
+            notes[name] = (stored, value)
     return notes
 
 
@@ -201,12 +201,12 @@ def read(group: PropertyGroup, kind: type[Parameters], notes: Notes, section: st
     """Return a part's parameters in SI, as a scene file's section would give them."""
     values = {}
     for name, field in _fields(kind).items():
-        kept = getattr(group, name)
+        stored = getattr(group, name)
         noted = notes.get(name)
         try:
-            values[name] = noted[1] if noted and noted[0] == kept else _meant(kept, field)
+            values[name] = noted[1] if noted and noted[0] == stored else _meant(stored, field)
         except InvalidOperation:
-            raise ParameterError(section, name, "must be numbers separated by commas", repr(kept)) from None
+            raise ParameterError(section, name, "must be numbers separated by commas", repr(stored)) from None
     return values
 
 
@@ -220,8 +220,8 @@ def _power(field: dataclasses.Field[Any]) -> int:
     return unit_of(field.metadata["quantity"].unit, field.default)[1]
 
 
-def _meant(kept: Any, field: dataclasses.Field[Any]) -> Any:
+def _meant(stored: Any, field: dataclasses.Field[Any]) -> Any:
     """Return the value a property stands for."""
     if isinstance(field.default, tuple):
-        return tuple(float(Decimal(word.strip()).scaleb(-_power(field))) for word in kept.split(","))
-    return to_si(kept, _power(field)) if isinstance(kept, float) else kept
+        return tuple(float(Decimal(word.strip()).scaleb(-_power(field))) for word in stored.split(","))
+    return to_si(stored, _power(field)) if isinstance(stored, float) else stored

@@ -209,9 +209,9 @@ def give_settings(bed: Object, tip: Object) -> None:
     if read_stored(tip, "digiclay"):
         return
     for section in FINGER_PARTS:
-        ours, own = getattr(bed.digiclay, section), getattr(tip.digiclay, section)
+        ours, further = getattr(bed.digiclay, section), getattr(tip.digiclay, section)
         for name in list_quantities(import_parameters(section, "")):
-            setattr(own, name, getattr(ours, name))
+            setattr(further, name, getattr(ours, name))
     bridge.resize_fingertip(tip, read_finger(tip.digiclay))
 
 
@@ -224,7 +224,9 @@ def resize(settings: PropertyGroup, finger: Fingertip) -> None:
         assign(settings.fingertip, Fingertip, name, getattr(finger, name))
     if tip is not None and lowest is not None:
         bridge.resize_fingertip(tip, read_finger(settings))
-        bridge.move_fingertips(bed, lowest, [bridge.finger_of(one) for one in fingertips_of(bed).values()])
+        bridge.move_fingertips(
+            bed, lowest, [bridge.finger_of(fingertip) for fingertip in fingertips_of(bed).values()]
+        )
     follows = bed.digiclay.blister_follows and finger.width != before.width
     if follows and settings == find_first(bed):
         _scale_blister(bed.digiclay, before, finger)

@@ -59,9 +59,9 @@ def place_of(settings: PropertyGroup) -> int:
     return names.index(method_of(settings))
 
 
-def choose(settings: PropertyGroup, place: int) -> None:
+def choose(settings: PropertyGroup, number: int) -> None:
     """Set the method by its place among those offered."""
-    name = list_offered(settings, None)[place][0]
+    name = list_offered(settings, None)[number][0]
     if name in METHODS:
         settings.method = name
     else:
@@ -108,8 +108,8 @@ def take_arrangement(layout: PropertyGroup, context: Context) -> None:
     """Set the share of the contact laws a cell carries, which depends on how close the cells stand."""
     share = ARRANGEMENTS[layout.arrangement].share
     values = {} if share is None else {"share": share}
-    for own in devices.list_settings(layout.id_data):
-        fill(own.contact, import_parameters("contact", ""), ("share",), values)
+    for settings in devices.list_settings(layout.id_data):
+        fill(settings.contact, import_parameters("contact", ""), ("share",), values)
 
 
 def take_size(fingertip: PropertyGroup, context: Context) -> None:

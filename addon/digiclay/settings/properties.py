@@ -33,8 +33,8 @@ _NAME = re.compile(rf"\b({'|'.join(SECTIONS)})\.(\w+)")
 def relabel(error: ParameterError, numbers: Sequence[int]) -> ParameterError:
     """Return an error of the core as the panels show its owner, the number of a fingertip, rule and value."""
 
-    def labeled(found: re.Match[str]) -> str:
-        return f"{title(found[1])}: {title(found[2])}" if found[2] in _known(found[1]) else found[0]
+    def labeled(match: re.Match[str]) -> str:
+        return f"{title(match[1])}: {title(match[2])}" if match[2] in _known(match[1]) else match[0]
 
     (*finger, owner), field = re.split(rf"^{FINGERS} #(\d+)\.", error.owner), title(error.field)
     if owner in SECTIONS:
@@ -107,15 +107,18 @@ def table_of(bed: Object) -> Record:
     fingers: list[Record] = [{} for _ in each]
     for section in SECTIONS:
         holders = zip(each, fingers, strict=True) if section in FINGER_PARTS else [(settings, table)]
-        for row, (own, part) in enumerate(holders, 1):
+        for row, (holder, part) in enumerate(holders, 1):
             owner = f"{FINGERS} #{row}.{section}" if section in FINGER_PARTS and len(each) > 1 else section
             if section in OPTIONAL and not getattr(settings, f"use_{section}"):
                 part[section] = ABSENT
             elif NEEDS.get(section) and not getattr(settings, f"use_{NEEDS[section]}"):
                 continue
             elif section != "blister" or formed:
-                kind, notes = import_parameters(section, method), _notes(own).get(_key(section, method), {})
-                values = read(part_group(own, section), kind, notes, owner)
+                kind, notes = (
+                    import_parameters(section, method),
+                    _notes(holder).get(_key(section, method), {}),
+                )
+                values = read(part_group(holder, section), kind, notes, owner)
                 part[section] = {key: _path(value) for key, value in values.items()}
     if settings.use_control:
         table["control"]["method"] = method
@@ -137,11 +140,13 @@ def write_scene(bed: Object, scene: Scene) -> None:
         if part is not None:
             notes[_key(section, scene.method)] = write(part_group(settings, section), part)
     _keep_notes(settings, notes)
-    for own, finger in zip(devices.list_settings(bed), scene.fingers, strict=False):
+    for holder, finger in zip(devices.list_settings(bed), scene.fingers, strict=False):
         parts = {section: getattr(finger, section) for section in FINGER_PARTS}
-        if own != settings:
+        if holder != settings:
             given = {section: part for section, part in parts.items() if part is not None}
-            _keep_notes(own, {section: write(getattr(own, section), part) for section, part in given.items()})
+            _keep_notes(
+                holder, {section: write(getattr(holder, section), part) for section, part in given.items()}
+            )
 
 
 def _keep_notes(settings: PropertyGroup, notes: dict[str, Notes]) -> None:

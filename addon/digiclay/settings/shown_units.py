@@ -48,8 +48,8 @@ def to_si(value: float, power: int) -> float:
 def convert_units(text: str) -> str:
     """Return a message with its lengths, speeds and pressures in the units a person reads."""
 
-    def converted(found: re.Match[str]) -> str:
-        name, power = SHOWN[found[2]]
-        return f"{to_shown(float(found[1]), power):g} {name}"
+    def converted(match: re.Match[str]) -> str:
+        name, power = SHOWN[match[2]]
+        return f"{to_shown(float(match[1]), power):g} {name}"
 
     return _MEASURED.sub(converted, text)

@@ -141,8 +141,8 @@ def _mark(nominal: Nominal, stroke: Stroke, device: Device, image: Image, index:
     places = [image.place(point.x, point.y) for point in row]
     level = device.find_level(stroke, image, nominal.before)
     tops = [
-        device.find_top(stroke, point, place, nominal.ground, level)
-        for point, place in zip(row, places, strict=True)
+        device.find_top(stroke, point, at, nominal.ground, level)
+        for point, at in zip(row, places, strict=True)
     ]
     reach = device.reach + 0.5 * length / parts
     for part, (start, end) in enumerate(pairwise(places)):

@@ -130,7 +130,7 @@ LOCKS = (Brush.LOCK, Brush.UNLOCK, Brush.INVERT_LOCKS, Brush.CLEAR_LOCKS)
 #: Brushes that put a shape onto the surface, up or down.
 STAMPS = (Brush.STAMP, Brush.IMPRINT)
 INVERSES = {Brush.LOWER: Brush.RAISE, Brush.LOCK: Brush.UNLOCK, Brush.STAMP: Brush.IMPRINT}
-INVERSES |= {other: one for one, other in INVERSES.items()}
+INVERSES |= {other: brush for brush, other in INVERSES.items()}
 
 
 @dataclass(frozen=True)

@@ -136,11 +136,11 @@ def _sample_underside(finger: Fingertip, layout: Layout) -> tuple[Floats, float]
 def _find_sink(touch: Touch, gap: Floats, share: float, force: float) -> float:
     """Return how deep a fingertip, its underside given by `gap` (k,), m, lies in flat pins under a force."""
     pulp = touch.pulp
-    kept = float(pulp.reduced(np.array(CONTACT_TIME))) if isinstance(pulp, Relaxation) else 1.0
+    remaining = float(pulp.reduced(np.array(CONTACT_TIME))) if isinstance(pulp, Relaxation) else 1.0
     low, high = 0.0, touch.fingertip.height
     for _ in range(HALVINGS):
         middle = (low + high) / 2.0
         tension = touch.contact.tension(middle - gap)
-        enough = kept * share * touch.contact.share * float(tension.sum()) >= force
+        enough = remaining * share * touch.contact.share * float(tension.sum()) >= force
         low, high = (low, middle) if enough else (middle, high)
     return high

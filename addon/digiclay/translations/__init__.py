@@ -73,8 +73,8 @@ def _property_strings(owner: type[bpy_struct]) -> Iterator[str]:
     """Yield labels and tooltips of the properties that a class or a mixin of it declares, and shows."""
     if issubclass(owner, bpy.types.Menu | bpy.types.Panel):  # their annotations are of Blender's own
         return
-    own = [kind for kind in owner.__mro__ if kind.__module__.startswith(EXTENSION)]
-    declared = {name for kind in own for name in inspect.get_annotations(kind)}
+    kinds = [kind for kind in owner.__mro__ if kind.__module__.startswith(EXTENSION)]
+    declared = {name for kind in kinds for name in inspect.get_annotations(kind)}
     described: bpy_struct | None = getattr(owner, "bl_rna", None)
     if issubclass(owner, bpy.types.Operator):  # its class does not list them
         area, _, name = owner.bl_idname.partition(".")
