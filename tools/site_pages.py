@@ -80,6 +80,7 @@ PYTHON = """\
       heading: digiclay.Scene
       toc_label: Scene
       heading_level: 3
+      show_if_no_docstring: false
 
 [Sample scenes](samples.md) and [parameters](parameters.md) have tables of their own.
 
@@ -114,6 +115,7 @@ The codes of `mode` are those of the class `Mode`:
       heading: digiclay.Mode
       toc_label: Mode
       heading_level: 3
+      show_if_no_docstring: false
 
 ## Sweeps and metrics
 
@@ -126,6 +128,8 @@ The codes of `mode` are those of the class `Mode`:
       heading: digiclay.METRICS
       toc_label: METRICS
       heading_level: 3
+
+### Table of metrics
 
 [Metrics](../metrics.md) has the formulas.
 {metrics}
@@ -304,11 +308,11 @@ def make_python_page() -> str:
         for name, array in HISTORY_ARRAYS.items()
     ]
     modes = [(str(int(mode)), mode.name.lower(), meaning) for mode, meaning in MEANINGS.items()]
-    metrics = [(f"`{name}`", metric.unit, metric.doc) for name, metric in FIGURES.items()]
+    metrics = [(f"`{name}`", metric.unit, metric.worse, metric.doc) for name, metric in FIGURES.items()]
     return AHEAD + PYTHON.format(
         arrays=write_table(("Name", "Shape", "Type", "Unit", "Meaning"), *arrays),
         modes=write_table(("Code", "Mode", "Meaning"), *modes),
-        metrics=write_table(("Name", "Unit", "Meaning"), *metrics),
+        metrics=write_table(("Name", "Unit", "Worse if", "Meaning"), *metrics),
     )
 
 

@@ -10,12 +10,14 @@ import bpy
 import digiclay
 import pytest
 from digiclay import manual_map, panels, translations, ui_text
+from digiclay.core.base.quantity import list_quantities
 from digiclay.core.control.methods import METHODS
-from digiclay.core.scene.schema import SECTIONS
+from digiclay.core.scene.schema import SECTIONS, import_parameters
 from digiclay.panels.base import CATEGORY
 from digiclay.panels.display import Display
 from digiclay.panels.parameters import in_use
 from digiclay.roles import bed_of, fingertip_of
+from digiclay.settings.declared import title
 from digiclay.settings.groups import CLASSES
 from digiclay.ui_text import localize
 
@@ -203,6 +205,16 @@ def test_the_address_is_right_whatever_the_folder_is_called(page, address):
 )
 def test_units_symbols_and_bounds_are_kept(text, german):
     assert translations.translate(text, "de") == german
+
+
+def test_methods_laws_sections_and_parameters_have_german_labels():
+    names = {*METHODS, *SECTIONS}
+    for section in SECTIONS:
+        for method in METHODS:
+            for name, known in list_quantities(import_parameters(section, method)).items():
+                names |= {name, *known.choices}
+    lacking = sorted({title(name) for name in names} - translations._catalog("de")["labels"].keys())
+    assert lacking == [], "addon/digiclay/translations/de.toml, [labels], needs each"
 
 
 def test_a_label_is_found_among_operators_and_elsewhere_and_a_brush_has_the_name_of_what_it_does():

@@ -19,6 +19,7 @@ from digiclay.core.mesh_io.mesh_reader import READERS
 from digiclay.core.mesh_io.mesh_writer import FORMATS
 from digiclay.core.scene.scene_source import list_samples
 from digiclay.core.scene.schema import SECTIONS, import_parameters
+from digiclay.core.studies.evaluation import FIGURES
 
 from benchmarks.kinds import parser as benchmarks_parser
 
@@ -221,6 +222,7 @@ NAMED = {
         [ending[1:].upper() for ending in READERS],
         "{}",
     ),
+    "metrics of a run": ("docs/metrics.md", "## Metrics of a session", FIGURES, "`{}`"),
 }
 
 
