@@ -15,6 +15,7 @@ from digiclay.sessions.sculpting import change_stroke, find_device, queue_stroke
 from digiclay.settings.devices import BEDS, make_scene
 from digiclay.strokes.nominal import find_ghosts
 from digiclay.strokes.stroke import Brush, lay_path, lay_ring, make_images, start
+from digiclay.strokes.sweep import estimate_time
 
 from tests.hand import heights
 
@@ -127,10 +128,10 @@ def form(part, queue):
     before = heights(session).copy()
     ghost = find_ghosts(session.strokes, find_device(session), before)[-1].nominal.height
     session = sculpting.follow_finger(session, session.pose, 1)
-    expected, begun = sculpting.estimate_time(session), session.state.period
+    expected, begun = estimate_time(session.strokes), session.state.period
     done = finish(session, 64)
     taken = (done.state.period - begun) * done.system.period
-    return Formed(before, ghost, heights(done), expected, taken, sculpting.estimate_time(done))
+    return Formed(before, ghost, heights(done), expected, taken, estimate_time(done.strokes))
 
 
 @pytest.mark.parametrize("part, queue", CASES)

@@ -9,12 +9,12 @@ from digiclay.core.base.errors import DigiclayError
 from digiclay.core.scene.toml_table import resolve
 from digiclay.core.session import snapshot
 from digiclay.core.session.live_session import simulate_path
+from digiclay.sessions.running import match_poses
 from digiclay.sessions.sculpting import (
     GESTURES,
     advance,
     begin_session,
     change_scene,
-    match_poses,
     reset,
     restore,
     restore_gesture,

@@ -57,7 +57,7 @@ def start(context: Context, bed: Object) -> list[Note]:
     numbers, was, poses = tuple(fingertips_of(bed)), beds.read_numbers(bed), bridge.poses(bed)
     stood, (*_, lines) = beds.read_poses(bed), beds.read_queue(bed)
     if lines and stood is not None:  # the fingertip has come along a stroke, which begins anew
-        poses = sculpting.match_poses(stood, was, poses, numbers)
+        poses = running.match_poses(stood, was, poses, numbers)
     begun, fault = sculpting.begin_session(
         bed.session_uid, bed.name, scene, poses, beds.read_snapshot(bed), beds.read_tick(bed), numbers, was
     )
@@ -133,7 +133,7 @@ def take_up(context: Context, bed: Object, session: Running) -> Running:
     poses, was, queue = beds.read_poses(bed), beds.read_numbers(bed), beds.read_queue(bed)
     if poses is None:
         others = session.poses[:1].repeat(len(was), axis=0)
-        poses = sculpting.match_poses(session.poses, session.numbers, others, was)
+        poses = running.match_poses(session.poses, session.numbers, others, was)
     back = stored.take_up(session, beds.read_snapshot(bed), poses, was, *queue)
     if queue[-1]:
         place_fingers(context, bed, back)

@@ -28,6 +28,7 @@ from ..sessions import running, sculpting
 from ..sessions.running import Running
 from ..settings import properties
 from ..settings.declared import flag, text
+from ..strokes.sweep import estimate_time
 from ..ui_text import localize
 from . import poll_messages as poll
 from .action import Action, Modal, Polled, Result, action, become_modal
@@ -174,7 +175,7 @@ def escape(operator: Operator, context: Context) -> None:
 
 def _estimate_time() -> float:
     """Return about how long the strokes of all sessions still take, s of simulated time."""
-    return sum(map(sculpting.estimate_time, running.list_sessions()))
+    return sum(estimate_time(session.strokes) for session in running.list_sessions())
 
 
 def _stop(operator: Operator, context: Context) -> bool:

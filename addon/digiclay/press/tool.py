@@ -23,11 +23,11 @@ from ..overlay.sections import LETTERS, place_label
 from ..overlay.views import find_free_room
 from ..roles import fingertip_of
 from ..sessions import running
-from ..sessions.sculpting import estimate_time, list_pressing
+from ..sessions.sculpting import list_pressing
 from ..settings import devices
 from ..strokes.nominal import find_radius
 from ..strokes.stroke import LOCKS, STAMPS, Brush, Place, lay_ring, lay_square
-from ..strokes.sweep import SWEEPS
+from ..strokes.sweep import SWEEPS, estimate_time
 from ..ui_text import localize
 from . import aim
 from .brush import (
@@ -222,7 +222,7 @@ def describe(bed: Object, settings: OperatorProperties) -> str:
     if session is None or not session.strokes:
         return words
     speed = 0.0 if session.paused else session.clock.factor
-    left = estimate_time(session) / speed if speed else None
+    left = estimate_time(session.strokes) / speed if speed else None
     return words + describe_queue(session.strokes[0].brush, len(session.strokes) - 1, left)
 
 

@@ -5,6 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from ..core.base.arrays import Floats
 from ..core.model.fingers import MOST_FINGERS
 from ..core.session.live_session import Clock, LiveSession, Moment
 from ..core.session.recent_trace import RecentTrace
@@ -90,6 +93,12 @@ class Running(LiveSession):
 def name_fingers(numbers: tuple[int, ...], count: int) -> tuple[int, ...]:
     """Return the numbers of so many fingertips: those that have `numbers`, and those that a stroke adds."""
     return (*numbers, *range(OWN, OWN + count - len(numbers)))
+
+
+def match_poses(poses: Floats, was: tuple[int, ...], others: Floats, numbers: tuple[int, ...]) -> Floats:
+    """Return the poses (f, 7) of fingertips, by number: those they had, or else those of others (f, 7)."""
+    places = zip(numbers, others, strict=True)
+    return np.array([poses[was.index(number)] if number in was else other for number, other in places])
 
 
 @dataclass

@@ -20,15 +20,15 @@ from ..core.scene.schema import Scene
 from ..core.session import accuracy, live_session, recent_trace, snapshot
 from ..device.instant import CLEARANCE, find_ellipsoid
 from ..strokes import drawn
-from ..strokes.motion import DRAG, follow, follow_images
 from ..strokes.motion import begin as begin_stroke
+from ..strokes.motion import follow, follow_images
 from ..strokes.nominal import Device
 from ..strokes.pose import turn_image
-from ..strokes.stroke import FINISHING, Brush, Place, Stroke
+from ..strokes.stroke import FINISHING, Place, Stroke
 from ..strokes.sweep import SWEEPS, WHOLE, finish, order_all, sweep
 from ..strokes.tracking import find_blister, find_tracking
 from ..ui_text import localize
-from .running import Gesture, Running, name_fingers
+from .running import Gesture, Running, match_poses, name_fingers
 
 #: How many gestures can be taken back, and the most memory their states may take, bytes.
 GESTURES, GESTURE_BYTES = 20, 200_000_000
@@ -39,8 +39,6 @@ REST = 0.5
 #: Control periods of a queue that are simulated at a time, and between two estimates of the error: so many
 #: go by in a second that one as often as under a hand takes a quarter of the time.
 CHUNK, PAUSE = 16, 10 * accuracy.PAUSE
-#: Time that a stroke takes beside its path, s: to come, press, rise and leave.
-BESIDE = 0.4
 #: Time between two ticks, s, unless told.
 INTERVAL = 1.0 / 30.0
 #: Numbers of fingertips.
@@ -117,12 +115,6 @@ def _change_fingers(
         return stored
     places = [was.index(number) if number in was else None for number in numbers]
     return snapshot.dump(system, snapshot.change_fingers(former, system, state, places))
-
-
-def match_poses(poses: Floats, was: Numbers, others: Floats, numbers: Numbers) -> Floats:
-    """Return the poses (f, 7) of fingertips, by number: those they had, or else those of others (f, 7)."""
-    places = zip(numbers, others, strict=True)
-    return np.array([poses[was.index(number)] if number in was else other for number, other in places])
 
 
 def advance(
@@ -234,19 +226,6 @@ def _give_fingers(running: Running, count: int) -> Running:
     return _pack(
         replace(running, system=system, state=state, poses=poses, recording=recording, monitor=monitor)
     )
-
-
-def estimate_time(running: Running) -> float:
-    """Return about how long the session's strokes still take, s of simulated time."""
-    tracking, time = running.strokes[0].tracking if running.strokes else None, 0.0
-    for stroke in running.strokes:
-        speed, deepest = DRAG, max(sample.depth for sample in stroke.samples)
-        if tracking is not None:
-            speed = tracking.limit_drag(deepest, pressed=stroke.brush is Brush.LOWER)
-        lengths = [float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum()) for path in stroke.ahead]
-        times = [BESIDE + length / speed for length in lengths]
-        time += sum(times) if stroke.brush in SWEEPS else max(times)
-    return time
 
 
 def _pack(running: Running) -> Running:

@@ -7,6 +7,7 @@ where the device is at work. At the end it waits until all pins have come to the
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -29,6 +30,8 @@ SWEEPS = {
 }
 #: Brushes that tell all pins something, at once.
 WHOLE = {Brush.INVERT_LOCKS: Verb.INVERT, Brush.CLEAR_LOCKS: Verb.UNLOCK}
+#: Time that a stroke takes beside its path, s: to come, press, rise and leave.
+BESIDE = 0.4
 #: Least change of a pin that the valves are to make, m.
 LEAST_CHANGE = 1e-7
 
@@ -116,3 +119,17 @@ def _wait(
     most = min(count, LOOK - stroke.waited % LOOK)
     stroke = replace(stroke, waited=stroke.waited + most, arrived=arrived if looks else stroke.arrived)
     return stroke, np.tile(pose, (most + 1, 1)), replace(order, rows=np.tile(order.rows, (most, 1)))
+
+
+def estimate_time(strokes: Sequence[Stroke]) -> float:
+    """Return about how long the strokes of a queue still take, s of simulated time."""
+    tracking, time = strokes[0].tracking if strokes else None, 0.0
+    for stroke in strokes:
+        speed = DRAG
+        if tracking is not None:
+            deepest = max(sample.depth for sample in stroke.samples)
+            speed = tracking.limit_drag(deepest, pressed=stroke.brush is Brush.LOWER)
+        lengths = [float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum()) for path in stroke.ahead]
+        times = [BESIDE + length / speed for length in lengths]
+        time += sum(times) if stroke.brush in SWEEPS else max(times)
+    return time
