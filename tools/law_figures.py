@@ -27,6 +27,7 @@ def draw_laws(out: Path) -> None:
     """Write the figure: panels in two columns."""
     style = STYLE | {"axes.prop_cycle": f"cycler('color', {list(LINES)})", "legend.fontsize": 11}
     with empty(10.0, 11.6, style, layout="constrained") as figure:
+        figure.get_layout_engine().set(w_pad=0.12, h_pad=0.12)
         panels = figure.subplots(3, 2).ravel()
         draw_curves(*panels)
         for axes, (title, across, up) in zip(panels, PANELS, strict=True):
