@@ -85,6 +85,10 @@ POINT = {"time": 0, "position": [0, 0, 0]}
 WRONG = [
     ({"valve": {"orifice_diameter": -3e-4}}, "valve.orifice_diameter must be above 0 m (got -0.0003 m)."),
     ({"valve": {"orifice_diameter": "-0.3 mm"}}, "valve.orifice_diameter must be above 0 m (got '-0.3 mm')."),
+    (
+        {"control": {"method": "hybrid", "force_gain": 1}},
+        "control.force_gain must be a parameter of hybrid (got 1). It is one of virtual_master, cell_states.",
+    ),
     ({"valve": {"orifice_diamater": 1}}, "valve.orifice_diamater must be a known key (got 1). Did you mean"),
     ({"fluid": {"xyz": 1}}, "fluid.xyz must be a known key (got 1). Known here: density, viscosity."),
     ({"valv": {"a": 1}}, "valv must be a known key (got a section). Did you mean valve?"),

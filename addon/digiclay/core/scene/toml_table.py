@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 
 from ..base.errors import ParameterError
 from ..base.quantity import Parameters, list_quantities
-from ..control.methods import find_method
+from ..control.methods import METHODS, find_method
 from ..files.tables import (
     ReadParts,
     Record,
@@ -174,8 +174,19 @@ def _read_parts(
             continue
         if section != "blister" or _forms_blister(method, given):
             kind, usual = import_parameters(section, method), defaults.get(section, {})
+            if section == "control":
+                _refuse_another_method(given, kind, method)
             parts[section] = cache.read(read_part, owner + section, kind, usual, given)
     return parts
+
+
+def _refuse_another_method(given: Table, kind: type[Parameters], method: str) -> None:
+    """Refuse a key that only other control methods have. `kind`: parameters of the chosen method."""
+    for key in [key for key in given if key not in ("method", *list_quantities(kind))]:
+        others = [name for name in METHODS if key in list_quantities(import_parameters("control", name))]
+        if others:
+            rule, hint = f"must be a parameter of {method}", f"It is one of {', '.join(others)}."
+            raise ParameterError("control", key, rule, show_value(given[key]), hint)
 
 
 def _read_finger(
