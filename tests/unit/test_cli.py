@@ -63,7 +63,7 @@ MISTAKES = {
     "run my.toml --set recorder=absent --plots": "--plots needs a recorder",
     "run my.toml --out my.toml": "my.toml is a file",
     "run my.toml --out d.png": "d.png is not empty",
-    "form dome --out d.png --quiet": "replace the run in it with --overwrite.",
+    "form dome --out d.png --quiet": "replace the run in it with --overwrite",
     "": "the following arguments are required: COMMAND",
     "walk": "invalid choice: 'walk'",
     "run": "the following arguments are required: SCENE",

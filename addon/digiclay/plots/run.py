@@ -147,7 +147,7 @@ def surface_figure(history: History) -> Figure:
 def _write_figures(axes: Axes, metrics: dict[str, float | None]) -> None:
     """Write the metrics of a session as text."""
     axes.set_axis_off()
-    axes.set_title("In figures")
+    axes.set_title("Metrics")
     names = [name for name in FIGURES if metrics["set_point"] is not None or not name.startswith("rfd")]
     for line, name in enumerate(names):
         value, metric, y = metrics[name], METRICS[name], 0.92 - 0.158 * line
