@@ -89,7 +89,7 @@ MISTAKES = {
     "compare my.toml --methods ,": "must name at least one method",
     "compare my.toml --method cell_stats": "Did you mean cell_states",
     "compare my.toml --out my.toml": "my.toml is a file",
-    "compare my.toml --set control.spring_trigger=1": "spring_trigger must be a known key",
+    "compare my.toml --set control.spring_trigger=1": "spring_trigger must be a parameter of virtual_master",
     "job .": ". is no job's folder: it has no job.toml.",
     "benchmark session --help": "run from a checkout: 'python -m benchmarks --help'",
 }
