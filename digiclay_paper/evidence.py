@@ -75,24 +75,19 @@ def speed(limit: float | None) -> str:
 
 def relief(results: Results) -> Evidence:
     """Whether ridge, mound and valley have the sections asked for."""
-    evidence, levels, missed = Evidence(), [], []
+    evidence, missed = Evidence(), []
     for method in METHODS:
-        parts = {}
         for one in sections(results.session[method]):
             evidence.add(f"{SHORT[method]}, {one.name}", _write_section(one), one.meets(LIMITS))
-            parts[one.part] = f"{one.part} {one.level * MM:.1f} mm"
             missed += [one.name] if method == TWO and not one.meets(LIMITS) else []
-        levels.append(f"{SHORT[method]} {', '.join(parts.values())}")
     evidence.why = (
         f"A section holds when its shape is {LIMITS}. Nominal is the method's own blister carried along "
-        "the fingertip's path, at the level that was formed: beyond the fingertip's lowest point by "
-        f"{'; '.join(levels)}."
+        "the fingertip's path, at the level that was formed."
     )
     if missed:
         evidence.why += (
-            f" {SHORT[TWO]} misses {', '.join(missed)}: every cell under the fingertip keeps its own force, "
-            "so the surface takes the shape of the fingertip, with a rim around it, and the cells that were "
-            "left behind at different moments stay where they were."
+            f" {SHORT[TWO]} misses {', '.join(missed)}: it holds the force of each cell, so the surface "
+            "takes the shape of the fingertip, with a rim around it."
         )
     return evidence
 
@@ -171,16 +166,11 @@ def deviations(results: Results) -> Evidence:
                 ratio = two / one
                 both = f"{one * factor:.3g} and {two * factor:.3g} {unit}, ratio {ratio:.1f}"
             evidence.add(f"{when}{meaning}", both, ratio > MUCH)
-    session = results.session[TWO]
-    each = session.gain("force_setpoint")
-    level = [f"{one.rfd:.3f} N {name}" for (method, name), one in results.simple.items() if method == TWO]
+    each = results.session[TWO].gain("force_setpoint")
     evidence.why = (
-        f"{SHORT[TWO]} holds a force per cell, {each:g} N, and {session.followers:.1f} cells follow it on "
-        f"average. Its set point, {each:g} N times the cells that follow at the moment, is "
-        f"{_newton(session.metrics['set_point'])} on average and changes as the fingertip passes from cell "
-        "to cell. A cell that is to rise needs a force below its set point, so the force falls short while "
-        "the fingertip lifts: in level drags the RFD is " + ", ".join(level) + ". "
-        f"It holds where all are {MUCH:g} times as great."
+        f"It holds where all are {MUCH:g} times as great. {SHORT[TWO]} holds {each:g} N per cell: its set "
+        "point changes as the fingertip passes from cell to cell. A cell that is to rise needs a force below "
+        "its set point, so the force falls short while the fingertip lifts."
     )
     return evidence
 
@@ -206,10 +196,6 @@ def reference_force(results: Results) -> Evidence:
 
 def _newton(value: float | None) -> str:
     return "–" if value is None else f"{value:.3f} N"
-
-
-def _gain(gain: float) -> str:
-    return "none seen" if gain == math.inf else f"K_f = {gain:g} 1/N"
 
 
 def onset(results: Results) -> Evidence:
@@ -263,13 +249,11 @@ def trade(results: Results) -> Evidence:
         ends = "and oscillates beyond" if len(calm) < len(row) else "the highest tried"
         times = f"{slow:.2f} s at K_f = {low:g}, {quick:.2f} s at {best:g}, {end:.2f} s at {high:g} 1/N"
         evidence.add(name, f"{times}, {ends}", len(calm) < len(row), quick < QUICKER * slow)
-    slowest = [row[0].settling for row in results.sweeps.values()]
     onsets = [onset_among(row)[1] or math.inf for row in results.sweeps.values()]
     evidence.holds.append(sorted(onsets, reverse=True) == onsets)
-    first, last = ("never" if time is None else f"{time:.2f} s" for time in (slowest[0], slowest[-1]))
     evidence.why = (
-        f"From the lowest to the highest K_p, the time to settle at the lowest K_f goes from {first} to "
-        f"{last}, and the onset from {_gain(onsets[0])} to {_gain(onsets[-1])}."
+        "It holds if settling is quicker at a higher K_f until the force oscillates, and if the oscillation "
+        "begins at a lower K_f with a higher K_p."
     )
     return evidence
 
@@ -384,21 +368,18 @@ def ahead(results: Results) -> Evidence:
 
 def escape(results: Results) -> Evidence:
     """Whether Method II stays clear of the oscillation of Method I."""
-    evidence, row, used = Evidence(), sorted(results.cell_swings), results.printed[ONE]
+    evidence, row = Evidence(), sorted(results.cell_swings)
     for one in row:
         pace = f" at {one.frequency:.0f} Hz" if one.sustained and one.frequency else ""
         evidence.add(f"K_FF = {one.gain:g} 1/N", f"{one.amplitude:.3f} N{pace}", not one.sustained)
     calm, first = onset_among(row)
     own = results.printed[TWO].gain("force_gain")
-    wild = results.onset(used.gain("position_gain"))[1]
     evidence.why = f"Its own gain is {own:g} 1/N."
     if first is not None:
         evidence.why += (
-            f" A cycle that goes on sets in {'' if calm is None else f'above {calm:g}, '}at {first:g} 1/N, "
-            f"{first / own:.1f} times that; each cell has a valve and a dead time of its own."
+            f" The oscillation begins {'' if calm is None else f'above {calm:g}, '}at {first:g} 1/N, "
+            f"{first / own:.1f} times that; each cell has its own valve and dead time."
         )
-    if wild is not None:
-        evidence.why += f" Method I's sets in at {wild / used.gain('force_gain'):.1f} times its own K_f."
     return evidence
 
 
