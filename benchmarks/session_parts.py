@@ -173,7 +173,7 @@ def period_calls(system: System, trajectories: Sequence[Trajectory], count: int)
 
 
 def list_calls(scene: Scene) -> Iterator[str]:
-    """Give the lines of a table of the calls a period by name."""
+    """Give the lines of a table of the calls per period by name."""
     count = min(scene.periods, 2000)
     calls, ledger = period_calls(assemble(scene), scene.trajectories(), count)
     yield f"numpy calls of the first {count} control periods: median {statistics.median(calls):g} a period"

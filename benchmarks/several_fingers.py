@@ -143,7 +143,7 @@ def measure_near(method: str, name: str, turn: float = TURN) -> tuple[list[Row],
 
 
 def measure_cost(method: str, count: int, repeats: int) -> list[float]:
-    """Return processor time a period of `COUNTS` fingers, s: medians of runs of so many periods, in turns."""
+    """Return the processor time per period of `COUNTS` fingers, s: medians of `repeats` runs, in turns."""
     works = []
     for fingers in COUNTS:
         depth = PRESSED if method else 39.0

@@ -1,8 +1,8 @@
 """Process of the doors: ``python -m digiclay_serve.door_process``, started by `doors`.
 
 A process of its own: whatever clients do costs its time and its memory, not those of the session. Its
-standard input has a line of settings, then an empty one a frame; it ends when that input ends. Its output has
-a line of addresses, an empty one an order, and a line of counts.
+standard input has a line of settings, then an empty one per frame; it ends when that input ends. Its output
+has a line of addresses, an empty one per order, and a line of counts.
 """
 
 import asyncio

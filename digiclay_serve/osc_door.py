@@ -91,7 +91,7 @@ def format_osc_frame(frame: Frame, part: str) -> list[bytes]:
 
 
 def format_osc(name: str, kinds: str, *values: object) -> bytes:
-    """Write a message; `kinds`: a letter a value, as OSC has them."""
+    """Write a message; `kinds`: one letter per value, as in OSC."""
     builder = OscMessageBuilder(f"/digiclay/{name}")
     for kind, value in zip(kinds, values, strict=True):
         builder.add_arg(value, kind)

@@ -1,7 +1,7 @@
 """Tracked fingers: poses with identities, which are off, late and trembling, to aims of fingertips.
 
 A tracked pose goes through a clutch, a filter and a virtual coupling; each is a pure function of arrays with
-a row a finger. No clock, no bed: `served_session` has both.
+one row per finger. No clock, no bed: `served_session` has both.
 """
 
 import math
@@ -42,7 +42,7 @@ TRACKING = Tracking()
 
 
 class Around(NamedTuple):
-    """Pins around the fingertips: a row a finger."""
+    """Pins around the fingertips: one row per finger."""
 
     #: (f,): how much the force grows with depth at once, N/m; highest pin, m, of the bed where there is none.
     stiffness: Floats
@@ -52,7 +52,7 @@ class Around(NamedTuple):
 
 
 class Felt(NamedTuple):
-    """What the fingertips feel: a row a finger."""
+    """What the fingertips feel: one row per finger."""
 
     #: (f, 7), simulated.
     poses: Floats

@@ -1,4 +1,4 @@
-"""League of control methods: confidence intervals over seeds of the noise, and one row a method.
+"""League of control methods: confidence intervals over seeds of the noise, and one row per method.
 
 An interval is Student's t for the mean over the seeds, of which each has the same trajectories. It states
 what other noise would do, and nothing about other trajectories.
@@ -104,13 +104,13 @@ def show_digits(value: float, digits: int = 3) -> str:
 
 
 def list_values(table: Table, method: str, trajectory: str, measure: str) -> list[float]:
-    """Return a measure of a method on a trajectory, a value a seed that has one."""
+    """Return a measure of a method on a trajectory, one value per seed that has one."""
     trials = (figures for (other, name, _), figures in table.items() if (other, name) == (method, trajectory))
     return [value for figures in trials if (value := figures.get(measure)) is not None]
 
 
 def find_league(table: Table, methods: Sequence[str]) -> list[Row]:
-    """Return a row a method, the smallest mean RFD first; all are compared with the first method."""
+    """Return one row per method, the smallest mean RFD first; all are compared with the first method."""
     seeds = sorted({seed for _, _, seed in table})
     worse = count_worse(table, methods)
     rows = []

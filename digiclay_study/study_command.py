@@ -165,7 +165,7 @@ class Findings(NamedTuple):
 
 
 def _summarize(findings: Findings) -> Iterator[str]:
-    """Give a line an output: its parameters by total index."""
+    """Give one line per output: its parameters by total index."""
     keys = findings.subject.keys
     for name, indices in findings.indices.items():
         if indices is None:

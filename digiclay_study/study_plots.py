@@ -164,7 +164,7 @@ def mark(axes: Any, row: float, mean: Interval, number: int, factor: float, **mo
 
 
 def draw_rfd(table: Table, methods: Sequence[str]) -> Figure:
-    """Draw the RFD of every trajectory: a small mark a seed, a large one the mean, with its interval.
+    """Draw the RFD of every trajectory: a small mark per seed, a large one for the mean, with its interval.
 
     The shaded band holds the just noticeable differences of the first method's set point.
     """
@@ -201,7 +201,7 @@ def draw_rfd(table: Table, methods: Sequence[str]) -> Figure:
 
 
 def draw_measures(league: Sequence[Row], methods: Sequence[str]) -> Figure:
-    """Draw a panel a measure of the league: a mark a method, with its interval and the mean beside it."""
+    """Draw one panel per measure of the league: one mark per method, its interval, the mean beside it."""
     names = [name for name in PANELS if any(row.measures.get(name) for row in league)]
     lines = -(-len(names) // 2)
     size = 13.0, lines * (0.42 * len(league) + 1.2) + 0.5

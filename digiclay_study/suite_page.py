@@ -175,7 +175,7 @@ def print_league(league: Sequence[Row]) -> list[str]:
 def format_page(
     source: Provenance, league: Sequence[Row], table: Table, failed: Sequence[str], pictures: Sequence[str]
 ) -> str:
-    """Return the page. `failed`: a line a failed trial; `pictures`: files beside it."""
+    """Return the page. `failed`: one line per failed trial; `pictures`: files beside it."""
     titles = {name: metric.title for name, metric in MEASURES.items()}
     methods = source.plan.methods
     first = escape(methods[0])

@@ -114,7 +114,7 @@ def _find_in_reports(root: Path) -> list[str]:
 
 
 def find_obstacles(root: Path, version: str, folder: Path) -> list[str]:
-    """Return all that stands in the way of a release, a line each; `folder`: where the files are to be."""
+    """Return the obstacles to a release, one line each; `folder`: where the files are to be."""
     if not VERSION.fullmatch(version):
         return [f"the version must be three numbers such as 0.1.0 (got {version!r})."]
     if git(root, "rev-parse", "--verify", "HEAD").returncode:

@@ -27,7 +27,7 @@ STRAY = 1e-4
 #: Where an empty keeps the semi-axes of its finger, m.
 AXES = "digiclay_axes"
 
-#: Attributes of a bed's mesh, one value a pin: type in Blender, name of its value, type of the array.
+#: Attributes of a bed's mesh, one value per pin: type in Blender, name of its value, type of the array.
 ATTRIBUTES = {"mode": ("INT", "value", np.int32), "force": ("FLOAT", "value", np.float32)}
 
 
@@ -168,7 +168,7 @@ def pose(tip: Object) -> Floats:
 
 
 def poses(bed: Object) -> Floats:
-    """Return the poses (f, 7) of the fingertips of a bed, in order; without any that of one at its origin."""
+    """Return the poses (f, 7) of the fingertips of a bed in order; without any, that of one at its origin."""
     tips = list(fingertips_of(bed).values())
     return _read_poses(bed, tips) if tips else np.array([[0.0, 0.0, 0.0, *LEVEL]])
 
@@ -238,6 +238,6 @@ def linear(color: tuple[float, float, float], alpha: float = 1.0) -> tuple[float
 
 
 def srgb(light: Sequence[float]) -> tuple[float, float, float]:
-    """Return a color of linear light as sRGB; what `linear` gave comes back."""
+    """Return a color of linear light as sRGB; the inverse of `linear`."""
     r, g, b = (c * 12.92 if c <= 0.0031308 else 1.055 * c ** (1 / 2.4) - 0.055 for c in light[:3])
     return r, g, b

@@ -152,7 +152,7 @@ def own_curves(owner: ID) -> None:
     data = owner.animation_data
     if not data or data.action is None:
         return
-    slot = getattr(data, "action_slot", None)  # up to 4.3 whoever has the action has all its curves
+    slot = getattr(data, "action_slot", None)  # up to 4.3 an action has the same curves for all its users
     if (data.action.users if slot is None else len(slot.users())) < 2:
         return
     action = data.action.copy()

@@ -141,7 +141,7 @@ class Preferences(bpy.types.AddonPreferences):
 
 
 def defaults() -> SimpleNamespace:
-    """Return the preferences of one who has changed none."""
+    """Return the default preferences."""
     declared = Preferences.__annotations__
     return SimpleNamespace(**{name: each.keywords["default"] for name, each in declared.items()})
 

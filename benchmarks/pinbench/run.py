@@ -39,7 +39,7 @@ RUNS = {
 
 @dataclass(frozen=True)
 class Answer:
-    """An engine's answer to a problem: SI units, processor time a period."""
+    """An engine's answer to a problem: SI units, processor time per period."""
 
     problem: str
     engine: str

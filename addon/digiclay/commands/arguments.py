@@ -99,7 +99,7 @@ def settings_of(arguments: argparse.Namespace) -> list[Setting]:
 
 
 def _with_method(setting: Setting) -> Setting:
-    """Return a setting of the method by its name, with a method of one's own loaded that it names."""
+    """Return a setting of the method by its name, and load the method of one's own that it may name."""
     return setting._replace(value=load_by_option(setting.value.strip("\"'"), setting.option))
 
 

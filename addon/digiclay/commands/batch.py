@@ -54,7 +54,7 @@ OPTIONS: Options = {
         "default": [],
         "help": "one more method for all scenes, also one of your own, mine.py:Mine; may be repeated",
     },
-    "--jobs N": (read_count, "number of processes; default: one a core"),
+    "--jobs N": (read_count, "number of processes; default: one per core"),
 }
 #: Options of which one may be given.
 INSTEAD = {

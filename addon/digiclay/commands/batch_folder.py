@@ -55,7 +55,7 @@ class Folder:
         return run_folder.resolve_inside(self.path, LOGS, f"{job.name}.log")
 
     def is_done(self, job: Job) -> bool:
-        """Return whether there is a whole run of just this job, and not of one it once was."""
+        """Return whether there is a whole run of this job as it is defined now."""
         return not job.error and is_done(self.find_job(job), self.find_run(job))
 
     def describe(self, job: Job) -> None:
@@ -186,7 +186,7 @@ def _find_series(job: Path) -> Folder | None:
 
 
 def note_failure(job: Path, error: str) -> None:
-    """Keep for the page why a job has failed that was started by itself, or take back what was noted."""
+    """Note for the page why a job failed that was started by itself; an empty text removes the note."""
     with suppress(OSError, DigiclayError):  # the job itself matters more
         series = _find_series(job)
         if series is None:

@@ -131,7 +131,7 @@ class Cluster(Executor):
         """Hand the outcome of a task over, unless it is cancelled; Dask calls this from one thread.
 
         Dask blames the death of a worker on all tasks that it had, also on those that it had not begun. So
-        each gets a second chance, one after the other: who kills once more is to blame.
+        each is tried once more, one after the other: a task that kills another worker is to blame.
 
         Rarely Dask tells of a result and never hands it over. This thread would wait for good, and with it
         all results after that one: the task is repeated then.
@@ -224,12 +224,12 @@ class Cluster(Executor):
 
 
 def _is_lost(answer: Any) -> bool:
-    """Return whether a worker died instead of an answer; one that comes back is asked by its tasks."""
+    """Return whether a worker died instead of answering; one that restarts is asked by its tasks."""
     return isinstance(answer, ConnectionError) or (isinstance(answer, OSError) and answer.errno is None)
 
 
 def _refuse_others(versions_of: Table, here: Versions) -> None:
-    """Refuse versions other than those here; one without digiclay has an error in their place."""
+    """Refuse versions other than those here; a worker without digiclay has an error in their place."""
     others = {name: versions for name, versions in versions_of.items() if versions != here}
     if not others:
         return
@@ -254,7 +254,7 @@ def _describe_exposure(address: str) -> str:
 
 
 def _pack_call(function: Callable[..., Any], *arguments: Any) -> bytes:
-    """Return what `pickle.loads` makes a call of: there a module that is missing is an error of the call."""
+    """Return bytes that `pickle.loads` turns into a call: a missing module then fails inside the call."""
 
     class Call:
         def __reduce__(self) -> tuple[Callable[..., Any], tuple[Any, ...]]:
@@ -264,7 +264,7 @@ def _pack_call(function: Callable[..., Any], *arguments: Any) -> bytes:
 
 
 def _tell(line: str) -> None:
-    """Say what a person should know even without a progress line."""
+    """Print a line that a person should see even without a progress line."""
     start = "\r\033[K" if sys.stderr.isatty() else ""
     print(f"{start}{line}", file=sys.stderr, flush=True)
 

@@ -248,7 +248,7 @@ def _speeds(scene: Scene) -> tuple[Metrics, list[str]]:
 
 
 def table(measured: dict[str, Metrics]) -> Iterator[str]:
-    """Give the lines of the table: a metric a line, a method a column, units people read."""
+    """Give the lines of the table: one line per metric, one column per method, in units people read."""
 
     def write(name: str, value: float | None, factor: float) -> str:
         end = describe_end(value) if name in SPEEDS else ""

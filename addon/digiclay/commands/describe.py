@@ -149,7 +149,7 @@ def _pins(scene: Scene, system: System) -> Iterator[tuple[str, str]]:
 
 
 def _lasting(distance: float, speed: float) -> str:
-    """Write how long a way takes, m and m/s; a reservoir may push the other way."""
+    """Write how long a distance, m, takes at a speed, m/s; a reservoir may push the other way."""
     return f"{distance / speed:.3g} s" if speed > 0.0 else "never"
 
 
@@ -168,7 +168,7 @@ def _rows(system: System) -> Iterator[tuple[str, int]]:
 
 
 def _filled(place: str, text: str) -> str:
-    """Write what stands at a place, on as many lines as it takes."""
+    """Write the text of a place, on as many lines as needed."""
     return textwrap.fill(text, 110, initial_indent=f"  {place:<11} ", subsequent_indent=" " * 14)
 
 

@@ -37,7 +37,7 @@ def _read_address(text: str) -> str:
 
 #: Options of which one says where bundles are evaluated.
 PLACES = {
-    "--workers N": (read_count, "number of processes; default: one a core"),
+    "--workers N": (read_count, "number of processes; default: one per core"),
     "--scheduler ADDRESS": (_read_address, "a Dask cluster instead, such as tcp://127.0.0.1:8786"),
 }
 add_pool = one_of(PLACES)

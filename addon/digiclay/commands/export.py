@@ -92,7 +92,7 @@ OPTIONS = {
         millimeters,
         "base under the lowest point, mm, or with a unit; default: 3 mm",
     ),
-    "--separate": "one file a feature",
+    "--separate": "one file per feature",
     "--unit": (UNITS, "unit of all formats but glb; default: mm", "mm"),
     "--up": (AXES, "upward axis of an obj; default y, as Blender's", UP),
     "--forward": (AXES, "forward axis of an obj, as --forward=-z; default: to --up", ""),

@@ -82,7 +82,7 @@ class Parser(ArgumentParser):
 
 def _asked(word: str, names: Sequence[str]) -> str:
     """Return a suggestion: the only name with this beginning, or the nearest."""
-    bare = {name.lstrip("-").lower(): name for name in names}  # dashes say nothing about who is near
+    bare = {name.lstrip("-").lower(): name for name in names}  # dashes do not count for likeness
     meant = word.lstrip("-").lower()
     longer = [name for name in bare if len(meant) > 1 and name.startswith(meant)]
     close = longer[0] if len(longer) == 1 else find_nearest_name(meant, list(bare), alike=0.6)

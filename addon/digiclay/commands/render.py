@@ -63,7 +63,7 @@ OPTIONS: Options = {
     "--stop T": (seconds, "last instant of the film, s"),
     "--strip": {
         "action": BooleanOptionalAction,
-        "help": "plot of the force over time, a line a fingertip; default: in films",
+        "help": "plot of the force over time, one line per fingertip; default: in films",
     },
 }
 #: What a picture is called by default.

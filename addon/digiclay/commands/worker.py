@@ -154,7 +154,7 @@ class Processes(Generic[Started]):
     def finish(
         self, count: int, pieces: Iterable[Piece], begin: Callable[[Piece], Started]
     ) -> Iterator[tuple[Piece, Started | str]]:
-        """Begin a process a piece, `count` at a time; yield those that ended, and why some did not begin."""
+        """Run a process per piece, `count` at a time; yield those that ended, and why some did not begin."""
         waiting, running = deque(pieces), list[tuple[Piece, Started]]()
         while waiting or running:
             if self.stopped():

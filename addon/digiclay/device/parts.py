@@ -82,7 +82,7 @@ class SkinMeshes(NamedTuple):
 class Sources(NamedTuple):
     """Objects drawn by a bed's geometry nodes, in a collection outside all Blender scenes."""
 
-    #: First a pin a mode, then a pin a level of force, in the order of their codes; then the others.
+    #: First one pin per mode, then one per level of force, in the order of their codes; then the others.
     collection: Collection
     #: An arrow of length 1 that points down and ends at the origin.
     arrow: Object

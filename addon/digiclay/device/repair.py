@@ -1,4 +1,4 @@
-"""Unit of a bed and its fingertip after copy, delete and hide.
+"""Repair of beds and their fingertips after copy, delete and hide.
 
 Blender copies, deletes and hides the objects that are selected, not those that belong to them. The first part
 here finds what is missing or left over then and puts it right; the second, a timer, decides when.
@@ -178,15 +178,15 @@ def _lacking(owner: Object, known: frozenset[int], mended: frozenset[int]) -> It
 
 
 def _holder(part: Object, owner: Object) -> Object | None:
-    """Return what has a part: its parent, or the bed of its palm, unless that is the owner asked about."""
+    """Return the holder of a part: its parent, or the bed of its palm unless the palm is the owner."""
     above = part.parent
     return above.parent if above is not None and above.get(ROLE) == PALM and above != owner else above
 
 
 def _lacks_part(owner: Object, name: str, known: frozenset[int], mended: frozenset[int]) -> bool:
     """Return whether an object without a part of its own is to get one."""
-    # A copy is: it holds the part of the one it was copied from. A bed that has come without is. One whose
-    # part the user has deleted, or taken off it, is not.
+    # A copy is to get one: it holds the part of its original. So is a bed that has come without any.
+    # An object whose part the user has deleted or detached is not.
     part, new = owner.get(name), owner.session_uid not in known
     if part is None:
         return name == FINGER and (new or (FINGER not in owner and owner.session_uid in mended))
@@ -306,7 +306,7 @@ def _remove(left: list[Object]) -> None:
             child.matrix_world = where
         for collection in part.users_collection:
             collection.objects.unlink(part)
-    # Also what Blender has kept of things deleted before, since those still held it.
+    # Also parts that Blender kept only because deleted objects still held them.
     bpy.data.batch_remove([thing for thing in bpy.data.objects if thing.get(OWNED) and not thing.users])
 
 

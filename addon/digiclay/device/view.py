@@ -1,6 +1,6 @@
 """Device in Blender: a bed of instanced pins, its housing and the fingertip.
 
-A bed is one mesh with a vertex a pin. Geometry nodes put a pin on every vertex and pick,
+A bed is one mesh with one vertex per pin. Geometry nodes put a pin on every vertex and pick,
 by the integer attribute ``mode`` or by the force, the one that wears the right material:
 this shows in Solid view too, and redraws 10 000 pins in a millisecond.
 

@@ -29,7 +29,7 @@ SHOWN = 1e-7
 
 
 def read_formed(bed: Object) -> Formed:
-    """Return the pins of a bed, and before: as kept, or at rest; DigiclayError when it is no bed."""
+    """Return the pins of a bed, and before: as kept, or at rest; DigiclayError when the object is no bed."""
     cells = bridge.read_cells(bed.data) | _of_session(bed)
     before: float | Floats = _scene(bed).actuator.rest_height
     if has_reference(bed):

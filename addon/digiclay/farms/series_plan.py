@@ -1,6 +1,6 @@
 """Tasks of a job series on a render farm, and their files for OpenJD, Flamenco and OpenCue.
 
-Of each job: the run, the frames of its films in ranges, and a task a film that encodes them; the page last.
+Of each job: the run, the frames of its films in ranges, one task per film that encodes them; last, the page.
 Each task is a command of digiclay that does nothing, with exit code 0, where it is done already.
 """
 
@@ -50,7 +50,7 @@ class Task:
 
 
 def plan_series(series: JobSeries, chunk: int) -> tuple[Task, ...]:
-    """Return the tasks of all jobs that have a scene, each after those it needs; `chunk` frames a task."""
+    """Return the tasks of all jobs that have a scene, each after those it needs; `chunk` frames per task."""
     tasks = [task for job in series.jobs for task in _plan_job(job, series.outputs, chunk)]
     if not tasks:
         raise OutputError("No job can be submitted: the values of none go together.")

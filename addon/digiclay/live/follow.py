@@ -113,7 +113,8 @@ class Following:
     heard: float | None = None
     #: The newest one (7,); None before the first.
     pose: Floats | None = None
-    #: The newest ones by identity, of a server with several fingertips; who has those of the bed, () before.
+    #: The newest ones by identity, of a server with several fingertips; and the identity of each fingertip of
+    #: the bed, () before.
     fingers: Mapping[int, Floats] = field(default_factory=dict)
     seats: tuple[int | None, ...] = ()
     #: Whether its silence has been reported.

@@ -174,7 +174,7 @@ class AdjustSize(AdjustMixin, Operator):
         devices.set_size(devices.find_first(bed), value)
 
     def rate(self, context: Context, bed: Object) -> float:
-        """Return m a pixel at which the outline's side keeps up with the mouse."""
+        """Return the meters per pixel at which the outline's side keeps up with the mouse."""
         points = self.center + 1e-3 * np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
         middle, along, across = bridge.project(context, bed, points)[:, 0]
         # Half the width on the screen of a circle of 1 mm about the place.

@@ -245,7 +245,7 @@ class ReplayTake(TimedAction, Operator):
         bed, system = bed_of(context), self._system
         state = snapshot.dump(system, self._state)
         self._place(bed)
-        # The session that would go on from here.
+        # The session that continues from here.
         numbers, tick_count = self._numbers, beds.read_tick(bed)
         begun = sculpting.begin_session(
             bed.session_uid,

@@ -112,7 +112,7 @@ def read_session(
 
 
 def _list_numbers(session: running.Running) -> tuple[int, ...]:
-    """Return the numbers of several fingertips; of one there is nothing to tell apart."""
+    """Return the numbers of several fingertips; a single one needs no number."""
     return session.numbers if len(session.numbers) > 1 else ()
 
 

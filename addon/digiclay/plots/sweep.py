@@ -148,7 +148,7 @@ def comparison(
     name: str,
     called: str = "total force",
 ) -> Any:
-    """Draw a force over time, by default the total one, and a bar a method for each metric.
+    """Draw a force over time, by default the total one, and one bar per method and metric.
 
     `forces`: time, s, force, N, and the one asked for, NaN where none is, by method.
     """
@@ -177,7 +177,7 @@ def comparison(
 
 
 def _bars(axes: Any, values: list[float | None], colors: list[str], factor: float) -> None:
-    """Draw a bar a method, its value beside it; a dash where there is none."""
+    """Draw one bar per method with its value beside it; a dash where there is none."""
     longest = max((value * factor for value in values if value is not None), default=0.0) or 1.0
     for line, (value, color) in enumerate(zip(values, colors, strict=True)):
         size = 0.0 if value is None else value * factor

@@ -324,7 +324,7 @@ def register() -> None:
 
 
 def unregister() -> None:
-    """Take the tool away; whoever has it in hand gets the first one."""
+    """Remove the tool; where it is in use, the first tool replaces it."""
     _put_down()
     bpy.utils.unregister_tool(PressTool)
 

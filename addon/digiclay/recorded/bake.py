@@ -72,7 +72,7 @@ MOST_FRAMES = 216_000
 
 @dataclass(frozen=True, eq=False)
 class BakedFrames:
-    """Content of a bake, a row a frame."""
+    """Content of a bake, one row per frame."""
 
     #: (n, 2), axes of the pins, m.
     position: Floats

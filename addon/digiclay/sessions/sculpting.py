@@ -105,7 +105,7 @@ def _load_state(system: System, stored: bytes | None) -> tuple[State, str]:
 def _change_fingers(
     scene: Scene, system: System, stored: bytes | None, was: Numbers, numbers: Numbers
 ) -> bytes | None:
-    """Return a snapshot of fingertips of some numbers as one of the fingertips that a system has."""
+    """Return a snapshot with the state of each fingertip moved to the place of its number in a system."""
     if stored is None or was == numbers:
         return stored
     former = assemble(replace(scene, fingers=scene.fingers[:1] * len(was)))
@@ -346,7 +346,7 @@ def change_scene(
         return replace(moment, snapshot=stored, poses=match_poses(moment.poses, had, others, numbers))
 
     plain = assemble(scene) if images else other.system
-    # What a stroke has formed, it has with the parameters before.
+    # The end of a stroke was formed with the former parameters: it cannot be restored.
     for name in ("gestures", "undone"):
         some = (replace(gesture, stroke="") for gesture in getattr(running, name))
         carried: dict[str, Any] = {name: tuple(some if numbers == was else map(change, some))}
@@ -451,8 +451,8 @@ def drop_strokes(running: Running) -> Running:
 def take_path(running: Running, count: int) -> tuple[Running, Floats, Orders | None]:
     """Return the session, and paths (k + 1, m, 7), k <= count, and orders of its first stroke.
 
-    The paths, of the fingertips that `list_pressing` begins with, end where the stroke waits for the hand:
-    there the clay stands still.
+    The paths are of the first fingertips of `list_pressing`. They end where the stroke waits for the hand:
+    the clay stands still meanwhile.
     """
     stroke = running.strokes[0]
     if stroke.height is None:

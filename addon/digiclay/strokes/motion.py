@@ -64,8 +64,8 @@ TURN = 3.0
 #: that begin on the flank of another one take more than 1 N, one of them 76 N; before, six did, up to 535 N.
 FIRM, PATIENCE, HURRY = 0.5, 0.1, 1.0
 
-#: Fastest drag where no blister follows, m/s and half widths a second, and fastest press there, m/s. Pressed
-#: faster, the fingertip runs into pins whose valves have not opened yet.
+#: Fastest drag where no blister follows, m/s and half widths per second, and fastest press there, m/s.
+#: Pressed faster, the fingertip runs into pins whose valves have not opened yet.
 DRAG, SPAN, PRESS = 0.1, 30.0, 0.02
 #: The fingertip comes down on a slope where it touches a pin so far above the surface below it, m.
 UNEVEN = 0.5e-3 + TIE
@@ -252,7 +252,7 @@ def _follow_once(
     for image, pose in sorted(at.items()):
         samples = stroke.samples[::-1] if parts[image].backward else stroke.samples
         part = alter(parts[image], samples=samples, held=stroke.held)
-        # One that waits lets pass whoever is down: none has to lift again from the clay.
+        # A waiting fingertip gives way to all that touch, so that none has to lift off again.
         others = parts if part.phase == YIELDING else parts[:image]
         down = [at[other.image] for other in others if other.image in at and other.phase in DOWN]
         part = _yield(part, parts[:image], down, device, now, pose)
