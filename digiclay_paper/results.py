@@ -126,8 +126,6 @@ class Session(NamedTuple):
     """As `Result.figures`."""
     lost: list[float]
     """When the fingertip was lost though it rose no faster than a pin can, s."""
-    followers: float
-    """Mean number of cells that follow the force while there are any."""
     windows: dict[str, dict[str, float | None]]
     """RFD, N, and standard deviations over time of total force, N, and of the height under the fingertip, m,
     by the names of `windows.WINDOWS` and of the metrics."""

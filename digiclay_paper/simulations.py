@@ -285,11 +285,10 @@ def _boil_down(scene: Scene) -> Session:
     rows |= {"set_point": find_set_point(done.scene.set_point, follow), "following": follow}
     kept = {name: np.concatenate([values[:-1:THINNED], values[-1:]]) for name, values in rows.items()}
     kept["position"] = done.history["position"]
-    followers = float(follow[follow > 0].mean()) if np.any(follow) else 0.0
     early = done.history["time"] <= DETAIL
     detail = {name: done.history[name][early] for name in ("time", "height")}
     lost, windows = speed_limits.find_unintended_losses(done), measure_windows(done)
-    return Session(done.scene, kept, detail, done.figures, lost, followers, windows)
+    return Session(done.scene, kept, detail, done.figures, lost, windows)
 
 
 def _swing(

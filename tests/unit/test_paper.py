@@ -42,7 +42,7 @@ GOOD = Follows(speed=15e-3, losses=0, loss_share=0.0, lag=1e-3, rfd=0.02)
 
 def session_of(scene, history=()):
     """Return a session of which nothing but its history is known."""
-    return Session(scene, dict(history), {}, {}, [], 0.0, {})
+    return Session(scene, dict(history), {}, {}, [], {})
 
 
 def results(*swings, **bad):
