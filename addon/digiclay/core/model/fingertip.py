@@ -8,6 +8,7 @@ the force on a tall pin that the fingertip meets sideways must grow, not jump.
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import TypeVar
 
 import numpy as np
@@ -91,7 +92,17 @@ class Fingertip(Parameters):
         Center x, y, z, m; matrix of the squared reduced radius S_xx, S_xy, S_yy, 1/m²; tilt of the mid
         surface t_x, t_y; half thickness over the center, m; smaller eigenvalue of S, 1/m².
         """
-        rotation = make_matrices(poses[:, 3:])
+        turns, outlines = poses[:, 3:], np.empty((len(poses), 10))
+        if len(turns) and (turns == turns[0]).all():
+            outlines[:] = _outline_turn(self, turns[0].tobytes())
+        else:
+            outlines[:] = self._outline_turns(turns)
+        outlines[:, :3] += poses[:, :3]
+        return outlines
+
+    def _outline_turns(self, turns: Floats) -> Floats:
+        """Return the outlines (k, 10) of a fingertip at the origin with unit quaternions (k, 4)."""
+        rotation = make_matrices(turns)
         axes = np.array([self.length, self.width, self.height])
         inverse = np.einsum("kij,j,klj->kil", rotation, axes**2, rotation)
         form = np.einsum("kij,j,klj->kil", rotation, axes**-2.0, rotation)
@@ -101,8 +112,13 @@ class Fingertip(Parameters):
         a, b, c = schur[:, 0, 0], schur[:, 0, 1], schur[:, 1, 1]
         larger = 0.5 * (a + c) + np.hypot(0.5 * (a - c), b)
         smaller = (a * c - b * b) / larger  # eigenvalue
-        center = lowest + poses[:, :3]
-        return np.column_stack([center, schur[:, 0], c, tilt, form[:, 2, 2] ** -0.5, smaller])
+        return np.column_stack([lowest, schur[:, 0], c, tilt, form[:, 2, 2] ** -0.5, smaller])
+
+
+@lru_cache(64)
+def _outline_turn(fingertip: Fingertip, turn: bytes) -> Floats:
+    """Return the outline (1, 10) at the origin: most fingertips do not turn from period to period."""
+    return fingertip._outline_turns(np.frombuffer(turn)[None])
 
 
 def compute_reaches(outline: Floats) -> Floats:
