@@ -31,7 +31,7 @@ ROOMS = {
     "steppers": "base model",
     "engine": "base model",
     "surface": "base model",
-    "mesh_io": "base files surface",
+    "mesh_io": "base files model surface",
     "shapes": "base files model surface mesh_io",
     "control": "base files model shapes",
     "metrics": "base model",

@@ -1,7 +1,7 @@
-"""Systems side by side, each a column of one set of arrays: the runs of a batch.
+"""Runs of a batch side by side: each is a column of one set of arrays.
 
-Parts are merged, so that a number that differs is an array with an entry a column; a control period takes as
-many numpy calls as that of one system.
+Equal parts are shared; a number that differs between runs becomes an array with one entry per run. A control
+period therefore takes as many numpy calls as that of a single run.
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ from ..model.touch import FingerPeriod
 
 
 class PaddedSelection(Selection):
-    """Selection of the active cells of many sessions, for all of them anew as soon as one needs it.
+    """Selection of the active cells of all runs, renewed for all as soon as one run needs it.
 
-    Where fewer are active than in another run, others make up the number. They could as well be
-    left out, so it does no harm that they are not.
+    All runs have as many cells as the largest set. Those that fill up a smaller one are idle: to integrate
+    them changes nothing.
     """
 
     margin_pitches = 0.5
@@ -53,58 +53,57 @@ class PaddedSelection(Selection):
 
 @dataclass(frozen=True, eq=False)
 class OwnSelection(Selection):
-    """Selection of the cells that are active in each session alone, for sessions that depend on them.
+    """Selection of the cells that each run has active when alone, for methods that depend on the set.
 
-    Where fewer are active than in another run, others make up the number; of these nothing is measured
-    and nothing is commanded.
+    Idle cells fill up the smaller sets; they are neither measured nor commanded.
     """
 
     runs: tuple[Selection, ...]
-    """The sessions' own."""
+    """Selection of each run."""
 
     def update(self, state: State, finger: FingerPeriod | None, control: Any) -> State:
-        """Return a state whose active cells are those of each session; see `Selection.update`."""
+        """Return a state whose active cells are those of each run; see `Selection.update`."""
         active, period, count = state.active, state.period, len(self.runs)
-        # Before the first period there are no sets; those are as good as outlived.
-        own = list(active.own or [replace(active, cells=np.empty(0, np.intp))] * count)
+        # Before the first period there are no sets: empty ones are due.
+        sets = list(active.runs or [replace(active, cells=np.empty(0, np.intp))] * count)
         windows = np.broadcast_to(finger.window, (6, count)).T.tolist() if finger else [None] * count
         discs = control or [None] * count
         due = [
             run
             for run, selection in enumerate(self.runs)
-            if not selection.serves(own[run], period, windows[run], discs[run])
+            if not selection.serves(sets[run], period, windows[run], discs[run])
         ]
         if period < active.until and not due:
             return state
         moving, peak = self.release(state), state.peak.copy()
         for run in due:
-            size = own[run].cells.size
+            size = sets[run].cells.size
             top = float(active.block[0, :size, run].max(initial=peak[run]))
             peak[run], still = top, moving[:size, run]
-            own[run] = self.runs[run].choose(own[run], period, windows[run], discs[run], still, top)
-        near, until = max(one.near for one in own), min(one.until for one in own)
-        chosen = replace(active, cells=_pad(own, self.grid.count), near=near, until=until, own=tuple(own))
+            sets[run] = self.runs[run].choose(sets[run], period, windows[run], discs[run], still, top)
+        near, until = max(part.near for part in sets), min(part.until for part in sets)
+        cells = _pad(sets, self.grid.count)
+        chosen = replace(active, cells=cells, near=near, until=until, runs=tuple(sets))
         return state._replace(peak=peak, active=self.take(state, chosen))
 
 
-def _pad(own: Sequence[ActiveSet], count: int) -> Cells:
-    """Return the cells (w, b) of all sets, with as many others of the `count` behind them as it takes."""
-    width = max(one.cells.size for one in own)
-    others = np.ones((len(own), count), np.bool_)
+def _pad(sets: Sequence[ActiveSet], count: int) -> Cells:
+    """Return the cells (w, b) of all sets, filled up with other cells of the bed, which has `count`."""
+    width = max(part.cells.size for part in sets)
     columns = []
-    for one, free in zip(own, others, strict=True):
-        free[one.cells] = False
-        columns.append(np.concatenate([one.cells, np.flatnonzero(free)[: width - one.cells.size]]))
+    for part in sets:
+        others = np.delete(np.arange(count), part.cells)
+        columns.append(np.concatenate([part.cells, others])[:width])
     return np.stack(columns, axis=-1)
 
 
-#: Cells moved at a time: as many as stay in a core's cache, and few enough for the matrix products to stay
-#: on one core (waking a second one takes longer than the product).
+#: Cells moved at a time: they fit into the cache of a core, and their matrix products run on one core, since
+#: to wake a second one takes longer than the product.
 PIECE = 2048
 
 
-#: Cells of a run out of the fingertip's reach are moved by so many at a time, or a multiple: workspaces of
-#: few sizes serve for any number of them.
+#: Cells out of the fingertips' reach are moved in multiples of this number, so that workspaces of few sizes
+#: serve for any number.
 GROUP = 8
 
 
@@ -113,29 +112,29 @@ class BatchMovement:
 
     def __init__(self, batch: Batch, rows: Floats, near: int) -> None:
         self._stepper, self._plan = stepper, plan = batch.stepper, batch.plan
-        # Where the cells of all runs are alike, they are moved as those of one large bed.
+        # If the cells of all runs are alike, they are moved as those of one large bed.
         self._alike = alike = plan is batch.systems[0].plan
-        # What moves a pin without a fingertip: its opening and its commands.
+        # A pin without a fingertip is moved by its valve: the rows of openings and commands.
         self._rows, self._near, self._valves = rows, near, rows[batch.cell.lag_rows.start :, near:]
-        own = self._beds(rows)
+        beds = self._beds(rows)
         count = near * rows.shape[2] if alike else near
         parts = _pieces(count, 1 if alike else rows.shape[2])
         self._touched = [
-            (part, stepper.prepare(plan, own[:, part], part.stop - part.start)) for part in parts
+            (part, stepper.prepare(plan, beds[:, part], part.stop - part.start)) for part in parts
         ]
         self._others: dict[int, tuple[Floats, Movement]] = {}
 
     def _beds(self, values: Floats) -> Floats:
-        """Return values (r, n, b) as the stepper takes them: (r, n b) where all cells are alike."""
+        """Return values (r, n, b) for the stepper: (r, n b) if all cells are alike."""
         return values.reshape(len(values), -1) if self._alike else values
 
     def __call__(self, under: Floats) -> Floats:
-        """Move the cells on by one control period, in place; return the force on the near ones, (k, b), N."""
+        """Move the cells by one control period, in place; return the force on the near ones, (k, b), N."""
         force = np.empty((1, *under.shape[1:]))
-        own, seen = self._beds(force)[0], self._beds(under)
+        forces, undersides = self._beds(force)[0], self._beds(under)
         for part, move in self._touched:
-            own[part] = move(seen[:, part])
-        # Beyond the fingers nothing moves whose valve is shut, with no command on its way: squares sum to 0.
+            forces[part] = move(undersides[:, part])
+        # Beyond the fingertips a pin with a shut valve and no queued command rests: squares sum to 0.
         awake = self._near + np.flatnonzero(np.einsum("rwb,rwb->w", self._valves, self._valves))
         for part in _pieces(awake.size, force.shape[2]):
             self._move_others(awake[part], under[:, :0])
@@ -143,7 +142,7 @@ class BatchMovement:
         return felt
 
     def _move_others(self, cells: Any, none: Floats) -> None:
-        """Move some cells out of the fingers' reach, each of all runs."""
+        """Move cells out of the fingertips' reach, the same ones in all runs."""
         size = -(-cells.size // GROUP) * GROUP
         if size not in self._others:
             rows = np.zeros((len(self._rows), size, self._rows.shape[2]))
@@ -155,7 +154,7 @@ class BatchMovement:
 
 
 def _pieces(count: int, runs: int) -> Iterator[slice]:
-    """Cut some cells of each run into pieces of about one size, none larger than `PIECE` in all runs."""
+    """Cut cells of all runs into pieces of about equal size, each at most `PIECE` over all runs."""
     pieces = -(-count * runs // PIECE)
     for i in range(pieces):
         yield slice(count * i // pieces, count * (i + 1) // pieces)
@@ -163,13 +162,13 @@ def _pieces(count: int, runs: int) -> Iterator[slice]:
 
 @dataclass(frozen=True, eq=False)
 class Batch(System):
-    """All that does not change in b sessions on one layout."""
+    """Parts and constants of b runs on one layout."""
 
     systems: tuple[System, ...]
-    """Those of the runs."""
+    """System of each run."""
 
     def prepare(self, active: ActiveSet) -> BatchMovement:
-        """Prepare to move one set of cells of all runs."""
+        """Return the movement of an active set of all runs."""
         return BatchMovement(self, active.driven, active.near)
 
 
@@ -185,7 +184,7 @@ def make_batch(systems: Sequence[System]) -> Batch:
     first, cell = systems[0], merge_parts([system.cell for system in systems])
     period, fastest = np.array([(system.period, system.fastest) for system in systems], np.float64).T
     common = first.grid, first.rows, cell, period, fastest
-    own = tuple(system.selection for system in systems)
+    selections = tuple(system.selection for system in systems)
     return Batch(
         grid=first.grid,
         cell=cell,
@@ -195,7 +194,7 @@ def make_batch(systems: Sequence[System]) -> Batch:
         plan=merge_parts([system.plan for system in systems]),
         period=period,
         fastest=fastest,
-        selection=OwnSelection(*common, own) if first.by_set else PaddedSelection(*common),
+        selection=OwnSelection(*common, selections) if first.by_set else PaddedSelection(*common),
         instants=first.instants,
         rows=first.rows,
         by_set=first.by_set,

@@ -1,4 +1,4 @@
-"""Runs of a batch played in step: paths of their fingertips, periods, and which runs go on."""
+"""Simulation of a batch, period by period: fingertip paths, and runs that end and leave."""
 
 import math
 import time
@@ -23,35 +23,40 @@ from .columns import Batch, begin, make_batch
 
 
 def extend_path(
-    path: FingerPath | None, systems: Sequence[System], ways: Sequence[Trajectory], period: int
+    path: FingerPath | None, systems: Sequence[System], trajectories: Sequence[Trajectory], period: int
 ) -> FingerPath | None:
-    """Return the fingertip path of a batch in a period and some more; None where nothing touches."""
+    """Return the fingertip path of a batch in a period and later ones; None without contact."""
     if systems[0].cell.touch is None or (path and period < path.first + len(path.forms)):
         return path
-    runs = {_list_causes(*run): run for run in zip(systems, ways, strict=True)}
-    alone = runs.values() if len(runs) == 1 else zip(systems, ways, strict=True)
-    return join_paths([_trace_run(system, way, period) for system, way in alone])
+    runs = {_list_causes(*run): run for run in zip(systems, trajectories, strict=True)}
+    alone = runs.values() if len(runs) == 1 else zip(systems, trajectories, strict=True)
+    return join_paths([_trace_run(system, trajectory, period) for system, trajectory in alone])
 
 
-def _list_causes(system: System, way: Trajectory) -> tuple[Any, ...]:
-    """Return what a run's fingertip path depends on."""
-    arrays = (system.instants, way.times, way.positions, way.orientations)
+def _list_causes(system: System, trajectory: Trajectory) -> tuple[Any, ...]:
+    """Return the data that determine the fingertip path of a run."""
+    arrays = (system.instants, trajectory.times, trajectory.positions, trajectory.orientations)
     touch = system.cell.touch
-    return touch and touch.fingertip, way.interpolation, system.period, *(one.tobytes() for one in arrays)
+    return (
+        touch and touch.fingertip,
+        trajectory.interpolation,
+        system.period,
+        *(values.tobytes() for values in arrays),
+    )
 
 
-def _trace_run(system: System, way: Trajectory, first: int) -> FingerPath:
-    """Compute the fingertip path of one run in some periods."""
+def _trace_run(system: System, trajectory: Trajectory, first: int) -> FingerPath:
+    """Return the fingertip path of one run from period `first` on."""
     assert system.cell.touch is not None
     starts = (first + np.arange(CHUNK)) * system.period
-    poses = way.poses((starts[:, None] + system.instants).ravel()).reshape(CHUNK, -1, 7)
+    poses = trajectory.poses((starts[:, None] + system.instants).ravel()).reshape(CHUNK, -1, 7)
     return trace_finger(system.cell.touch.fingertip, poses, first)
 
 
 def find_diverged(state: State) -> NDArray[np.bool_]:
-    """Return which runs, (b,), hold numbers that are not finite."""
+    """Return which runs, (b,), have numbers that are not finite."""
     block = state.active.block
-    # One sum tells that all is well, as it nearly always is.
+    # A finite sum, the usual case, shows that all numbers are finite.
     if math.isfinite(np.add.reduce(block, axis=None)):
         return np.zeros(block.shape[2], np.bool_)
     finite: NDArray[np.bool_] = np.isfinite(block.sum(axis=(0, 1)))
@@ -69,9 +74,9 @@ def make_divergence_error(batch: Batch, state: State, run: int) -> DivergenceErr
 
 
 def select_runs(state: State, runs: Sequence[int]) -> State:
-    """Return the state of some of the runs. `runs`: their indices on the last axis."""
+    """Return the state of some runs; `runs`: their indices on the last axis."""
     chosen, former = np.array(runs, np.intp), state.active
-    # The discs are not worth keeping: the set is made anew.
+    # The set is renewed at once: its discs are not needed.
     active = replace(
         former,
         cells=former.cells[:, chosen],
@@ -80,26 +85,26 @@ def select_runs(state: State, runs: Sequence[int]) -> State:
         quadratic_basis=former.quadratic_basis[..., chosen],
         peak=former.peak[chosen],
         until=0,
-        own=tuple(former.own[run] for run in runs) if former.own else (),
+        runs=tuple(former.runs[run] for run in runs) if former.runs else (),
     )
     several = (state.rows, state.modes, state.aged)
-    rows, modes, aged = (np.ascontiguousarray(one[..., chosen]) for one in several)
+    rows, modes, aged = (np.ascontiguousarray(rows[..., chosen]) for rows in several)
     memory = [state.memory[run] for run in runs]
     return State(state.period, rows, modes, aged, state.peak[chosen], active, memory)
 
 
 @dataclass(frozen=True, eq=False)
 class Play:
-    """Sessions under way, and all it takes to go on."""
+    """Batch at one instant, with all that the next period needs."""
 
-    ways: Mapping[int, Trajectory]
-    """By the numbers of their runs."""
+    trajectories: Mapping[int, Trajectory]
+    """By the numbers of the runs."""
     runs: tuple[int, ...]
-    """Whose the last axis is."""
+    """Numbers of the runs, in the order of the last axis."""
     batch: Batch
     state: State
     path: FingerPath | None = None
-    """Of the fingertips, in the coming periods as far as it is computed."""
+    """Fingertip paths in the coming periods, as far as computed."""
 
     @property
     def finger(self) -> FingerPeriod | None:
@@ -108,44 +113,44 @@ class Play:
 
 
 def begin_play(scenes: Mapping[int, Scene], systems: Mapping[int, System]) -> Play:
-    """Return sessions before their first control period. `scenes`: by the numbers of their runs."""
+    """Return a batch before its first control period; `scenes`: by the numbers of the runs."""
     batch = make_batch([systems[run] for run in scenes])
-    ways = {run: require_one(scene.trajectories()) for run, scene in scenes.items()}
-    return Play(ways, tuple(scenes), batch, begin(batch))
+    trajectories = {run: require_one(scene.trajectories()) for run, scene in scenes.items()}
+    return Play(trajectories, tuple(scenes), batch, begin(batch))
 
 
 def locate_fingers(play: Play) -> Play:
-    """Return the sessions with the way of their fingers through the coming control period."""
-    ways = [play.ways[run] for run in play.runs]
-    return replace(play, path=extend_path(play.path, play.batch.systems, ways, play.state.period))
+    """Return the batch with the fingertip paths in the coming control period."""
+    trajectories = [play.trajectories[run] for run in play.runs]
+    return replace(play, path=extend_path(play.path, play.batch.systems, trajectories, play.state.period))
 
 
 def keep_runs(play: Play, runs: tuple[int, ...]) -> Play:
-    """Return some of the sessions. `runs`: those that go on."""
-    places = [play.runs.index(run) for run in runs]
-    batch = make_batch([play.batch.systems[place] for place in places])
-    return replace(play, runs=runs, batch=batch, state=select_runs(play.state, places), path=None)
+    """Return the batch with only the runs that continue."""
+    columns = [play.runs.index(run) for run in runs]
+    batch = make_batch([play.batch.systems[column] for column in columns])
+    return replace(play, runs=runs, batch=batch, state=select_runs(play.state, columns), path=None)
 
 
 @dataclass(frozen=True, eq=False)
 class Instant:
-    """The sessions after a control period."""
+    """Batch after a control period."""
 
     play: Play
     over: NDArray[np.bool_]
     failed: NDArray[np.bool_]
-    """(b,): Which have come to their end, and which of them in an error."""
+    """(b,): Which runs have ended, and which of them by an error."""
     share: float
-    """The time each has taken, s: every period's, divided by the runs that were in the batch."""
+    """Computing time per run, s: that of each period, divided by the runs then in the batch."""
 
     def ended(self, index: int) -> Ended:
-        """Return how far the run at an index of the last axis has come."""
+        """Return the end of the run at an index of the last axis."""
         state = self.play.state
         return Ended(state.period, self.share, count_losses(state.memory[index]))
 
 
 def play_all(play: Play, ends: Mapping[int, int], stopped: Callable[[], bool] | None) -> Iterator[Instant]:
-    """Yield the sessions after each control period; what is at its end leaves before the next one."""
+    """Yield the batch after each control period; runs that have ended leave it before the next one."""
     share = 0.0
     while play.runs:
         started = time.perf_counter()

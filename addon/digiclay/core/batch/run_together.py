@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ..base.arrays import Array, Floats
 from ..base.errors import DigiclayError, ParameterError
-from ..base.modes import Mode
+from ..base.modes import FORCE_FOLLOW
 from ..engine.simulation import repeat_period
 from ..engine.state import ActiveSet
 from ..engine.system import System
@@ -22,9 +22,6 @@ from ..session.memory_limit import check_memory
 from ..session.run_scene import Result, evaluate, measure_losses, report
 from .play import Instant, Play, begin_play, keep_runs, locate_fingers, make_divergence_error, play_all
 from .structure import Findings, describe_structure
-
-#: A plain number: numpy compares with it ten times as fast.
-FORCE_FOLLOW = np.int8(Mode.FORCE_FOLLOW)
 
 
 class Histories:
@@ -44,8 +41,8 @@ class Histories:
 
     def _store(self, stretch: Stretch) -> None:
         """Keep a stretch of the runs that are present."""
-        for run, own in zip(self._present, stretch.split(), strict=True):
-            self._stretches[run].append(own)
+        for run, part in zip(self._present, stretch.split(), strict=True):
+            self._stretches[run].append(part)
 
     def observe(self, now: Instant) -> None:
         """Record a control period."""
@@ -118,9 +115,9 @@ class Sums:
         same = tuple(finger.trajectory for finger in scene.fingers), time, count, period
         if same not in self._ways:
             moments = np.minimum(np.arange(count) * self._every, period) * time
-            tip = play.ways[run].poses(moments)
-            places = np.unique(tip[:, :2], axis=0)
-            near = [np.argmin((grid.x - x) ** 2 + (grid.y - y) ** 2) for x, y in places]
+            tip = play.trajectories[run].poses(moments)
+            points = np.unique(tip[:, :2], axis=0)
+            near = [np.argmin((grid.x - x) ** 2 + (grid.y - y) ** 2) for x, y in points]
             self._ways[same] = moments, tip, np.unique(near)
         moments, tip, cells = self._ways[same]
         metrics = {
@@ -170,9 +167,9 @@ def _follow(monitor: Monitor, leader: Play) -> Monitor:
         play = keep_runs(play, leader.runs)
     play = locate_fingers(play)
     play = replace(play, state=repeat_period(play.batch, play.state, play.finger, leader.state))
-    own, other, force = play.state.active, leader.state.active, play.batch.rows.force
-    near = slice(own.near)
-    differences = compare(own.block[0], own.block[force, near], other.block[0], other.block[force, near])
+    force, blocks = play.batch.rows.force, (play.state.active.block, leader.state.active.block)
+    near = slice(play.state.active.near)
+    differences = compare(*(rows for block in blocks for rows in (block[0], block[force, near])))
     return Monitor(play, np.maximum(largest, differences))
 
 

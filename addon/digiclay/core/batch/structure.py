@@ -1,4 +1,4 @@
-"""Structure of scenes: those of one structure go together in a batch."""
+"""Structure of scenes: a batch has scenes of one structure."""
 
 from collections.abc import Callable
 from dataclasses import fields, is_dataclass, replace
@@ -11,15 +11,15 @@ from ..steppers.bernoulli import BernoulliPlan
 
 
 def classify(value: Any) -> Any:
-    """Return all of a part but its numbers: parts of one kind can be merged."""
+    """Return a part without its numbers; parts for which it is equal can be merged."""
     if is_dataclass(value) and not isinstance(value, type):
         return type(value), *(classify(getattr(value, field.name)) for field in fields(value))
     if isinstance(value, tuple):
-        return tuple(classify(one) for one in value)
+        return tuple(classify(part) for part in value)
     return float if isinstance(value, float) else value
 
 
-#: The steppers that know how to move cells whose numbers differ from run to run.
+#: Steppers for cells whose numbers differ from run to run.
 CLOSED_FORM = ("bernoulli", "richardson")
 
 
@@ -27,32 +27,32 @@ CLOSED_FORM = ("bernoulli", "richardson")
 PHYSICS = ("actuator", "supply", "fluid", "valve", "conduit", "valve_lag", "delay", "contact", "relaxation")
 
 
-#: How many kinds of parts, motions of cells and beds are kept: a bed can have a million cells.
+#: Most cached kinds of parts, motions of cells, and beds: a bed can have a million cells.
 KINDS, MOTIONS, BEDS = 4096, 1024, 2
 
 
 class Findings:
-    """Results of functions of parts, kept for scenes with equal parts."""
+    """Cache of functions of parts, for scenes with equal parts."""
 
     def __init__(self) -> None:
-        self._known: dict[int, dict[Any, Any]] = {KINDS: {}, MOTIONS: {}, BEDS: {}}
+        self._results: dict[int, dict[Any, Any]] = {KINDS: {}, MOTIONS: {}, BEDS: {}}
 
     def find(self, most: int, key: Any, make: Callable[..., Any], *given: Any) -> Any:
-        """Return what was made for an equal key, or make it; the first goes when there are `most`."""
-        kept = self._known[most]
-        if key not in kept:
-            if len(kept) >= most:
-                del kept[next(iter(kept))]
-            kept[key] = make(*given)
-        return kept[key]
+        """Return the result for a key, computed once; the oldest of `most` results is dropped."""
+        results = self._results[most]
+        if key not in results:
+            if len(results) >= most:
+                del results[next(iter(results))]
+            results[key] = make(*given)
+        return results[key]
 
 
 def describe_structure(scene: Scene, findings: Findings | None = None) -> Any:
-    """Return what scenes must have in common to stand in one batch.
+    """Return a key that scenes of one batch have in common.
 
-    With the closed-form step and Richardson's form of it, it is the kinds of the parts, not their numbers.
-    The other steppers know no runs, so for them all cells must be alike. `findings`: of scenes before.
-    Raises ParameterError when the scene's parts do not go together.
+    For the closed-form and the Richardson stepper it has the kinds of the parts, not their numbers. Other
+    steppers have no axis of runs: all cells must be alike. `findings`: cache of earlier scenes. Raises
+    ParameterError if the parts of the scene are not compatible.
     """
     if len(scene.fingers) != 1:
         return "one by one", len(scene.fingers)

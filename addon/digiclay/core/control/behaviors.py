@@ -10,7 +10,7 @@ import numpy as np
 
 from ..base.arrays import Cells, Flags, Floats, Modes
 from ..base.errors import ParameterError
-from ..base.modes import Mode
+from ..base.modes import BLISTER, FORCE_FOLLOW, HOLD, REST, SPRING
 from ..base.quantity import quantity
 from ..model.actuator import Actuator
 from ..model.control_interface import Commands, Measurement, Memory
@@ -46,10 +46,10 @@ class ElasticControl(CellwiseControl):
         """Let pressed cells give way, and the others spring back; see `Controller`."""
         gains, rest = self.parameters, self.actuator.rest_height
         error = rest - seen.height
-        pressed = seen.force >= gains.felt_force * np.where(seen.mode == Mode.SPRING, STILL, 1.0)
+        pressed = seen.force >= gains.felt_force * np.where(seen.mode == SPRING, STILL, 1.0)
         giving = (gains.stiffness * error - seen.force) / gains.damping
         speed = np.where(pressed, giving, self.drive.approach(error))
-        mode = np.where(pressed, np.int8(Mode.SPRING), np.int8(Mode.REST))
+        mode = np.where(pressed, SPRING, REST)
         target = np.full(seen.height.shape, rest)
         return memory, Commands(target, mode, self.drive.command(speed, seen.force))
 
@@ -91,8 +91,8 @@ class PlasticControl(CellwiseControl):
         speed = np.where(pressed, np.minimum(back, 0.0), back)
         np.putmask(speed, yielding, (limits.yield_force - seen.force) / limits.damping)
         mode = self.drive.mark_formed(target, self.actuator.rest_height)
-        np.putmask(mode, pressed, np.int8(Mode.SPRING))
-        np.putmask(mode, yielding, np.int8(Mode.FORCE_FOLLOW))
+        np.putmask(mode, pressed, SPRING)
+        np.putmask(mode, yielding, FORCE_FOLLOW)
         return memory, Commands(target, mode, self.drive.command(speed, seen.force))
 
 
@@ -191,12 +191,12 @@ class ViscousControl:
         """Return the modes: pressed, drawn along by a pressed neighbor, recovering, at rest."""
         drawn = np.zeros(cells.size, np.bool_)
         if pressed.any():
-            for one, other, _ in self.exchange.find_pairs(cells):
-                drawn[one] |= pressed[other]
-                drawn[other] |= pressed[one]
-        mode = np.where(formed, np.int8(Mode.HOLD), np.int8(Mode.REST))
-        np.putmask(mode, drawn & formed, np.int8(Mode.BLISTER))
-        np.putmask(mode, pressed, np.int8(Mode.SPRING))
+            for first, second, _ in self.exchange.find_pairs(cells):
+                drawn[first] |= pressed[second]
+                drawn[second] |= pressed[first]
+        mode = np.where(formed, HOLD, REST)
+        np.putmask(mode, drawn & formed, BLISTER)
+        np.putmask(mode, pressed, SPRING)
         return mode
 
 

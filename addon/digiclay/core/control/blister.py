@@ -10,7 +10,7 @@ import numpy as np
 
 from ..base.arrays import TIE, Constants, Flags, Floats, Modes
 from ..base.errors import ParameterError
-from ..base.modes import Mode
+from ..base.modes import BLISTER, EDGE, FROZEN
 from ..base.quantity import Parameters, quantity
 from ..model.control_interface import Measurement
 from ..model.layout import RELATIVE_TOLERANCE
@@ -68,7 +68,7 @@ class Blister(Parameters):
 HELD = 0.4
 #: It is freed when it lies less far behind than this share of the cosine from which cells freeze.
 FREED = 0.3
-CODES = Constants((Mode.EDGE, Mode.BLISTER, Mode.FROZEN), np.int8)
+CODES = Constants((EDGE, BLISTER, FROZEN), np.int8)
 
 
 class BlisterCells(NamedTuple):

@@ -101,7 +101,7 @@ class Patch(NamedTuple):
     losses: int = 0
 
     @property
-    def place(self) -> tuple[float, float] | None:
+    def position(self) -> tuple[float, float] | None:
         """Where the fingertip is, m; None: none is felt."""
         return (self.x, self.y) if self.felt else None
 
@@ -260,8 +260,8 @@ class CellStatesControl:
             else:
                 after[i] = memory._replace(felt=False, losses=memory.losses + memory.felt)
         in_blister, left_behind, at_edge = around
-        places = {"in_blister": in_blister, "left_behind": left_behind, "at_edge": at_edge}
-        mode = follow_arrows(mode, BY_PLACE, places | {"outside": ~(in_blister | at_edge)})
+        regions = {"in_blister": in_blister, "left_behind": left_behind, "at_edge": at_edge}
+        mode = follow_arrows(mode, BY_PLACE, regions | {"outside": ~(in_blister | at_edge)})
         np.putmask(target, mode == BLISTER, shape)
         mode = self._resting(mode, target, seen.force)
         seen.own[0] = np.where(mode == CRITICAL, seen.own[0] + 1.0, 0.0)
@@ -318,7 +318,7 @@ class CellStatesControl:
         spring = mode <= HOLD
         spring |= mode == SPRING
         formed = mark_formed(target, self.actuator.rest_height, self.parameters.dead_band)
-        return np.where(spring, np.where(force > TIE, np.int8(SPRING), formed), mode)
+        return np.where(spring, np.where(force > TIE, SPRING, formed), mode)
 
     def _commands(self, seen: Measurement, mode: Modes, target: Floats, under: Flags, most: Any) -> Floats:
         """Return valve commands: force control under the fingertip, springs and profile elsewhere."""

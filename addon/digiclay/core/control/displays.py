@@ -13,7 +13,7 @@ import numpy as np
 
 from ..base.arrays import TIE, Floats
 from ..base.errors import ParameterError
-from ..base.modes import Mode
+from ..base.modes import BLISTER, FORCE_FOLLOW, REST
 from ..base.quantity import quantity
 from ..files.formats import map_array
 from ..model.actuator import Actuator
@@ -136,15 +136,15 @@ class ForceDisplayControl(CellwiseControl):
         asked = take_cells(self.field, seen.cells)
         pressed = seen.force >= gains.felt_force
         alone = np.where(pressed, 0.0, seen.own[0] + 1.0)
-        kept = (seen.mode == Mode.FORCE_FOLLOW) & (alone * self.period <= gains.release_time + TIE)
-        felt = pressed | kept
+        lasting = (seen.mode == FORCE_FOLLOW) & (alone * self.period <= gains.release_time + TIE)
+        felt = pressed | lasting
         seen.own[0] = np.where(felt, alone, 0.0)
         limit = np.minimum(rest + gains.rise, self.actuator.stroke)
         pressing = np.minimum(
             (asked - seen.force) / gains.damping, (limit - seen.height) / self.drive.settling_time
         )
         speed = np.where(felt, pressing, self.drive.approach(rest - seen.height))
-        mode = np.where(felt, np.int8(Mode.FORCE_FOLLOW), np.int8(Mode.REST))
+        mode = np.where(felt, FORCE_FOLLOW, REST)
         target = np.full(seen.height.shape, rest)
         return memory, Commands(target, mode, self.drive.command(speed, seen.force))
 
@@ -261,7 +261,7 @@ class ShapeDisplayControl:
         error = target - seen.height
         command = self.drive.command(self.drive.approach(error), seen.force)
         mode = self.drive.mark_formed(target, self.actuator.rest_height)
-        np.putmask(mode, np.abs(error) > self.parameters.dead_band, np.int8(Mode.BLISTER))
+        np.putmask(mode, np.abs(error) > self.parameters.dead_band, BLISTER)
         return memory, Commands(target, mode, command)
 
     def _make_moves(self, memory: Progress, seen: Measurement) -> tuple[Progress, Floats]:

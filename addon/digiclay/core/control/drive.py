@@ -111,7 +111,7 @@ def _look_up(speed: Floats, speeds: Floats) -> Floats:
         openings: Floats = np.interp(speed, speeds, OPENINGS)
         return openings
     runs = zip(speed.T, speeds.T, strict=True)
-    return np.stack([np.interp(own, table, OPENINGS) for own, table in runs], axis=-1)
+    return np.stack([np.interp(speeds, table, OPENINGS) for speeds, table in runs], axis=-1)
 
 
 def find_free_speeds(cell: Cell, pressure: float) -> Floats:

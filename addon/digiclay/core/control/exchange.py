@@ -48,13 +48,12 @@ class Exchange:
         Of two neighbors the lesser weight, (m,) from 0 to 1, is the part of the exchange that takes place.
         """
         change = np.zeros(cells.size)
-        for one, other, share in self.find_pairs(cells):
-            flow = share * (values[other] - values[one])
+        for first, second, share in self.find_pairs(cells):
+            flow = share * (values[second] - values[first])
             if weight is not None:
-                flow *= np.minimum(weight[one], weight[other])
-            change += np.bincount(one, flow, cells.size) - np.bincount(other, flow, cells.size)
-        evened: Floats = values + change
-        return evened
+                flow *= np.minimum(weight[first], weight[second])
+            change += np.bincount(first, flow, cells.size) - np.bincount(second, flow, cells.size)
+        return values + change
 
 
 def make_exchange(grid: Grid, diffusivity: float, period: float) -> Exchange:

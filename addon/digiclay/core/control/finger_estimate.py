@@ -1,10 +1,10 @@
 """Extended Kalman filter of the fingertip: position, velocity, size and elongation, from the undersides.
 
-The state is x, y, z of the lowest point, m; their velocities, m/s; the logarithm of the fingertip's size over
-the known one; its elongation along x and along the diagonal. The last three are the curvatures of the
-underside at the lowest point, which take in errors of the model: a pulp that is stiffer than known makes the
-fingertip look flatter, that is larger; a fingertip too long, or tilted, is elongated.
-The basis of cells are rows 1, x, y, x², x y, y², (6, m).
+The state is the lowest point x, y, z, m; its velocity, m/s; the logarithm of the fingertip's size relative to
+the nominal one; and the elongations along x and along the diagonal. The last three are curvatures of the
+underside at the lowest point. They absorb errors of the model: a pulp stiffer than the nominal one makes the
+fingertip look flatter, that is larger; a longer or tilted fingertip looks elongated.
+The basis of cells has the rows 1, x, y, x², x y, y², (6, m).
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ Form = tuple[float, float, float, float, float, float]
 Aim = tuple[float, float, float]
 
 
-class Place(NamedTuple):
-    """Lowest point of a level fingertip, m, logarithm of its size over the known one, and elongations."""
+class Tip(NamedTuple):
+    """Lowest point of a level fingertip, m, logarithm of its relative size, and elongations."""
 
     x: float
     y: float
@@ -47,7 +47,7 @@ class Slopes(NamedTuple):
 class _Profile(NamedTuple):
     """Numbers of ``h(q) = slope q - lowest + (sqrt(max(bend (1 - q), least)) - root)²``, m.
 
-    They are those of `fingertip.compute_forms`; `mean`: M of the known fingertip, 1/m²; `root`: of `least`.
+    They are those of `fingertip.compute_forms`; `mean`: M of the nominal fingertip, 1/m²; `root`: of `least`.
     """
 
     mean: float
@@ -64,9 +64,9 @@ class _Profile(NamedTuple):
         return _Profile(mean / (k * k), k * slope, k * bend, k * lowest, k * least, math.sqrt(k) * root)
 
 
-def _find_radius(profile: _Profile, place: Place) -> Form:
+def _find_radius(profile: _Profile, tip: Tip) -> Form:
     """Return q."""
-    x, y, _, _, along, askew = place
+    x, y, _, _, along, askew = tip
     mean = profile.mean
     return _place_form(x, y, mean * (1.0 - along), -2.0 * mean * askew, mean * (1.0 + along))
 
@@ -77,17 +77,17 @@ def _place_form(x: float, y: float, xx: float, xy: float, yy: float) -> Form:
     return (0.5 * (by_x * x + by_y * y), -by_x, -by_y, xx, xy, yy)
 
 
-def _list_surfaces(profile: _Profile, place: Place, radius: Form) -> tuple[Form, Form]:
+def _list_surfaces(profile: _Profile, tip: Tip, radius: Form) -> tuple[Form, Form]:
     """Return what `fingertip.join_surfaces` joins: ``bend (1 - q)``, and ``z - lowest + slope q``."""
     free, x, y, xx, xy, yy = radius
     r, t = -profile.bend, profile.slope
     return (
         (r * free - r, r * x, r * y, r * xx, r * xy, r * yy),
-        (t * free + place.z - profile.lowest, t * x, t * y, t * xx, t * xy, t * yy),
+        (t * free + tip.z - profile.lowest, t * x, t * y, t * xx, t * xy, t * yy),
     )
 
 
-def _list_slopes(profile: _Profile, place: Place, radius: Form) -> tuple[Form, ...]:
+def _list_slopes(profile: _Profile, tip: Tip, radius: Form) -> tuple[Form, ...]:
     """Return the slopes of q by size, x, y and the two elongations."""
     free, x, y, xx, xy, yy = radius
     mean = profile.mean
@@ -95,23 +95,23 @@ def _list_slopes(profile: _Profile, place: Place, radius: Form) -> tuple[Form, .
         (-2.0 * free, -2.0 * x, -2.0 * y, -2.0 * xx, -2.0 * xy, -2.0 * yy),
         (-x, -2.0 * xx, -xy, 0.0, 0.0, 0.0),
         (-y, -xy, -2.0 * yy, 0.0, 0.0, 0.0),
-        _place_form(place.x, place.y, -mean, 0.0, mean),
-        _place_form(place.x, place.y, 0.0, -2.0 * mean, 0.0),
+        _place_form(tip.x, tip.y, -mean, 0.0, mean),
+        _place_form(tip.x, tip.y, 0.0, -2.0 * mean, 0.0),
     )
 
 
-#: Places in the state of what an underside depends on, in the order of `Slopes`: size, x, y, turn, z.
+#: Indices of the state variables that an underside depends on, in the order of `Slopes`.
 SEEN = np.array([6, 0, 1, 7, 8, 2])
 STATES = 9
 EYE = np.eye(6)
-#: Digits that are kept of the state: rounding must not grow where an estimate is unstable across a line of
-#: symmetry, as over the edge of a bed, where a single pin is touched.
+#: Digits of the state: rounding errors must not grow where an estimate is unstable across a line of symmetry,
+#: as when a single pin at the edge of a bed is touched.
 DIGITS = 11
 #: The size is at most this, as a logarithm: a factor of 2.7.
 LARGEST = 1.0
 #: The elongation is at most this: three times as long as wide.
 LONGEST = 0.8
-#: The elongation drifts like that of a turning fingertip whose own is at least this.
+#: Least elongation of the turning fingertip that gives the drift of the estimated elongation.
 LEAST = 0.05
 #: Standard deviations before the first contact: m, m/s, 1.
 FIRST = (2e-3, 2e-3, 1e-3, 2e-2, 2e-2, 2e-2, 0.1, 0.2, 0.2)
@@ -126,7 +126,7 @@ class Estimate(NamedTuple):
 
 @dataclass(frozen=True)
 class Spread:
-    """Standard deviations of a fingertip's motion, and of what the model leaves out.
+    """Standard deviations of a fingertip's motion, and of the model's errors.
 
     Acceleration, m/s²; turn and relative size within a second, rad and 1; measured underside, m.
     """
@@ -139,7 +139,7 @@ class Spread:
 
 @dataclass(frozen=True, eq=False)
 class FingerFilter:
-    """Filter of a known fingertip; `period`: control period, s."""
+    """Filter for a nominal fingertip; `period`: control period, s."""
 
     fingertip: Fingertip
     spread: Spread
@@ -156,15 +156,15 @@ class FingerFilter:
 
     @cached_property
     def _motion(self) -> tuple[Floats, Floats]:
-        """Transition of the state, and covariance of what is random: white acceleration, drifting shape."""
+        """Transition matrix, and covariance of the process noise: white acceleration, drifting shape."""
         time, spread = self.period, self.spread
         step, noise = np.eye(STATES), np.zeros((STATES, STATES))
         strength = spread.acceleration**2 * time
-        for place in range(3):
-            speed = place + 3
-            step[place, speed] = time
-            noise[place, place] = strength * time * time / 3.0
-            noise[place, speed] = noise[speed, place] = strength * time / 2.0
+        for axis in range(3):
+            speed = axis + 3
+            step[axis, speed] = time
+            noise[axis, axis] = strength * time * time / 3.0
+            noise[axis, speed] = noise[speed, axis] = strength * time / 2.0
             noise[speed, speed] = strength
         noise[6, 6] = spread.size**2 * time
         length, width = self.fingertip.length**2, self.fingertip.width**2
@@ -182,7 +182,7 @@ class FingerFilter:
         return [self._update(*finger) for finger in zip(guesses, *parts, strict=True)], error
 
     def _update(self, guess: Estimate, slopes: Floats, weighted: Floats, error: Floats) -> Estimate:
-        """Return the estimate of one finger after errors (m,), m, of which in place those left remain."""
+        """Return the estimate of one finger after errors (m,), m, reduced to the remaining ones in place."""
         weight = weighted.dot(slopes.T)
         wide = guess.covariance.take(SEEN, 0)
         spread = weight.dot(wide)
@@ -204,10 +204,10 @@ class FingerFilter:
         forms, numbers = [], []
         for mean in means:
             x, y, z, _, _, _, *shape = mean.tolist()
-            place = Place(x, y, z, *shape)
-            profile = self._profile.resize(place.size)
-            radius = _find_radius(profile, place)
-            forms.append((*_list_surfaces(profile, place, radius), *_list_slopes(profile, place, radius)))
+            tip = Tip(x, y, z, *shape)
+            profile = self._profile.resize(tip.size)
+            radius = _find_radius(profile, tip)
+            forms.append((*_list_surfaces(profile, tip, radius), *_list_slopes(profile, tip, radius)))
             _, slope, bend, _, least, root = profile
             numbers.append((least, root, bend * root, slope - bend, z))
         least, root, product, rest, z = sections.spread(numbers)
@@ -216,7 +216,7 @@ class FingerFilter:
         under, tangent, slopes = rows[0], rows[1], rows[2:]
         bend = np.sqrt(np.maximum(under, least))
         join_surfaces(under, tangent, least, root)
-        # h'(q) of each cell: what the slopes of q are to be multiplied with.
+        # h'(q) of each cell, by which the slopes of q are multiplied.
         np.divide(product, bend, out=bend)
         bend += rest
         by_form, by_size = slopes[:5], slopes[0]
@@ -233,16 +233,16 @@ class FingerFilter:
         """Return the undersides over cells, (m,), m, of fingertips like the estimated ones at places, m."""
         surfaces, numbers = [], []
         for aim, estimate in zip(aims, like, strict=True):
-            place = Place(*aim, *estimate.mean.tolist()[6:])
-            profile = self._profile.resize(place.size)
-            surfaces.append(_list_surfaces(profile, place, _find_radius(profile, place)))
+            tip = Tip(*aim, *estimate.mean.tolist()[6:])
+            profile = self._profile.resize(tip.size)
+            surfaces.append(_list_surfaces(profile, tip, _find_radius(profile, tip)))
             numbers.append((profile.least, profile.root))
         inner, tangent = sections.multiply(surfaces, basis)
         return join_surfaces(inner, tangent, *sections.spread(numbers))
 
     @cached_property
     def _profile(self) -> _Profile:
-        """Underside of the known fingertip, level."""
+        """Underside of the nominal fingertip, level."""
         outline = self.fingertip.outline(np.array([[0.0, 0.0, 0.0, *LEVEL]]))
         (inner, tangent), join = compute_forms(outline)
         bend, (least, root) = inner[0], join.ravel()

@@ -50,8 +50,8 @@ def list_rows(filters: int) -> OwnRows:
     return OwnRows(slice(k + 1), k, k + 1, k + 2, k + 3, k + 4, k + 5, slice(k + OWN_ROWS, None))
 
 
-#: Noise beyond which a finger is taken to accelerate the less, the noisier its forces are, N: else the filter
-#: follows the noise of 10 mN to velocities of 40 mm/s.
+#: Noise beyond which the assumed acceleration falls with the noise, N: otherwise the filter would follow a
+#: noise of 10 mN to velocities of 40 mm/s.
 STEADY = 5e-4
 
 
@@ -60,13 +60,13 @@ def measure_trust(noise: float) -> float:
     return min(STEADY / noise, 1.0)
 
 
-#: While the force is within this share of the set point, less with noise, and the fingertip no faster than
-#: this, m/s, it is fitted and the top solved for in one of so many periods; in the others the top goes along
-#: with it. So a force that a few stiff pins carry does not swing from period to period, as it does at 2 %.
+#: If the force is within this share of the set point, less with noise, and the fingertip no faster than this,
+#: m/s, then fit and top are computed only every `EVERY` periods; in between the top moves with the fingertip.
+#: Otherwise the force on a few stiff pins would oscillate from period to period, as it does at 2 %.
 NEAR, SLOW, EVERY = 0.15, 20e-3, 2
-#: How far a touched cell may be from the predicted fingertip, in semi-axes: beyond is a new touch.
+#: Largest distance of a touched cell from the predicted fingertip, in semi-axes; beyond it is a new touch.
 JUMP = 1.5
-#: Underside where none is predicted, m.
+#: Underside of cells without a prediction, m.
 AWAY = 1.0
 
 
@@ -97,7 +97,7 @@ class FingerObserver:
         return NEAR * measure_trust(self.noise) * self.asked
 
     def observe(self, memories: list[Follower], touched: Measurement, sections: Whole) -> list[Follower]:
-        """Observe the pulp of the cells the fingertips may touch, and follow or find them."""
+        """Observe the pulp of the cells that fingertips may touch, and follow or find the fingertips."""
         at, rows, force = self.at, touched.own, touched.force
         period = sections.spread([memory.period for memory in memories])
         late = (period - 1.0) - rows[at.stamp]
@@ -123,7 +123,7 @@ class FingerObserver:
     def _follow(
         self, memories: list[Follower], touched: Measurement, cells: tuple[Cells, Cells], sections: Whole
     ) -> list[Follower]:
-        """Fit the fingertips that are felt, unless they hold; those that have jumped are found anew.
+        """Fit the fingertips that are felt, except those that hold; search again for those that have jumped.
 
         `cells`: those whose force is felt, and those under a predicted fingertip.
         """
@@ -131,7 +131,7 @@ class FingerObserver:
         counts, bounds = sections.find_bounds(felt), sections.find_bounds(here)
         totals, after, fits = sections.add(force), list(memories), [False] * len(memories)
         for i, memory in enumerate(memories):
-            # Forces under the predicted fingertip are felt where they are more than their noise together.
+            # Forces under the predicted fingertip are felt if their sum exceeds its noise.
             if counts[i] == counts[i + 1] and not self._is_felt(force.take(here[bounds[i] : bounds[i + 1]])):
                 touched.own[self.at.residual, sections.parts[i]] = 0.0
                 after[i] = self.loss.wait(memory)
@@ -163,14 +163,14 @@ class FingerObserver:
         return abs(force - self.asked) <= self.near and math.hypot(vx, vy, vz) <= SLOW
 
     def _has_jumped(self, guess: Estimate, x: Sequence[float], y: Sequence[float]) -> bool:
-        """Tell whether cells are touched, at x, y, m, but none where the fingertip can be."""
+        """Tell whether cells at x, y, m, are touched, but none within reach of the predicted fingertip."""
         middle = guess.mean.tolist()[:2]
         return bool(x) and not any(
             math.dist(middle, cell) <= self.farthest for cell in zip(x, y, strict=True)
         )
 
     def _find(self, memory: Follower, touched: Measurement, here: Cells) -> Follower:
-        """Begin to follow a fingertip that has touched: at the centroid of its forces (equation 13)."""
+        """Begin to follow a fingertip that has touched, at the centroid of its forces (equation 13)."""
         force, basis = touched.force.take(here), touched.quadratic_basis.take(here, 1)
         under, _ = self.pulp.find_underside(
             touched.height.take(here), touched.own[self.at.tension].take(here), self.noise
@@ -211,7 +211,7 @@ class FingerObserver:
                 heading = update_heading(memory.heading, x, y, self.travel)
                 after.append(memory._replace(estimate=estimate, heading=heading, alone=0))
             else:
-                # No fingertip is that fast: another one has these undersides.
+                # No fingertip is that fast: these are undersides of another one.
                 left[part] = 0.0
                 after.append(memory._replace(alone=0))
         touched.own[self.at.residual, here] = left

@@ -1,7 +1,7 @@
-"""Layouts of the cells of several fingers: one finger's after the other's, or in columns.
+"""Layouts of the cells of several fingers: in sequence, finger by finger, or in columns.
 
-The formulas of one finger hold for several: `Whole` lets them combine numbers of fingers, lists of f, with
-arrays of m cells, (m,) or (r, m).
+The same formulas serve one finger and several: `Whole` combines numbers of fingers, lists of f, with arrays
+of cells, (m,) or (r, m).
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ OUTSIDE = np.array([1.0, BEYOND, BEYOND, *(BEYOND**2,) * 3])[:, None]
 
 
 class Whole:
-    """All cells are those of one finger."""
+    """Cells of one finger."""
 
-    #: Where the cells of each finger are.
+    #: Cells of each finger.
     parts: Sequence[slice] = (slice(None),)
 
     def spread(self, numbers: Sequence[Any]) -> Any:
@@ -50,7 +50,7 @@ class Whole:
         return sums
 
     def average(self, values: Floats, test: Flags, instead: list[float]) -> list[float]:
-        """Return the mean of each finger's values where a test holds; `instead`: where it holds nowhere."""
+        """Return the mean of each finger's values where a test holds; `instead`: if it holds nowhere."""
         count = count_true(test)
         return [float(values.dot(test)) / count] if count else instead
 
@@ -60,16 +60,16 @@ class Whole:
         return rows
 
     def find_bounds(self, cells: Cells) -> list[int]:
-        """Return where in a selection of the cells, ascending, each finger's begin, and the end."""
+        """Return the start of each finger's cells in a selection of the cells, ascending, and the end."""
         return [0, cells.size]
 
     def pick(self, cells: Cells, wanted: list[bool]) -> tuple[Cells, list[int], Whole]:
-        """Return those of a selection whose finger is wanted, the fingers that have any, their sections."""
+        """Return the cells of wanted fingers in a selection, the fingers that have any, their sections."""
         return cells, [0] if wanted[0] and cells.size else [], self
 
 
 class Sections(Whole):
-    """Cells of fingers one after the other, (f,) of each, at least one."""
+    """Cells of several fingers in sequence; `sizes` (f,): their numbers, each at least one."""
 
     def __init__(self, sizes: Sequence[int]) -> None:
         self.sizes, self.edges = np.array(sizes), np.cumsum([0, *sizes])
@@ -122,7 +122,7 @@ class Sections(Whole):
 
 
 class Shared(Whole):
-    """All cells are those of each finger: arrays are (f, m), or (r, f, m)."""
+    """Cells that all fingers share: arrays are (f, m), or (r, f, m)."""
 
     def spread(self, numbers: Sequence[Any]) -> Any:
         """See `Whole`."""
@@ -138,9 +138,9 @@ WHOLE, SHARED = Whole(), Shared()
 
 
 class Columns:
-    """Active cells in columns, one a finger: those in its disc, and its part of those in no disc.
+    """Active cells in columns, one per finger: the cells in its disc, and a part of those in no disc.
 
-    Entries (k,) are the cells of all columns, those of the first finger first.
+    Entries (k,) are the cells of all columns in sequence, the first finger first.
     """
 
     def __init__(self, basis: Floats, discs: tuple[Floats, Floats, Floats]) -> None:
@@ -152,11 +152,11 @@ class Columns:
         self.inside, self._basis = inside, basis
         #: Finger and cell of each entry.
         self.finger, self.cell = inside.nonzero()
-        #: Cells in several columns, and their entries; cells of these, and where they are, (2, p), m.
+        #: Cells in several columns, and their p entries; cells of these, and their positions, (2, p), m.
         self.copies = find_copies(inside)
         self.cells = self.copies.cells[self.copies.which]
-        self.places = basis[1:3, self.cells]
-        #: The entry of each cell, (m,); of one in several columns any.
+        self.positions = basis[1:3, self.cells]
+        #: An entry of each cell, (m,).
         self.only = np.empty(basis.shape[1], np.intp)
         self.only[self.cell] = np.arange(self.cell.size)
 
@@ -169,7 +169,7 @@ class Columns:
 
     @cached_property
     def padded(self) -> tuple[Cells, Flags, Floats, Cells]:
-        """The columns side by side, (w, f): cells; which are none; basis, (6, w, f); where entries are."""
+        """The columns side by side, (w, f): cells; fillers; basis, (6, w, f); indices of the entries."""
         sizes = self.inside.sum(axis=1)
         absent = np.arange(sizes.max())[:, None] >= sizes
         cells = np.zeros(absent.shape, np.intp)

@@ -1,4 +1,4 @@
-"""Interfaces of the controllers that follow a fingertip, of which several fingers have one each."""
+"""Interfaces of controllers that follow a fingertip; several fingers have one controller each."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from .finger_sections import Whole
 
 
 class Follower(Protocol):
-    """What a controller remembers of the fingertip that it follows."""
+    """Memory of a controller about its fingertip."""
 
     @property
-    def place(self) -> tuple[float, float] | None:
-        """Where the fingertip is, m; None: none is followed."""
+    def position(self) -> tuple[float, float] | None:
+        """Position of the fingertip, m; None if none is followed."""
 
     @property
     def top(self) -> float:
@@ -28,7 +28,7 @@ class Follower(Protocol):
 
     @property
     def losses(self) -> int:
-        """How often a fingertip was lost."""
+        """Number of losses of the fingertip."""
 
 
 @runtime_checkable
@@ -37,28 +37,28 @@ class FollowingControl(Controller, Protocol):
 
     @property
     def division(self) -> str:
-        """Class in `pin_division` by which several fingers divide the pins."""
+        """Class in `pin_division` with the rules for several fingers."""
 
     @property
     def blister_radius(self) -> float:
-        """How far from the fingertip pins may be in its blister, m."""
+        """Largest distance of pins in the blister from the fingertip, m."""
 
     @property
     def pin_rows(self) -> Sequence[int]:
-        """State rows of a pin's command, the same for all fingers whichever the pin obeys."""
+        """State rows of a pin's command, which all fingers share."""
 
 
 @runtime_checkable
 class GroupedControl(FollowingControl, Protocol):
-    """Controller that serves several fingers at once, whose cells follow each other in sections."""
+    """Controller that serves several fingers in one call, with their cells in sections."""
 
     def sort(self, memory: Memory) -> Hashable:
-        """Return what is the same for all fingers that are served together; None: it is served alone."""
+        """Return a key: one call serves fingers with equal keys; None: the finger is served alone."""
 
     def locate_all(
         self, memories: list[Memory], touched: Measurement, sections: Whole
     ) -> tuple[list[Memory], list[Disc | None]]:
-        """Locate each fingertip by the cells of its section; see `Controller.locate`."""
+        """Locate each fingertip by its section of the cells; see `Controller.locate`."""
 
     def command_all(
         self, memories: list[Memory], seen: Measurement, sections: Whole

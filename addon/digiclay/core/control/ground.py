@@ -1,16 +1,16 @@
 """Ground of a blister: the surface from which it rises or sinks.
 
-The paper takes one height for all cells, the mean at the blister's edge. What is formed inside is then cut:
-a ridge across another one has a gap on either side. With a ground of its own a cell goes from the height that
-it was commanded to when the blister came over it, and one at the blister's rim stays where it is.
+The paper uses one height for all cells, the mean at the edge of the blister. This cuts existing features: a
+ridge across another one gets a gap on both sides. With `OwnGround` each cell starts from its commanded height
+when the blister reached it, and a cell at the rim of the blister does not move.
 
-A level blister on a slope moves every cell to one height: behind a fingertip that climbs, what it has pressed
-is raised again, and ahead of it what it is to climb is lowered. So a blister that sinks, its top below the
-own ground of the cells under the fingertip, raises no cell, and lowers none farther than those. What it has
-raised before stays: a fingertip that climbs out of a valley which it fills sinks into the far side. Where the
-ground is uneven, what the fingertip has left freezes sooner, and what it has lowered is freed when it lies
-ahead again: on a slope the fingertip is felt beside its lowest point. On even ground that would leave a
-groove with ragged flanks.
+A level blister on a slope moves all cells to one height: behind a climbing fingertip it would raise pressed
+cells again, and ahead of it lower the slope. Therefore a sinking blister, whose top is below the ground of
+the cells under the fingertip, raises no cell, and lowers no cell by more than those. Cells raised before
+stay: a fingertip that climbs out of a valley while filling it sinks into the far side. On uneven ground
+cells freeze nearer behind the fingertip, and lowered cells are freed when they are ahead of it again, since
+on a slope the fingertip is felt beside its lowest point. On even ground that would leave a groove with
+ragged flanks.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from ..base.arrays import TIE, Flags, Floats, Modes, any_true
-from ..base.modes import Mode
+from ..base.modes import EDGE
 from ..model.control_interface import Measurement
 from ..model.interfaces import Alike
 from .blister import Blister, BlisterCells, BlisterRule
@@ -52,11 +52,11 @@ class EdgeGround(Alike):
         """Return the height of the blister at each cell, m, and which cells sink into uneven ground: none."""
         return blister.interpolate(distance, ground, top), False
 
-    def find_kept(self, target: Floats, profile: Floats, ground: Any, top: Any, uneven: Any = False) -> Flags:
+    def find_holding(self, target: Floats, profile: Floats, ground: Any, top: Any, uneven: Any) -> Flags:
         """Tell which frozen cells keep their command, m: those farther off the ground than the profile, m."""
-        kept: Flags = target > profile
-        kept ^= top < ground - TIE
-        return kept
+        holding: Flags = target > profile
+        holding ^= top < ground - TIE
+        return holding
 
 
 class OwnGround(Alike):
@@ -67,10 +67,10 @@ class OwnGround(Alike):
 
     def find(self, seen: Measurement, edge: Any) -> Any:
         """Return the ground of each cell, (m[, b]), m; see `EdgeGround.find`."""
-        own: Floats = seen.own[0]
+        ground: Floats = seen.own[0]
         # Their modes are those of the last period: these cells were outside the blister then.
-        np.copyto(own, seen.target, where=seen.mode <= Mode.EDGE)
-        return own
+        np.copyto(ground, seen.target, where=seen.mode <= EDGE)
+        return ground
 
     def find_profile(
         self, blister: Blister, distance: Floats, inside: Flags, ground: Any, top: Any, seen: Measurement
@@ -101,13 +101,13 @@ class OwnGround(Alike):
         uneven = sinks & (reach > UNEVEN * (mean - top))
         return np.where(sinks, profile, level), uneven & ~raised
 
-    def find_kept(self, target: Floats, profile: Floats, ground: Any, top: Any, uneven: Any = False) -> Flags:
-        """Tell which frozen cells keep their command; see `EdgeGround.find_kept`."""
-        kept: Flags = target > profile
+    def find_holding(self, target: Floats, profile: Floats, ground: Any, top: Any, uneven: Any) -> Flags:
+        """Tell which frozen cells keep their command; see `EdgeGround.find_holding`."""
+        holding: Flags = target > profile
         # What is raised stays when the blister sinks below the ground beside it; and what is lowered by one
         # that sinks into uneven ground is not raised where the ground falls below its top.
-        kept ^= uneven | ((top < ground - TIE) & (target <= ground + TIE))
-        return kept
+        holding ^= uneven | ((top < ground - TIE) & (target <= ground + TIE))
+        return holding
 
 
 #: Grounds by the value of `VirtualMaster.ground`.
@@ -119,7 +119,7 @@ def raise_blister(
     ground: EdgeGround | OwnGround,
     cells: BlisterCells,
     seen: Measurement,
-    heights: tuple[Any, Any, int | Floats, bool | Flags],
+    heights: tuple[Any, Any, np.int8 | Modes, bool | Flags],
     mode: Modes,
 ) -> Floats:
     """Return commanded heights (m[, b]), m, with a blister of `heights`; modes are set in place."""
@@ -129,10 +129,10 @@ def raise_blister(
     profile, uneven = ground.find_profile(rule.blister, cells.distance, cells.inside, level, top, seen)
     frozen = rule.find_frozen(cells, seen, uneven)
     if any_true(frozen):
-        # What is frozen is never called back.
-        kept = ground.find_kept(seen.target, profile, level, top, uneven)
-        kept |= stays
-        kept &= frozen
-        np.putmask(profile, kept, seen.target)
+        # Frozen cells are never called back.
+        holding = ground.find_holding(seen.target, profile, level, top, uneven)
+        holding |= stays
+        holding &= frozen
+        np.putmask(profile, holding, seen.target)
     rule.set_modes(mode, cells, seen.force, touched_mode, frozen)
     return np.where(cells.inside, profile, seen.target)

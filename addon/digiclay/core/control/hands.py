@@ -1,7 +1,7 @@
-"""Control of several fingers on one bed: a controller of the method for each of them.
+"""Control of several fingers on one bed: one controller of the method per finger.
 
-In a control period each controller first locates its finger, by the pressed pins that belong to it, then
-commands the pins in its disc; see `pin_division` for pins that several fingers press or command.
+In a control period each controller first locates its finger by the pressed pins that belong to it, and then
+commands the pins in its disc. `pin_division` has the rules for pins that several fingers press or command.
 """
 
 from __future__ import annotations
@@ -30,17 +30,17 @@ class HandControl:
     """Controller of several fingers."""
 
     controllers: tuple[Controller, ...]
-    """The method's, one a finger; those of unknown code are guarded."""
+    """One per finger; those of unknown code are guarded."""
     division: PinDivision
 
     @property
     def count(self) -> int:
-        """State rows a cell needs for each finger."""
+        """State rows per cell and finger."""
         return self.controllers[0].rows
 
     @property
     def rows(self) -> int:
-        """State rows a cell needs: those of each controller, one after the other."""
+        """State rows per cell: those of all controllers in sequence."""
         return self.count * len(self.controllers)
 
     def begin(self) -> Hands:
@@ -49,7 +49,7 @@ class HandControl:
         return Hands(followers, (NO_DISC,) * len(followers))
 
     def locate(self, memory: Hands, touched: Measurement) -> tuple[Hands, Any]:
-        """Divide the pressed pins among the fingers, and let each controller take in those of its finger."""
+        """Divide the pressed pins among the fingers; each controller locates its finger by its pins."""
         (pins,) = touched.force.nonzero()
         owner, under = self.division.assign(memory, touched, pins)
         followers, discs = zip(*self.locate_each(memory, touched, pins, owner, under), strict=True)
@@ -57,7 +57,7 @@ class HandControl:
         return Hands(followers, tuple(disc or NO_DISC for disc in discs), owners), list(discs)
 
     def command(self, memory: Hands, seen: Measurement) -> tuple[Hands, Commands]:
-        """Let each controller command the pins in its disc; a pin in several discs obeys one of them."""
+        """Let each controller command the pins in its disc; a pin in several discs obeys one finger."""
         columns = self.arrange("all", seen)
         followers, commands, owner = self.command_each(memory, seen, columns)
         memory = memory._replace(fingers=tuple(followers), pressed=None)
@@ -72,27 +72,27 @@ class HandControl:
     def locate_each(
         self, memory: Hands, touched: Measurement, pins: Cells, owner: Cells, under: Floats
     ) -> list[Located]:
-        """Return what each controller remembers, and its disc.
+        """Return the follower of each finger, and its disc.
 
-        Pressed pins (q,), the fingers that they belong to, (q,), and the undersides over them, (f, q), m.
+        `pins` (q,): pressed ones; `owner` (q,): their fingers; `under` (f, q): undersides over them, m.
         """
         raise NotImplementedError
 
     def command_each(
         self, memory: Hands, seen: Measurement, columns: Columns
     ) -> tuple[list[Follower], Commands, Cells]:
-        """Return what each controller remembers, and commands for the entries of all columns, (k,).
+        """Return the follower of each finger, and commands for the entries of all columns, (k,).
 
-        The last result, (g,), is the finger that each pin in several columns belongs to.
+        The last result is the owner of each pin in several columns, (g,).
         """
         raise NotImplementedError
 
     def arrange(self, part: str, seen: Measurement) -> Columns:
-        """Return the columns of a part of the active cells; those of one active set are the same."""
+        """Return the columns of a part of the active cells, made once per active set."""
         basis, columns = self._columns.get(part, (None, None))
         if columns is None or basis is not seen.quadratic_basis:
             assert seen.discs is not None
-            # An order may add a disc, which is no finger's.
+            # An order may add a disc, which belongs to no finger.
             x, y, radius = (values[: len(self.controllers)] for values in seen.discs)
             columns = Columns(seen.quadratic_basis, (x, y, radius))
             self._columns[part] = seen.quadratic_basis, columns
@@ -100,21 +100,21 @@ class HandControl:
 
     @cached_property
     def _columns(self) -> dict[str, tuple[Floats, Columns]]:
-        """The last columns of each part, and the basis that they belong to."""
+        """Last columns of each part, with their basis."""
         return {}
 
 
 @dataclass(frozen=True, eq=False)
 class HandTogether(HandControl):
-    """Controller of several fingers, for a method whose formulas hold for many at once: Method I."""
+    """Controller of several fingers for Method I, whose formulas hold for many masters at once."""
 
     together: Controller
-    """The method's of all fingers, as of the runs of a batch."""
+    """Controller of all fingers, as of the runs of a batch."""
 
     def locate_each(
         self, memory: Hands, touched: Measurement, pins: Cells, owner: Cells, under: Floats
     ) -> list[Located]:
-        """Let each controller see all pressed pins, but no force on those of other fingers."""
+        """Show each controller all pressed pins, without the forces on those of other fingers."""
         owner = self.division.assign_by_tips(memory, touched, owner, under, pins)
         columns = touched._replace(
             quadratic_basis=touched.quadratic_basis[:, pins, None],
@@ -152,23 +152,23 @@ class HandTogether(HandControl):
 
 
 class Group(NamedTuple):
-    """Fingers that are served together, and their pins, one finger's after the other's."""
+    """Fingers that one call serves, and their pins, finger by finger."""
 
     controller: GroupedControl | None
     fingers: list[int]
     entries: Cells
-    """Which entries of all fingers are theirs."""
+    """Indices of their entries among those of all fingers."""
     seen: Measurement
     sections: Whole
 
 
 @dataclass(frozen=True, eq=False)
 class HandInGroups(HandControl):
-    """Controller of several fingers, for other methods: those that are sorted alike are served together."""
+    """Controller of several fingers for other methods: one call serves those with the same `sort` key."""
 
     @cached_property
     def _grouped(self) -> list[GroupedControl | None]:
-        """Controllers that serve several fingers at once; None: it does not, or is guarded."""
+        """Controllers for several fingers per call; None for other or guarded ones."""
         pairs = zip(self.division.controllers, self.controllers, strict=True)
         return [
             inner if inner is outer and isinstance(inner, GroupedControl) else None for inner, outer in pairs
@@ -177,12 +177,12 @@ class HandInGroups(HandControl):
     def locate_each(
         self, memory: Hands, touched: Measurement, pins: Cells, owner: Cells, under: Floats
     ) -> list[Located]:
-        """Let each controller see the pins in its disc but those of other fingers, and all it presses."""
+        """Show each controller the pins of its disc that no other finger owns, and all that it presses."""
         shares = self.division.share_pressed(owner, under, touched, pins)
         shape = len(memory.fingers), touched.force.size
         visible, parts = np.zeros(shape, np.bool_), np.ones(shape)
         if touched.discs is not None:
-            followed = np.array([follower.place is not None for follower in memory.fingers])[:, None]
+            followed = np.array([follower.position is not None for follower in memory.fingers])[:, None]
             visible = self.arrange("touched", touched).inside & followed
             visible[:, pins] &= self.division.share_whole(owner) > 0.0
         parts[:, pins] = shares
@@ -204,7 +204,7 @@ class HandInGroups(HandControl):
     def command_each(
         self, memory: Hands, seen: Measurement, columns: Columns
     ) -> tuple[list[Follower], Commands, Cells]:
-        """Let each controller command its column, with its shares of the forces."""
+        """Let each controller command its column, with its shares in the forces."""
         cells, copies, parts = columns.cell, columns.copies, np.ones(columns.cell.size)
         owner, shares = self.division.claim(memory, seen, copies.cells)
         parts[copies.number] = shares[copies.row, copies.which]
@@ -228,9 +228,9 @@ class HandInGroups(HandControl):
     def _divide(
         self, followers: tuple[Follower, ...], seen: Measurement, force: Floats, finger: Cells, cells: Cells
     ) -> Iterator[Group]:
-        """Give the fingers in groups; the rows of a group are brought up to date before the next one.
+        """Yield groups of fingers; the rows of a group are written back before the next group.
 
-        Entries (k,), those of each finger one after the other: `finger`, `cells`, and the `force` it sees.
+        `finger`, `cells` and visible `force` (k,): entries of all fingers, finger by finger.
         """
         counts = np.bincount(finger, minlength=len(followers)).tolist()
         groups: dict[object, list[int]] = {}

@@ -1,11 +1,14 @@
 """Method III: regional height and force commands, by an estimate of the fingertip.
 
-It is the framework that the paper asks for in its conclusion.
+It is the framework that the paper calls for in its conclusion. A control period has four steps:
 
-Observe, fit, solve, serve: the pulp's tension over each cell from its force; the known fingertip from the
-undersides; the one height of the blister's top at which the predicted forces add up to the set point; the
-valve commands that bring every pin to its height in time. Heights are the blister's around the predicted
-place of the fingertip, and ahead of it as far as the speed of the pins requires.
+1. Observe: the tension of the pulp over each cell, from the force on it.
+2. Fit: position and shape of the fingertip, from the undersides over touched cells.
+3. Solve: the height of the blister's top at which the predicted forces add up to the set point.
+4. Serve: the valve commands that bring each pin to its height in time.
+
+The blister is around the predicted position of the fingertip, and ahead of it as far as the speed of the pins
+requires.
 """
 
 from __future__ import annotations
@@ -105,7 +108,7 @@ class Hybrid(ControlParameters):
 
     @property
     def pace(self) -> Pace:
-        """How fast a fingertip may lead it: that goes with the skirt, which is there when a drag begins."""
+        """How fast a fingertip may lead it: in proportion to the skirt, which exists before a drag begins."""
         if not self.skirt_speed:
             return Pace()
         return Pace(RADII, RADII, SKIRT * self.skirt_speed, ready=True, press=0.06, gain=0.1)
@@ -113,13 +116,14 @@ class Hybrid(ControlParameters):
 
 #: Fastest drag, in radii of the blister a second, and as a share of the skirt's speed.
 RADII, SKIRT = 14.0, 0.6
-#: Share of the set point within which the trim learns; it is at most as large.
+#: Share of the set point within which the trim is corrected, and largest trim.
 LEARNED = 0.5
-#: Share of the set point by which the forces predicted may be off, rms over that many control periods: beyond
-#: it the model is wrong, and Method I follows the fingertip until it is lost. A lift at 22 mm/s has 0.28.
+#: Largest error of predicted forces, as a share of the set point, rms over a number of control periods:
+#: beyond it the model is wrong, and Method I follows the fingertip until it is lost. A lift at 22 mm/s has
+#: 0.28.
 DOUBTED, PERIODS = 0.4, 20.0
-#: Share of the set point from which on a single pin gives way, whatever is aimed at: under a fingertip that
-#: is followed none carries more than 0.4.
+#: Share of the set point above which a single pin gives way: under a followed fingertip no pin carries more
+#: than 0.4.
 OVER = 0.45
 
 
@@ -128,7 +132,7 @@ Top = tuple[float, float]
 
 
 class Coasting(NamedTuple):
-    """Motion that no command of this period changes: lowest and highest speeds, and heights reached, m."""
+    """Motion without a new command: lowest and highest speeds, m/s, and heights reached, m."""
 
     limits: Floats
     heights: Floats
@@ -149,9 +153,9 @@ class HybridControl:
     noise: float
     """Force above which a cell is touched, and standard deviation of forces, N."""
     contact_radius: float
-    """Within which the fingertip may touch, m."""
+    """Radius within which the fingertip may touch, m."""
     substitute: VirtualMasterControl
-    """Method I, for a fingertip that the model does not predict."""
+    """Method I, which takes over when the model does not predict the fingertip."""
 
     @cached_property
     def _at(self) -> OwnRows:
@@ -176,25 +180,25 @@ class HybridControl:
 
     @cached_property
     def _unknown(self) -> tuple[float, ...]:
-        """Forces until the heights aimed at, of which none is predicted."""
+        """Forces of the coming periods before any is predicted."""
         return (-1.0,) * max(1, round(self.servo.ahead / self.device.period))
 
     @cached_property
     def _surface(self) -> LedBlister:
-        """Blister and the pins led ahead of it."""
+        """Blister, and the pins led ahead of it."""
         release = max(self.parameters.release_force, self.felt)
         rule = BlisterRule(self.blister, self.parameters.behind, release, self.felt)
         return LedBlister(rule, self.profile, self.servo.ahead)
 
     @cached_property
     def _limits(self) -> Constants:
-        """Height of a pin at rest, how far from it one counts as formed, and its end stops, m."""
+        """Rest height, distance from it of a formed pin, and end stops, m."""
         actuator = self.device.cell.actuator
         return Constants((actuator.rest_height, self.parameters.dead_band, 0.0, actuator.stroke))
 
     @property
     def rows(self) -> int:
-        """State rows a cell needs."""
+        """State rows per cell."""
         return self.pulp.filters + OWN_ROWS + self.servo.rows
 
     #: See `following.FollowingControl`.
@@ -202,12 +206,12 @@ class HybridControl:
 
     @property
     def blister_radius(self) -> float:
-        """How far from the fingertip pins may be in its blister, m."""
+        """Largest distance of pins in the blister from the fingertip, m."""
         return self.blister.radius
 
     @property
     def pin_rows(self) -> tuple[int, ...]:
-        """Rows of the command a cell follows, whoever gave it: how far it is led, and its speeds."""
+        """Rows of the command that a cell obeys, of any finger: lead and speeds."""
         at = self._at
         return at.lead, *range(self.rows)[at.speeds]
 
@@ -226,13 +230,13 @@ class HybridControl:
         return memory, commands
 
     def sort(self, memory: Follower) -> Phase | None:
-        """Return the phase: fingers of one phase are served together; None: Method I serves it, alone."""
+        """Return the phase: one call serves fingers of equal phase; None: Method I serves the finger."""
         return memory.phase if memory.master.phase is IDLE else None
 
     def locate_all(
         self, memories: list[Follower], touched: Measurement, sections: Whole = WHOLE
     ) -> tuple[list[Follower], list[Any]]:
-        """Observe the pulp, and fit the fingertips, which are sorted alike; see `Controller.locate`."""
+        """Observe the pulp, and fit fingertips with the same `sort` key; see `Controller.locate`."""
         if memories[0].master.phase is not IDLE:
             memory, disc = self._substitute(memories[0], touched)
             return [memory], [disc]
@@ -249,7 +253,7 @@ class HybridControl:
         return memory._replace(period=memory.period + 1, estimate=estimate)
 
     def _substitute(self, memory: Follower, touched: Measurement) -> tuple[Follower, Any]:
-        """Let Method I follow the fingertip; the next one is predicted again."""
+        """Let Method I follow the fingertip until it is lost."""
         before, begins = memory.master, self.substitute.is_new(memory.master)
         master, disc = self.substitute.locate(Master(losses=before.losses) if begins else before, touched)
         if begins and master.phase is not IDLE:
@@ -276,7 +280,7 @@ class HybridControl:
     def command_all(
         self, memories: list[Follower], seen: Measurement, sections: Whole = WHOLE
     ) -> tuple[list[Follower], Commands]:
-        """Form the blisters of fingers that are sorted alike, and drive all pins to their heights."""
+        """Form the blisters of fingers with the same `sort` key, and drive all pins to their heights."""
         lead, speeds = seen.own[self._at.lead], seen.own[self._at.speeds]
         if memories[0].master.phase is not IDLE:
             unled = seen._replace(target=seen.target - lead)
@@ -299,7 +303,7 @@ class HybridControl:
             np.minimum(target, highest, out=target)
         most = OVER * self.parameters.force_setpoint
         if np.maximum.reduce(seen.force, initial=0.0) > most:
-            # A fingertip that presses a single pin so hard is not where it is taken to be: the pin gives way.
+            # Such a force on a single pin shows that the estimate is wrong: the pin gives way.
             over = seen.force > most
             low = np.maximum(coasting.heights + coasting.limits[0] * self.servo.span, 0.0)
             left, target = np.where(over, low, left), np.where(over, low, target)
@@ -315,7 +319,7 @@ class HybridControl:
         coasting: Coasting,
         sections: Whole,
     ) -> list[Follower]:
-        """Move tops to where the forces reach the set point; without contact, to the last height with it."""
+        """Move tops to the heights of the set point; without contact, to the last height with contact."""
         forces, tops = sections.add(seen.force), list[Top | None]()
         for memory, force, part in zip(memories, forces, sections.parts, strict=True):
             if memory.period % EVERY and not memory.alone and self._observer.holds(memory, force):
@@ -341,7 +345,7 @@ class HybridControl:
         aim: Aim,
         speed: float,
     ) -> Follower:
-        """Return the memory with the top where it is solved to be, m, with the predicted total force, N.
+        """Return the memory with the solved top, m, and the predicted total force, N.
 
         `force` of so many cells, N; surface, m; lowest point of the fingertip, m, and its speed, m/s.
         """
@@ -350,9 +354,9 @@ class HybridControl:
         if not memory.alone:
             top, coming = solved or (felt, 0.0)
             goes, beyond = self._leaves(memory)
-            carried = trim != 0.0  # one that has just landed does not leave, wherever it is estimated
+            carried = trim != 0.0  # a fingertip that has just landed does not leave, whatever its estimate
             if carried and (goes or beyond) and top > (along := self._move_top(memory)):
-                top, coming = along, -1.0  # fewer cells carry the fingertip, and none is to rise for it
+                top, coming = along, -1.0  # fewer cells carry the fingertip, and none must rise for it
             top = min(max(top, 0.0), self.device.cell.actuator.stroke)
             # The trim belongs to a force that pins reach.
             coming -= trim * (coming == asked + trim)
@@ -383,21 +387,21 @@ class HybridControl:
         )
 
     def _leaves(self, memory: Follower) -> tuple[bool, bool]:
-        """Tell whether the fingertip goes off the bed, and whether it is beyond, where few pins carry it."""
+        """Tell whether the fingertip moves off the bed, and whether few pins carry it beyond the rim."""
         x, y, _, vx, vy, *_ = memory.estimate.mean.tolist()
         rim, speed = self.device.rim, math.hypot(vx, vy)
         goes = speed > SLOWEST and rim.is_ahead(x, y, vx / speed, vy / speed)
         return goes, rim.is_under(x, y, -rim.reach)
 
     def _doubt(self, memory: Follower, force: float, cells: int) -> float:
-        """Return the doubt, N², after a force of some cells, N: beyond a limit Method I takes over."""
+        """Return the doubt, N², after a force on cells, N; beyond a limit Method I takes over."""
         due, most = memory.due[0], LEARNED * self.parameters.force_setpoint
         error = min(abs(force - due), most) if due >= 0.0 else 0.0
         doubt = memory.doubt + (error * error - cells * self.noise**2 - memory.doubt) / PERIODS
         return max(doubt, 0.0)
 
     def _move_top(self, memory: Follower) -> float:
-        """Return the height of the top, m, along with the fingertip for a period."""
+        """Return the height of the top, m, moved with the fingertip for a period."""
         speed: float = memory.estimate.mean.tolist()[5]
         return memory.top + speed * self.device.period
 
@@ -441,9 +445,9 @@ class HybridControl:
             tops[i] = top
 
 
-#: How far beyond the fingertip's largest semi-axis cells may be touched, m.
+#: Largest distance of touched cells beyond the fingertip's largest semi-axis, m.
 BESIDE = 3e-3
-#: Standard deviation of the forces of sensors without noise that the filter counts on, N.
+#: Standard deviation of forces that the filter assumes for sensors without noise, N.
 QUIET = 2e-4
 
 

@@ -90,10 +90,10 @@ class Follower(NamedTuple):
         return self.edge
 
     @property
-    def place(self) -> tuple[float, float] | None:
+    def position(self) -> tuple[float, float] | None:
         """Where the fingertip is, m; None: none is followed."""
         if self.phase is IDLE or self.master.phase is not IDLE:
-            return self.master.place
+            return self.master.position
         x, y, *_ = self.estimate.mean.tolist()
         return x, y
 
@@ -105,7 +105,7 @@ MARGIN = 2e-3
 
 
 class Region(NamedTuple):
-    """Cells about the predicted places of the fingertips."""
+    """Cells about the predicted positions of the fingertips."""
 
     edges: list[float]
     raised: list[bool]

@@ -78,9 +78,11 @@ class Masters(Sequence[Master]):
         return self.numbers.shape[1]
 
     def __getitem__(self, run: Any) -> Any:
-        phase, *place, from_x, from_y, toward_x, toward_y, felt, alone, losses = self.numbers[:, run].tolist()
+        phase, *numbers, from_x, from_y, toward_x, toward_y, felt, alone, losses = self.numbers[
+            :, run
+        ].tolist()
         heading = Heading(from_x, from_y, toward_x, toward_y)
-        return Master._make((Phase(phase), *place, heading, felt, int(alone), int(losses)))
+        return Master._make((Phase(phase), *numbers, heading, felt, int(alone), int(losses)))
 
     def copy(self) -> Masters:
         """Return masters that share no array with these."""
@@ -134,7 +136,9 @@ class VirtualMasterColumns(VirtualMasterControl):
             square = (x - numbers[FROM_X]) ** 2 + (y - numbers[FROM_Y]) ** 2
         goes = ~none & ~idle & (near >= felt) & (square < (SHORT * gains.travel) ** 2)
         others = ~goes & ~(none & idle)
-        alone = [self.runs[i].follow(masters[i], *(own[i] for own in sums)) for i in others.nonzero()[0]]
+        alone = [
+            self.runs[i].follow(masters[i], *(values[i] for values in sums)) for i in others.nonzero()[0]
+        ]
         np.copyto(numbers[X], x, where=goes)
         np.copyto(numbers[Y], y, where=goes)
         np.copyto(numbers[ALONE], 0.0, where=goes)
@@ -176,7 +180,7 @@ class VirtualMasterColumns(VirtualMasterControl):
         radius = np.broadcast_to(self.blister.edge_radius, len(memory)).tolist()
         phase, x, y = memory.numbers[:3].tolist()
         discs: list[Disc | None] = [
-            own[1:] if own[0] else None for own in zip(phase, x, y, radius, strict=True)
+            disc[1:] if disc[0] else None for disc in zip(phase, x, y, radius, strict=True)
         ]
         return discs
 

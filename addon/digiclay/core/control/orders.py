@@ -22,14 +22,15 @@ they have arrived.
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from enum import IntEnum
+from functools import partial
 
 import numpy as np
 
 from ..base.arrays import Flags, Floats, any_true
-from ..base.modes import Mode
+from ..base.modes import BLISTER, HOLD, LOCKED
 from ..model.actuator import Actuator
 from ..model.control_interface import Commands, Controller, Measurement, Memory
 from ..model.layout import Disc, Grid, add_disc, widen_disc
@@ -123,6 +124,13 @@ class Around:
         return self.method.begin()
 
 
+#: Returns, of measured cells, new commanded heights, (m,), m, which pins are driven there, and which a brush
+#: changes.
+Aim = Callable[[Measurement], tuple[Floats, Flags, Flags]]
+#: Returns the commanded heights after a period, (m,), m, of measured cells by weights, (m,), not all 0.
+Change = Callable[[Measurement, Floats], Floats]
+
+
 @dataclass(frozen=True, eq=False)
 class DrivingControl(Around):
     """Controller of one control period with an order: the method's, but for the cells the valves drive."""
@@ -133,6 +141,7 @@ class DrivingControl(Around):
     actuator: Actuator
     reach: Disc
     """Cells to be driven, and those whose heights that takes, m."""
+    aim: Aim
 
     def locate(self, memory: Memory, touched: Measurement) -> tuple[Memory, Disc | None]:
         """Request the order's disc, and the method's; see `Controller`."""
@@ -140,107 +149,66 @@ class DrivingControl(Around):
         return memory, add_disc(disc, self.reach)
 
     def command(self, memory: Memory, seen: Measurement) -> tuple[Memory, Commands]:
-        """Drive the pins of the order, and those still on their way; the method commands all others."""
-        moved = seen.mode == Mode.BLISTER
+        """Drive the pins of the order, and those that have not arrived; the method commands all others."""
+        moved = seen.mode == BLISTER
         memory, orders = self.method.command(memory, seen)
         if self.free:
-            # What has arrived holds: no method takes it over.
-            orders = orders._replace(mode=np.where(moved, np.int8(Mode.HOLD), seen.mode))
+            # Pins that have arrived hold: no method takes them over.
+            orders = orders._replace(mode=np.where(moved, HOLD, seen.mode))
         target, driven, busy = self.aim(seen)
-        # What the method moves itself, as part of its blister, is not on its way from an order.
-        own = driven | (moved & (orders.mode <= Mode.HOLD))
+        # Pins that the method moves as part of its blister are not driven by an order.
+        ordered = driven | (moved & (orders.mode <= HOLD))
         error, band = target - seen.height, self.drive.dead_band
         # An error within the dead band of what is placed may be one of what forms pins.
         mode = mark_formed(target, self.actuator.rest_height, max(band, DriveParameters().dead_band))
-        np.putmask(mode, busy | (np.abs(error) > band), np.int8(Mode.BLISTER))
+        np.putmask(mode, busy | (np.abs(error) > band), BLISTER)
         command = self.drive.command(self.drive.approach(error), seen.force)
-        np.copyto(target, orders.target, where=~own)
-        np.copyto(mode, orders.mode, where=~own)
-        np.copyto(command, orders.command, where=~own)
+        np.copyto(target, orders.target, where=~ordered)
+        np.copyto(mode, orders.mode, where=~ordered)
+        np.copyto(command, orders.command, where=~ordered)
         return memory, Commands(target, mode, command)
 
-    def aim(self, seen: Measurement) -> tuple[Floats, Flags, Flags]:
-        """Return new commanded heights, (m,), m, which pins are driven there, and which are under a brush."""
-        raise NotImplementedError
 
+def brush(disc: Disc, strength: float, change: Change) -> Aim:
+    """Return the aim of a disc whose pins change with weights: 1 in its middle, 0 from its rim on."""
+    x, y, radius = disc
 
-@dataclass(frozen=True, eq=False)
-class BrushControl(DrivingControl):
-    """Controller of a control period in which the pins of a disc change with weights."""
-
-    disc: Disc
-    strength: float
-
-    def aim(self, seen: Measurement) -> tuple[Floats, Flags, Flags]:
-        """See `DrivingControl`."""
-        weight = self._weigh(seen)
+    def aim(seen: Measurement) -> tuple[Floats, Flags, Flags]:
+        share = np.maximum(1.0 - measure_square(x, y, seen.quadratic_basis) / radius**2, 0.0)
+        share[seen.mode == LOCKED] = 0.0
+        weight = share * share if strength else np.zeros_like(share)
         under = weight > 0.0
-        return (self.change(seen, weight) if any_true(under) else seen.target.copy()), under, under
+        return (change(seen, weight) if any_true(under) else seen.target.copy()), under, under
 
-    def _weigh(self, seen: Measurement) -> Floats:
-        """Return the weights of cells, (m,): 1 in the disc's middle, falling smoothly to 0 at its rim."""
-        x, y, radius = self.disc
-        if self.strength == 0.0:
-            return np.zeros(seen.height.size)
-        left: Floats = np.maximum(1.0 - measure_square(x, y, seen.quadratic_basis) / radius**2, 0.0)
-        np.putmask(left, seen.mode == Mode.LOCKED, 0.0)
-        return left * left
-
-    def change(self, seen: Measurement, weight: Floats) -> Floats:
-        """Return the commanded heights after the period, (m,), m; some weight (m,) is not 0."""
-        raise NotImplementedError
+    return aim
 
 
-@dataclass(frozen=True, eq=False)
-class SmoothingControl(BrushControl):
-    """Controller of a control period in which a disc is smoothed."""
-
-    exchange: Exchange
-    """Of the commanded heights, in one period."""
-
-    def change(self, seen: Measurement, weight: Floats) -> Floats:
-        """See `BrushControl`."""
-        return self.exchange.even_out(seen.cells, seen.target, weight)
+def smooth(exchange: Exchange, seen: Measurement, weight: Floats) -> Floats:
+    """Spread the heights of a disc, see `SMOOTH`; `exchange`: of heights, in one period."""
+    return exchange.even_out(seen.cells, seen.target, weight)
 
 
-@dataclass(frozen=True, eq=False)
-class AveragingControl(SmoothingControl):
-    """Controller of a control period in which a disc is averaged."""
-
-    def change(self, seen: Measurement, weight: Floats) -> Floats:
-        """See `BrushControl`."""
-        change = weight * (self.exchange.even_out(seen.cells, seen.target) - seen.target)
-        rise, fall = np.maximum(change, 0.0), np.maximum(-change, 0.0)
-        risen, fallen = float(rise.sum()), float(fall.sum())
-        same = min(risen, fallen)
-        return seen.target + (rise * (same / risen) - fall * (same / fallen) if same > 0.0 else 0.0)
+def average(exchange: Exchange, seen: Measurement, weight: Floats) -> Floats:
+    """Average the heights of a disc, see `AVERAGE`."""
+    change = weight * (exchange.even_out(seen.cells, seen.target) - seen.target)
+    rise, fall = np.maximum(change, 0.0), np.maximum(-change, 0.0)
+    risen, fallen = float(rise.sum()), float(fall.sum())
+    same = min(risen, fallen)
+    return seen.target + (rise * (same / risen) - fall * (same / fallen) if same > 0.0 else 0.0)
 
 
-@dataclass(frozen=True, eq=False)
-class ErasingControl(BrushControl):
-    """Controller of a control period in which the pins of a disc go back to rest."""
-
-    rate: float
-    """Of what is left, in one period."""
-
-    def change(self, seen: Measurement, weight: Floats) -> Floats:
-        """See `BrushControl`."""
-        left = (seen.target - self.actuator.rest_height) * np.exp(-self.rate * weight)
-        np.putmask(left, (weight > 0.0) & (np.abs(left) <= self.drive.dead_band), 0.0)
-        return np.where(weight > 0.0, self.actuator.rest_height + left, seen.target)
+def erase(rate: float, rest: float, band: float, seen: Measurement, weight: Floats) -> Floats:
+    """Bring the pins of a disc back to rest, m; `rate`: of the rest in one period, `band`: no height, m."""
+    left = (seen.target - rest) * np.exp(-rate * weight)
+    np.putmask(left, (weight > 0.0) & (np.abs(left) <= band), 0.0)
+    return np.where(weight > 0.0, rest + left, seen.target)
 
 
-@dataclass(frozen=True, eq=False)
-class PlacingControl(DrivingControl):
-    """Controller of a control period in which pins go to the heights of a surface (n,), m."""
-
-    surface: Floats
-
-    def aim(self, seen: Measurement) -> tuple[Floats, Flags, Flags]:
-        """See `DrivingControl`."""
-        goal = self.surface.take(seen.cells)
-        driven = ~np.isnan(goal) & (seen.mode != Mode.LOCKED)
-        return np.where(driven, goal, seen.target), driven, np.zeros_like(driven)
+def approach(surface: Floats, seen: Measurement) -> tuple[Floats, Flags, Flags]:
+    """Return the aim of pins that go to the heights of a surface (n,), m; see `Aim`."""
+    goal = surface.take(seen.cells)
+    driven = ~np.isnan(goal) & (seen.mode != LOCKED)
+    return np.where(driven, goal, seen.target), driven, np.zeros_like(driven)
 
 
 @dataclass(frozen=True, eq=False)
@@ -267,12 +235,12 @@ class LockingControl(Around):
         if not any_true(locked):
             return memory, orders
         target = np.where(locked, seen.height, orders.target)
-        mode = np.where(locked, np.int8(Mode.LOCKED), orders.mode)
+        mode = np.where(locked, LOCKED, orders.mode)
         return memory, Commands(target, mode, np.where(locked, 0.0, orders.command))
 
     def _choose(self, seen: Measurement) -> Flags:
         """Return which pins are locked after the period, (m,)."""
-        locked: Flags = seen.mode == Mode.LOCKED
+        locked: Flags = seen.mode == LOCKED
         if self.disc is None:
             return locked
         x, y, radius = self.disc
@@ -283,7 +251,7 @@ class LockingControl(Around):
 
     def _mask(self, seen: Measurement) -> Measurement:
         """Return what a method sees that knows no locks."""
-        locked = seen.mode == Mode.LOCKED
+        locked = seen.mode == LOCKED
         if not any_true(locked):
             return seen
         formed = mark_formed(seen.target, self.actuator.rest_height, DriveParameters().dead_band)
@@ -314,32 +282,30 @@ def order_periods(
     exact = make_drive(DriveParameters(settling, max(BAND, floor)), cell, period)
     margin, free = MARGIN * max(plan.pitch, plan.row_spacing), isinstance(method, Uncontrolled)
     circles: dict[int, Disc | None] = {}
-    held: Controller = method
+    actuator, held = cell.actuator, method
     for x, y, radius, strength, number in orders.rows.tolist():
         verb, disc = Verb(int(number)), (x, y, radius)
         locked |= radius > 0.0 and verb in LOCKING
-        held = LockingControl(method, cell.actuator, verb) if locked else method
+        held = LockingControl(method, actuator, verb) if locked else method
         if verb is Verb.PLACE:
             surface = orders.surfaces[int(x)]
             if int(x) not in circles:
                 driven = grid.enclose(np.flatnonzero(~np.isnan(surface)))
                 circles[int(x)] = widen_disc(driven, 0.1 * plan.pitch)
-            circle = circles[int(x)]
-            yield PlacingControl(held, free, exact, cell.actuator, circle, surface) if circle else held
+            circle, goal = circles[int(x)], partial(approach, surface)
+            yield DrivingControl(held, free, exact, actuator, circle, goal) if circle else held
         elif radius == 0.0:
             yield held
         elif verb in LOCKING:
-            yield LockingControl(method, cell.actuator, verb, disc)
+            yield LockingControl(method, actuator, verb, disc)
         elif verb is Verb.ERASE:
-            rate = strength * period / ERASING
-            yield ErasingControl(held, free, exact, cell.actuator, disc, disc, strength, rate)
+            change = partial(erase, strength * period / ERASING, actuator.rest_height, exact.dead_band)
+            yield DrivingControl(held, free, exact, actuator, disc, brush(disc, strength, change))
         else:
-            kind, time = (
-                (SmoothingControl, SPREADING) if verb is Verb.SMOOTH else (AveragingControl, AVERAGING)
-            )
+            even, time = (smooth, SPREADING) if verb is Verb.SMOOTH else (average, AVERAGING)
             exchange = make_exchange(grid, strength * radius**2 / time, period)
-            reach = (x, y, radius + margin)
-            yield kind(held, free, drive, cell.actuator, reach, disc, strength, exchange)
+            aim, reach = brush(disc, strength, partial(even, exchange)), (x, y, radius + margin)
+            yield DrivingControl(held, free, drive, actuator, reach, aim)
 
 
 def find_fault(orders: Orders, periods: int, pins: int, stroke: float) -> str:

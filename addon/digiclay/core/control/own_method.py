@@ -20,7 +20,7 @@ import numpy as np
 from ..base.arrays import Cells as Numbers
 from ..base.arrays import Floats, Modes
 from ..base.errors import DigiclayError, MethodError
-from ..base.modes import Mode
+from ..base.modes import FORCE_FOLLOW, Mode
 from ..base.quantity import quantity
 from ..model.control_interface import Commands, Controller, Measurement, Memory
 from ..model.layout import Disc
@@ -161,7 +161,7 @@ class OwnControl:
         if mode is None:
             touched = suppress_noise(seen.force, self.device.force_floor) > 0.0
             formed = self.drive.mark_formed(target, actuator.rest_height)
-            mode = np.where(touched, np.int8(Mode.FORCE_FOLLOW), formed)
+            mode = np.where(touched, FORCE_FOLLOW, formed)
         if rows is not None:
             seen.own[:] = rows
         return memory, Commands(target, mode, command)

@@ -1,16 +1,16 @@
-"""Division of pins among fingers: whose each pin is, who sees its force, and whose command it obeys.
+"""Division of pins among fingers: owner of each pin, visible forces, and the command that it obeys.
 
 Each finger has a controller, which sees and commands the pins around its finger as if it were alone. Sensors
-measure the force on a pin, not the finger that presses it. So a pin that two fingers press is divided twice
-in a control period:
+measure the force on a pin, but not which finger presses it. Pin ownership is therefore recomputed every
+control period, in two steps:
 
-- `assign`, before the controllers locate their fingertips: the pin belongs to the finger whose underside is
-  lowest over it. This finger sees the whole force, the other one sees none. A pressed pin far from all
-  fingers begins a new one.
-- `choose`, after both have commanded the pin: it obeys the finger it belongs to.
+- `assign`, before the controllers locate their fingertips: a pressed pin belongs to the finger whose
+  underside is lowest over it. This finger sees the whole force, the others see none. A pressed pin far from
+  all fingers begins a new finger.
+- `choose`, after the controllers have commanded their pins: a pin in several discs obeys its owner.
 
-Here undersides are those of balls that stand on top of the blisters, for the master of Method I is where its
-fingertip is. `CellDivision` has what is different with Method II, `PredictedDivision` with Method III.
+For Method I the undersides are those of balls on top of the blisters, since its master is at the fingertip.
+`CellDivision` has the differences for Method II, `PredictedDivision` those for Method III.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..base.arrays import TIE, TINY, Cells, Flags, Floats, any_true, find_first_largest
-from ..base.modes import Mode
+from ..base.modes import HOLD
 from ..model.control_interface import Measurement
 from ..model.fingertip import continue_ball
 from ..model.layout import RELATIVE_TOLERANCE, Disc
@@ -34,23 +34,23 @@ from .travel import measure_square
 CAPTURE = 1.2
 #: Shares of that within which pressed pins begin a new finger, and within which pins are under one.
 NEW, UNDER = 0.65, 0.5
-#: How far above a pressed pin the underside of the finger that presses it may be taken to be, m.
+#: Largest height of an estimated underside above a pin that its finger presses, m.
 REACHED = 6e-3
-#: How far a pin may stand above a fingertip's underside and tell where it is, m: one that another fingertip's
-#: blister holds up beside it would draw its master there.
+#: Largest height of a pin above the underside of the fingertip that owns it, m: a higher one is held up by
+#: the blister of another finger, and would attract the master.
 ASIDE = 1.5e-3
-#: How near a pressed pin two undersides must be for both to be able to press it, m.
+#: Largest distance of an underside above a pressed pin at which its finger may be the one that presses, m.
 UNCLEAR = 0.2e-3
-#: Share of a pin that a finger does not see, not even its height.
+#: Share of a finger in a pin that is hidden from it, with its height.
 HIDDEN = -1.0
 #: No finger.
 NOBODY = -1
 #: Rank of the command of the finger that presses the pin: above all others.
 PRESSING = 2.0
-#: Row of the periods for which Method II remembers a pin to be critical, and what stands there for a finger
-#: that the pin does not obey.
+#: Row of Method II with the periods since a pin became critical, and its value for fingers that the pin does
+#: not obey.
 PERIODS, ANOTHER = 0, -1.0
-#: Where a finger is that is not followed: beyond every pin.
+#: Position of a finger that is not followed: beyond every pin.
 NOWHERE = (BEYOND, BEYOND)
 
 
@@ -64,7 +64,7 @@ class Hands(NamedTuple):
 
     @property
     def losses(self) -> int:
-        """How often a finger was lost."""
+        """Number of losses of all fingers."""
         return sum(follower.losses for follower in self.fingers)
 
 
@@ -83,12 +83,12 @@ class PinDivision:
     """Rules by which f fingers divide the pins."""
 
     controllers: tuple[FollowingControl, ...]
-    """The fingers' own; fingers that are alike have one and the same."""
+    """One per finger; equal fingers share one."""
     sizes: tuple[float, ...]
     heights: tuple[float, ...]
     """Largest semi-axis of each fingertip, and that upwards, m."""
     felt: float
-    """Force from which on a pin begins a new finger, N."""
+    """Least force on a pin that begins a new finger, N."""
 
     @cached_property
     def fingers(self) -> Cells:
@@ -102,14 +102,14 @@ class PinDivision:
 
     @cached_property
     def captures(self) -> Floats:
-        """How far from each finger a pin may belong to it, (f, 1), m."""
+        """Largest distance of a finger's pins from it, (f, 1), m."""
         captures: Floats = CAPTURE * (1.0 + RELATIVE_TOLERANCE) * self._radii
         return captures
 
     # Before the controllers locate their fingertips.
 
     def assign(self, memory: Hands, touched: Measurement, pressed: Cells) -> tuple[Cells, Floats]:
-        """Return which finger each pressed pin (q,) belongs to, and the undersides over it, (f, q), m."""
+        """Return the owner of each pressed pin (q,), and the undersides over it, (f, q), m."""
         if not pressed.size:
             return pressed, np.zeros((len(self.controllers), 0))
         height = touched.height[pressed]
@@ -117,14 +117,14 @@ class PinDivision:
         under[under > height + REACHED] = np.inf
         return self._begin_fingers(touched, pressed, find_lowest(under)), under
 
-    def find_places(self, memory: Hands) -> Floats:
-        """Return where the fingers are, (2, f), m."""
-        places: Floats = np.array([follower.place or NOWHERE for follower in memory.fingers]).T
-        return places
+    def find_positions(self, memory: Hands) -> Floats:
+        """Return the positions of the fingers, (2, f), m."""
+        positions: Floats = np.array([follower.position or NOWHERE for follower in memory.fingers]).T
+        return positions
 
     def find_undersides(self, memory: Hands, basis: Floats, height: Floats) -> Floats:
         """Return the undersides of fingers over pins of a `height`, (f, q), m; infinite: too far away."""
-        x, y = self.find_places(memory)
+        x, y = self.find_positions(memory)
         tops = np.array([follower.top for follower in memory.fingers])[:, None]
         return self._lay_balls(measure_square(x, y, basis), tops)
 
@@ -134,7 +134,7 @@ class PinDivision:
         return np.where(square > self.captures**2, np.inf, under)
 
     def _begin_fingers(self, touched: Measurement, pressed: Cells, owner: Cells) -> Cells:
-        """Return the owners; pressed pins of nobody begin new fingers about the strongest forces."""
+        """Return the owners; pressed pins without one begin new fingers, from the strongest force on."""
         force, seeds = np.where(owner == NOBODY, touched.force[pressed], 0.0), []
         if force.max() < self.felt:
             return owner
@@ -153,7 +153,7 @@ class PinDivision:
             seeds.append((finger, distance))
         if not seeds:
             return owner
-        # Of fingers that land in one period each has the pins nearest to it.
+        # Fingers that land in the same period get the pins nearest to each.
         fingers, distances = (np.array(part) for part in zip(*seeds, strict=True))
         near = (owner == NOBODY) & (distances < np.inf).any(axis=0)
         return np.where(near, fingers[find_first_largest(-distances)], owner)
@@ -175,14 +175,14 @@ class PinDivision:
         return self.share_whole(owner)
 
     def share_whole(self, owner: Cells) -> Floats:
-        """Return the shares of fingers in forces, (f, q): none of pins that belong to another finger."""
+        """Return the shares of fingers in forces, (f, q): 1 in pins of the finger or of none, else 0."""
         shares: Floats = ((owner == self.fingers) | (owner == NOBODY)).astype(np.float64)
         return shares
 
-    # Before they command their pins.
+    # Before the controllers command their pins.
 
     def find_owner(self, memory: Hands, seen: Measurement, shared: Cells) -> Cells:
-        """Return which finger each pin in several discs (g,) was assigned to."""
+        """Return the owner of each pin in several discs (g,), from `assign`."""
         if not memory.pressed:
             return np.full(shared.size, NOBODY)
         (pressed, owner), cells = memory.pressed, seen.cells[shared]
@@ -190,25 +190,25 @@ class PinDivision:
         return np.where(pressed[at] == cells, owner[at], NOBODY)
 
     def claim(self, memory: Hands, seen: Measurement, shared: Cells) -> tuple[Cells, Floats]:
-        """Return whose the pins in several discs are, (g,), and the share of each finger in them, (f, g)."""
+        """Return the owner of each pin in several discs, (g,), and each finger's share of it, (f, g)."""
         owner = self.find_owner(memory, seen, shared)
         return owner, self.share_whole(owner)
 
     def mask(self, seen: Measurement) -> None:
-        """Hide, in place, what fingers must not see of the pins in their discs."""
+        """Hide from fingers, in place, the modes of pins that obey others."""
 
-    # After they have commanded them.
+    # After the controllers have commanded their pins.
 
     def choose(
         self, memory: Hands, seen: Measurement, owner: Cells, columns: Columns, target: Floats
     ) -> Cells:
-        """Return which command each pin in several discs obeys, (g,); `target`: commanded heights, m.
+        """Return the entry of the command that each pin in several discs obeys, (g,).
 
-        That of the finger it belongs to; else that of the finger above it; else, in several blisters, the one
-        that moves it farthest off its ground; outside of all that of the nearest, but of those that move it.
+        In this order: that of its owner; of the finger above it; of the blister that moves it farthest off
+        the ground; of the nearest finger, of those that move it. `target`: commanded heights, m.
         """
         copies = columns.copies
-        finger, (x, y) = copies.row, columns.places
+        finger, (x, y) = copies.row, columns.positions
         blisters = self.find_blisters(memory)
         limits = blisters.radius * np.abs(blisters.radius), (UNDER * self.captures[:, 0]) ** 2
         limit, near, ground, at_x, at_y = np.array((*limits, blisters.ground, blisters.x, blisters.y)).take(
@@ -227,13 +227,13 @@ class PinDivision:
         """Return the blisters of all fingers."""
         rows = []
         for controller, follower in zip(self.controllers, memory.fingers, strict=True):
-            middle = follower.place
+            middle = follower.position
             radius = controller.blister_radius * (1.0 + RELATIVE_TOLERANCE) if middle else -1.0
             rows.append((*(middle or NOWHERE), radius, follower.ground, follower.top))
         return Blisters(*np.array(rows).T)
 
     def remember(self, rows: Floats, obeyed: Cells) -> None:
-        """Let all fingers remember of each pin's command what the finger it obeys does; rows (f, r, m)."""
+        """Copy the rows of each pin's command from the finger it obeys to all fingers; rows (f, r, m)."""
         pins = np.arange(obeyed.size)
         for row in self.controllers[0].pin_rows:
             rows[:, row] = rows[obeyed, row, pins]
@@ -242,41 +242,41 @@ class PinDivision:
 class CellDivision(PinDivision):
     """Rules for Method II, which has neither a master nor an estimate of the fingertip.
 
-    Beside one fingertip pins may stand high that another one follows low. So each controller sees as
-    following, in its blister or frozen only the pins that obeyed it last. A pressed pin belongs to the finger
-    whose underside is nearest, for no pin is pressed deep; and pins obey the nearer finger.
+    Pins of a high fingertip may be next to those of a low one. So each controller sees the modes of the
+    blister only at pins that obeyed it last. A pressed pin belongs to the finger whose underside is nearest,
+    since no pin is pressed deeply, and pins obey the nearer finger.
     """
 
-    def find_places(self, memory: Hands) -> Floats:
-        """Return where the fingers are, (2, f), m, from the first force on: cells follow later."""
-        places = []
+    def find_positions(self, memory: Hands) -> Floats:
+        """Return the positions of the fingers, (2, f), m, from the first force on: cells follow later."""
+        positions = []
         for follower, (x, y, radius) in zip(memory.fingers, memory.discs, strict=True):
-            places.append(follower.place or ((x, y) if radius >= 0.0 else NOWHERE))
-        return np.array(places).T
+            positions.append(follower.position or ((x, y) if radius >= 0.0 else NOWHERE))
+        return np.array(positions).T
 
     def find_undersides(self, memory: Hands, basis: Floats, height: Floats) -> Floats:
-        """Return how far pins are from undersides, (f, q), m; a fingertip is on the pin nearest to it."""
-        x, y = self.find_places(memory)
+        """Return distances of pins from undersides, (f, q), m, with each fingertip on its nearest pin."""
+        x, y = self.find_positions(memory)
         square = measure_square(x, y, basis)
         nearest = find_first_largest(-square.T)
         under: Floats = self._lay_balls(square, 0.0) + height[nearest][:, None] - height
         return np.abs(under)
 
     def mask(self, seen: Measurement) -> None:
-        """Show each finger the pins that obey another one as if they held their height."""
-        seen.mode[seen.own[PERIODS] == ANOTHER] = Mode.HOLD
+        """Show pins that obey another finger as holding their height."""
+        seen.mode[seen.own[PERIODS] == ANOTHER] = HOLD
 
     def choose(
         self, memory: Hands, seen: Measurement, owner: Cells, columns: Columns, target: Floats
     ) -> Cells:
-        """Return which command each pin in several discs obeys, (g,): that of the nearer finger.
+        """Return the entry of the command that each pin in several discs obeys, (g,): of the nearer finger.
 
         A finger that would leave the pin unchanged has no say unless it is above it; the pressing finger has
         priority.
         """
         copies = columns.copies
-        finger, (x, y) = copies.row, columns.places
-        at_x, at_y = self.find_places(memory)[:, finger]
+        finger, (x, y) = copies.row, columns.positions
+        at_x, at_y = self.find_positions(memory)[:, finger]
         order = (x - at_x) ** 2 + (y - at_y) ** 2
         still = np.abs(target[copies.number] - seen.target[columns.cells]) <= TIE
         order += still & (order > ((UNDER * self.captures) ** 2)[finger, 0])
@@ -284,7 +284,7 @@ class CellDivision(PinDivision):
         return columns.pick(-order)
 
     def remember(self, rows: Floats, obeyed: Cells) -> None:
-        """Let the finger that each pin obeys remember it, and all others that it obeys another one."""
+        """Note at each pin that it obeys one finger, in the rows of all others."""
         obedience, pins = rows[:, PERIODS], np.arange(obeyed.size)
         remembered = obedience[obeyed, pins]
         obedience[:] = ANOTHER
@@ -298,7 +298,7 @@ class PredictedDivision(PinDivision):
 
     @cached_property
     def _alike(self) -> dict[PredictingControl, list[int]]:
-        """Which fingers have each controller."""
+        """Fingers of each controller."""
         alike: dict[PredictingControl, list[int]] = {}
         for finger, controller in enumerate(self.controllers):
             alike.setdefault(controller, []).append(finger)
@@ -306,7 +306,7 @@ class PredictedDivision(PinDivision):
 
     def find_undersides(self, memory: Hands, basis: Floats, height: Floats) -> Floats:
         """Return the predicted undersides over pins, (f, q), m; infinite: too far away."""
-        x, y = self.find_places(memory)
+        x, y = self.find_positions(memory)
         under = np.full((x.size, basis.shape[1]), np.inf)
         for controller, fingers in self._alike.items():
             followed = [finger for finger in fingers if x[finger] < BEYOND]
@@ -316,9 +316,9 @@ class PredictedDivision(PinDivision):
         return np.where(measure_square(x, y, basis) > self.captures**2, np.inf, under)
 
     def share_pressed(self, owner: Cells, under: Floats, touched: Measurement, pressed: Cells) -> Floats:
-        """Return the share of each finger in the force on each pressed pin, (f, q); `HIDDEN`: of none.
+        """Return the share of each finger in the force on each pressed pin, (f, q); `HIDDEN`: not visible.
 
-        A finger that is not followed yet shares nothing: it would draw the estimates of the others to it.
+        A pin of a finger that is not followed yet is shared with no other: it would attract their estimates.
         """
         shares, certain = self.divide_force(owner, under, touched, pressed)
         shares[:, owner == NOBODY] = 0.0
@@ -328,10 +328,10 @@ class PredictedDivision(PinDivision):
     def divide_force(
         self, owner: Cells, under: Floats, measured: Measurement, pins: Cells
     ) -> tuple[Floats, Flags]:
-        """Return the shares of fingers in the forces on pins (q,), (f, q), and which of them are certain.
+        """Return the shares of fingers in the forces on pins (q,), (f, q), and which pins are certain.
 
-        Of a pin that several may press each has its share of the forces predicted; where none is predicted,
-        it is uncertain who presses the pin.
+        If several fingers may press a pin, they share its force in the ratio of the predicted forces; without
+        a predicted force the pin is uncertain.
         """
         shares, certain = self.share_whole(owner), np.ones(pins.size, np.bool_)
         height = measured.height[pins]
@@ -347,11 +347,11 @@ class PredictedDivision(PinDivision):
         return shares, certain
 
     def claim(self, memory: Hands, seen: Measurement, shared: Cells) -> tuple[Cells, Floats]:
-        """Return whose the pins in several discs are, (g,), and the share of each finger in them, (f, g).
+        """Return the owner of each pin in several discs, (g,), and each finger's share of it, (f, g).
 
-        A pin belongs to the fingertip that presses it, or would if a blister raised it to its top. Where the
-        blister of one finger would press the pin into another fingertip, and not the other way round, the pin
-        is hidden from the one: it cannot be high for it.
+        A pin belongs to the fingertip that presses it, or that would press it at the top of a blister. If the
+        blister of only one of two fingers would press the pin into the other fingertip, the pin is hidden
+        from that finger, which must not raise it.
         """
         if not shared.size:
             return super().claim(memory, seen, shared)

@@ -79,12 +79,12 @@ class PulpEstimate:
         pulp[-1, periods > 0.0] = 0.0
 
     def observe(self, pulp: Floats, force: Floats, expected: Floats) -> Flags:
-        """Bring filters and tensions of cells up to date, in place; return which cells are touched.
+        """Update filters and tensions of cells, in place; return which cells are touched.
 
-        Pulp that is relieved faster than it relaxes is still indented, and carries no force. So the tension
-        of a cell without a force is the expected one, at most the one at which a force would be measured.
-        A cell is also touched where a force is expected, whatever is measured: that there is none tells where
-        the fingertip ends; and a choice by noisy forces would take the cells whose noise is positive.
+        Pulp that is relieved faster than it relaxes is still indented, but carries no force. So a cell
+        without a force has the expected tension, at most that at which a force would be measured. A cell with
+        an expected force counts as touched even if none is measured, since this tells where the fingertip
+        ends; a selection by noisy forces would prefer cells with positive noise.
 
         `pulp` (k + 1, m), filters z and tension T a period before, N; `expected` (m,), tension under the
         predicted fingertip, N.

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..base.arrays import Flags, Floats
 from ..base.errors import ParameterError
-from ..base.modes import Mode
+from ..base.modes import FORCE_FOLLOW
 from ..base.quantity import quantity
 from ..model.actuator import Actuator
 from ..model.control_interface import Commands, Measurement
@@ -111,7 +111,7 @@ class PushPullControl:
         swing = stroke + centering if rising else -stroke
         speed = np.where(listening, swing + speeds.assist * seen.own[1], self.drive.approach(error))
         mode = self.drive.mark_formed(target, self.actuator.rest_height)
-        np.putmask(mode, touched & listening, np.int8(Mode.FORCE_FOLLOW))
+        np.putmask(mode, touched & listening, FORCE_FOLLOW)
         return memory, Commands(target, mode, self.drive.open_for(speed))
 
     def _drag_targets(self, seen: Measurement, listening: Flags) -> Floats:

@@ -17,24 +17,24 @@ Part = TypeVar("Part")
 
 
 def merge_parts(parts: Sequence[Part]) -> Part:
-    """Return a part that stands for those of all runs; the first one itself where all are alike.
+    """Return one part for all runs; the first one itself if all are equal.
 
-    What is the same in all, of one `classify`, stays; a number that is not becomes an array (b,), an array
-    gets a last axis, parts within the parts likewise. The rules of parameters are not checked again.
+    The parts must be equal by `classify`. A number that differs becomes an array (b,), an array gets a last
+    axis, and inner parts are merged likewise. The rules of parameters are not checked again.
     """
     first: Any = parts[0]
-    own = {field.name: merge_values([getattr(one, field.name) for one in parts]) for field in fields(first)}
-    if all(value is getattr(first, name) for name, value in own.items()):
+    names = [field.name for field in fields(first)]
+    values = {name: merge_values([getattr(part, name) for part in parts]) for name in names}
+    if all(value is getattr(first, name) for name, value in values.items()):
         return parts[0]
-    part: Any = object.__new__(type(first))
-    for name, value in own.items():
-        object.__setattr__(part, name, value)
-    stands_for_all: Part = part
-    return stands_for_all
+    merged: Part = object.__new__(type(first))
+    for name, value in values.items():
+        object.__setattr__(merged, name, value)
+    return merged
 
 
 def merge_values(values: list[Any]) -> Any:
-    """Return what stands for a value in all runs."""
+    """Return one value for all runs; see `merge_parts`."""
     first = values[0]
     if isinstance(first, np.ndarray):
         alike = all(value is first or np.array_equal(value, first) for value in values)
@@ -42,43 +42,42 @@ def merge_values(values: list[Any]) -> Any:
     if is_dataclass(first):
         return merge_parts(values)
     if isinstance(first, tuple):
-        own = tuple(merge_values(list(several)) for several in zip(*values, strict=True))
-        return first if all(map(operator.is_, own, first)) else own
+        merged = tuple(merge_values(list(items)) for items in zip(*values, strict=True))
+        return first if all(map(operator.is_, merged, first)) else merged
     return first if all(value is first or value == first for value in values) else np.array(values)
 
 
 @dataclass(frozen=True, eq=False)
 class RunByRun:
-    """Calls each run's controller separately; correct for any method, not vectorized.
+    """Calls the controller of each run separately: correct for any method, but not vectorized.
 
-    What it asks about are the cells that take part in the run; the others get no orders.
+    A controller sees only the cells that are active in its run; the others get no orders.
     """
 
     controllers: tuple[Controller, ...]
 
     def locate(self, memory: list[Any], touched: Measurement) -> tuple[list[Any], list[Any]]:
-        """Let each take in its cells."""
+        """Let each controller locate its fingertip."""
         located = [
-            controller.locate(own, _take_run(touched, run))
-            for run, (controller, own) in enumerate(zip(self.controllers, memory, strict=True))
+            controller.locate(memory[run], _take_run(touched, run))
+            for run, controller in enumerate(self.controllers)
         ]
-        return [own for own, _ in located], [disc for _, disc in located]
+        return [after for after, _ in located], [disc for _, disc in located]
 
     def command(self, memory: list[Any], seen: Measurement) -> tuple[list[Any], Commands]:
-        """Let each give its orders."""
-        given = [
-            controller.command(own, _take_run(seen, run))
-            for run, (controller, own) in enumerate(zip(self.controllers, memory, strict=True))
-        ]
+        """Let each controller command its cells."""
+        after: list[Any] = []
         targets, modes, commands = seen.target.copy(), seen.mode.copy(), np.zeros(seen.target.shape)
-        for run, (_, orders) in enumerate(given):
-            own = slice(orders.target.size)
-            targets[own, run], modes[own, run], commands[own, run] = orders
-        return [own for own, _ in given], Commands(targets, modes, commands)
+        for run, controller in enumerate(self.controllers):
+            remembered, orders = controller.command(memory[run], _take_run(seen, run))
+            after.append(remembered)
+            cells = slice(orders.target.size)
+            targets[cells, run], modes[cells, run], commands[cells, run] = orders
+        return after, Commands(targets, modes, commands)
 
 
 def join_controllers(controllers: Sequence[Any], *, by_set: bool = False) -> Any:
-    """Return one controller for all runs: the method's own where its formulas hold for many at once."""
+    """Return one controller for all runs: the method's if its formulas hold for a batch, else one by one."""
     first = controllers[0]
     if isinstance(first, BatchControl) and not by_set:
         merged = merge_parts(controllers)
@@ -88,8 +87,8 @@ def join_controllers(controllers: Sequence[Any], *, by_set: bool = False) -> Any
 
 
 def _take_run(seen: Measurement, run: int) -> Measurement:
-    """Return what is measured of one run."""
-    own = slice(seen.present[run] if seen.present else None)
-    rows: Any = seen[:-3]
-    basis, *others = (one[..., own, run] for one in rows)
+    """Return the measurement of one run."""
+    cells = slice(seen.present[run] if seen.present else None)
+    arrays: Any = seen[:-3]
+    basis, *others = (values[..., cells, run] for values in arrays)
     return Measurement(np.ascontiguousarray(basis), *others)

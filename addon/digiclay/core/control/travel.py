@@ -63,11 +63,11 @@ def update_heading(heading: Heading, x: float, y: float, travel: float, reversal
     slope the centroid of the forces moves about under a fingertip that goes one way.
     """
     dx, dy = x - heading.x, y - heading.y
-    way = math.hypot(dx, dy)
+    gone = math.hypot(dx, dy)
     along = dx * heading.toward_x + dy * heading.toward_y
-    if way < travel - TIE or (way < reversal - TIE and along < BACK * way - TIE):
+    if gone < travel - TIE or (gone < reversal - TIE and along < BACK * gone - TIE):
         return heading
-    return Heading(x, y, dx / way, dy / way)
+    return Heading(x, y, dx / gone, dy / gone)
 
 
 def measure_lead(heading: Heading, x: float, y: float, basis: Floats) -> Floats:
@@ -117,8 +117,8 @@ def _circle(x: float, y: float, radius: float = 0.0) -> tuple[float, ...]:
 
 def measure_square(x: Floats | float, y: Floats | float, basis: Floats) -> Floats:
     """Return squared distances from one point, (m,), or from s points, (s, m), m²."""
-    one = x * 0.0 + 1.0
-    form = np.array([x * x + y * y, -2.0 * x, -2.0 * y, one, 0.0 * one, one]).T
+    ones = x * 0.0 + 1.0
+    form = np.array([x * x + y * y, -2.0 * x, -2.0 * y, ones, 0.0 * ones, ones]).T
     square: Floats = form.dot(basis)
     np.abs(square, square)  # at a point itself rounding may leave a negative one
     return square

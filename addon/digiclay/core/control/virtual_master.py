@@ -108,7 +108,7 @@ class Master(NamedTuple):
     """How often the fingertip was lost while shaping."""
 
     @property
-    def place(self) -> tuple[float, float] | None:
+    def position(self) -> tuple[float, float] | None:
         """Where the fingertip is, m; None: none is followed."""
         return None if self.phase is IDLE else (self.x, self.y)
 
@@ -339,7 +339,7 @@ class VirtualMasterControl(BatchControl):
         edge = bound(level / count, 0.0, self.actuator.stroke)
         return Master._make((phase, x, y, height, opening, reference, edge, heading, felt, alone, losses))
 
-    def get_heights(self, master: Master) -> tuple[float, float, int, bool]:
+    def get_heights(self, master: Master) -> tuple[float, float, np.int8, bool]:
         """Return heights around and of a master, m, mode of felt cells, whether frozen ones stay behind."""
         kind = SPRING if master.phase is SPRINGING else FORCE_FOLLOW
         beyond = master.alone > 0 and master.height - master.felt > CARRIED * self.blister.radius

@@ -16,7 +16,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ..base.arrays import Cells, Flags
-from ..base.modes import Mode
+from ..base.modes import HOLD, LOCKED
 from ..model.fingertip import Window, compute_reach
 from ..model.layout import Disc, Discs, Grid, encloses, widen_disc
 from ..model.physics import Cell
@@ -47,8 +47,8 @@ class Selection:
     smaller: ClassVar[Callable[..., Any]] = staticmethod(min)
 
     @cached_property
-    def kept(self) -> int:
-        """Control periods for which a set is kept."""
+    def lifetime(self) -> int:
+        """Control periods for which a set serves."""
         return max(LASTING_PERIODS, int(LASTING_TIME / np.max(self.period)))
 
     @property
@@ -59,7 +59,7 @@ class Selection:
     @property
     def rise(self) -> Any:
         """Largest rise of pins while a set serves, m; a number or (b,)."""
-        return self.kept * self.period * self.fastest
+        return self.lifetime * self.period * self.fastest
 
     def update(self, state: State, finger: FingerPeriod | None, control: Any) -> State:
         """Return a state, in the same arrays, whose active cells include all that can change in a period."""
@@ -98,7 +98,13 @@ class Selection:
         control = widen_disc(control, self.margin)
         cells, near = self.pick(active, moving, reach, control)
         return replace(
-            active, cells=cells, near=near, reach=reach, control=control, peak=peak, until=period + self.kept
+            active,
+            cells=cells,
+            near=near,
+            reach=reach,
+            control=control,
+            peak=peak,
+            until=period + self.lifetime,
         )
 
     def pick(
@@ -124,7 +130,7 @@ class Selection:
         moving: Flags = active.block[cell.lag_rows.start : rows.target].any(axis=0)
         moving |= active.block[rows.force] > 0.0
         # Locked pins do not move.
-        moving |= (active.mode > Mode.HOLD) & (active.mode != Mode.LOCKED)
+        moving |= (active.mode > HOLD) & (active.mode != LOCKED)
         return moving
 
     def take(self, state: State, chosen: ActiveSet) -> ActiveSet:

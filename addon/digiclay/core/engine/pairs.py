@@ -15,14 +15,14 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..base.arrays import TIE, Cells, Flags, Floats, any_true, find_copies
-from ..model.fingers import HandPeriod, HandTouch, gather_places
+from ..model.fingers import HandPeriod, HandTouch, gather_positions
 from ..model.layout import RELATIVE_TOLERANCE, Discs, join_discs
 from ..model.physics import Cell
 from .active_set import Selection
 from .state import ActiveSet, State
 from .system import System
 
-#: How many times as long as that of one finger a set is kept.
+#: How many times as long as that of one finger a set serves.
 LONGER = 8
 #: How far pins may rise until a set is made anew, m, at least as far as they can in two periods: the less,
 #: the fewer cells a fingertip may touch.
@@ -45,9 +45,9 @@ class HandSelection(Selection):
         return max(ROOM, self.grid.layout.pitch)
 
     @cached_property
-    def kept(self) -> int:
-        """Control periods for which a set is kept: to make one takes as long as a period of ten fingers."""
-        return LONGER * super().kept
+    def lifetime(self) -> int:
+        """Control periods for which a set serves: to make one takes as long as a period of ten fingers."""
+        return LONGER * super().lifetime
 
     @cached_property
     def rise(self) -> float:
@@ -81,11 +81,11 @@ class HandSelection(Selection):
         """Put the active cells back; the pulp of a fingertip out of reach has aged since they were taken."""
         active, near, touch = state.active, state.active.near, self.cell.touch
         # Of cells taken over from another number of fingertips no disc tells whose pulps have aged: none has.
-        known = active.reach is not None and any_true(np.asarray(active.reach[2]) >= 0.0)
-        if near and known and isinstance(touch, HandTouch):
-            rows = [own.pulp.rows for own in touch.each]
+        timed = active.reach is not None and any_true(np.asarray(active.reach[2]) >= 0.0)
+        if near and timed and isinstance(touch, HandTouch):
+            rows = [finger.pulp.rows for finger in touch.each]
             apart = ~find_pairs(active)
-            waited = (state.period - (active.until - self.kept)) * self.period
+            waited = (state.period - (active.until - self.lifetime)) * self.period
             touch.pulp.age(active.block[self.cell.pulp_rows, :near], np.repeat(apart * waited, rows, axis=0))
         return super().release(state)
 
@@ -137,8 +137,8 @@ class Pairs:
         cell, rows, width = system.cells[fingers[0]], system.rows, active.cells.size
         finger, self.cells = inside[fingers].nonzero()
         self.fingers = np.array(fingers)[finger]
-        self.places = gather_places(inside[fingers], active.quadratic_basis[:, : active.near])
-        self.places = self.places._replace(fingers=np.array(fingers)[self.places.fingers])
+        self.positions = gather_positions(inside[fingers], active.quadratic_basis[:, : active.near])
+        self.positions = self.positions._replace(fingers=np.array(fingers)[self.positions.fingers])
         self.columns = columns = np.concatenate([self.cells, others])
         filters = np.arange(cell.pulp_rows.start, cell.pulp_rows.stop)[:, None]
         common = [0, *range(system.rows.physics)[system.cell.lag_rows], *range(rows.count)[rows.commands]]
@@ -148,23 +148,23 @@ class Pairs:
         shared = np.array(common)[:, None] * width + columns
         unused = np.zeros((filters.size, others.size), np.intp)
         self.index = np.concatenate([shared[:1], np.concatenate([of_pairs, unused], axis=1), shared[1:]])
-        self.own = np.empty(self.index.shape)
+        self.rows = np.empty(self.index.shape)
         self.pulp, count = slice(1, 1 + filters.size), self.cells.size
         self.lag = slice(self.pulp.stop, self.pulp.stop + cell.lag.rows)
-        self.move = system.stepper.prepare(system.plans[fingers[0]], self.own, count)
+        self.move = system.stepper.prepare(system.plans[fingers[0]], self.rows, count)
 
     def advance(self, block: Floats, finger: HandPeriod | None, instants: int) -> Moved:
         """Move the pairs of a block; their filters and forces are set in place, no heights."""
         flat, count = block.reshape(-1), self.cells.size
-        np.take(flat, self.index, out=self.own, mode="clip")  # another mode copies
-        before, forces = self.own.copy(), flat.take(self.forces)
+        np.take(flat, self.index, out=self.rows, mode="clip")  # another mode copies
+        before, forces = self.rows.copy(), flat.take(self.forces)
         under = np.empty((instants, 0))
         if self.cells.size and finger is not None:
-            under = finger.under(self.places)
+            under = finger.under(self.positions)
         after = self.move(under)
         flat[self.forces] = after
-        flat[self.filters] = self.own[self.pulp, :count]
-        return Moved(before[:, :count], self.own[0, :count], np.maximum(forces, after) > TIE, under)
+        flat[self.filters] = self.rows[self.pulp, :count]
+        return Moved(before[:, :count], self.rows[0, :count], np.maximum(forces, after) > TIE, under)
 
 
 class Moved(NamedTuple):
@@ -208,8 +208,8 @@ class HandMovement:
         rows, block, near = system.rows, active.block, active.near
         moved = [group.advance(block, finger, system.instants.size) for group in self._groups]
         for group in self._groups:
-            block[0, group.columns] = group.own[0]
-            block[system.cell.lag_rows, group.columns] = group.own[group.lag]
+            block[0, group.columns] = group.rows[0]
+            block[system.cell.lag_rows, group.columns] = group.rows[group.lag]
         if self._double.size:
             pairs = moved[0] if len(moved) == 1 else join_moved(moved)
             block[0, self._double] = np.minimum.reduce(pairs.height[self._copies])

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.arrays import Cells, Floats
-from ..base.modes import Mode
+from ..base.modes import REST
 from ..model.control_interface import Commands, Measurement
 from ..model.layout import Discs
 
@@ -108,7 +108,7 @@ class ActiveSet:
     """Bound of the pin tops near the fingertip while this set serves, m; a number or (b,)."""
     until: int
     """Control period by which the set is to be renewed."""
-    own: tuple[ActiveSet, ...] = ()
+    runs: tuple[ActiveSet, ...] = ()
     """In a batch whose runs keep the sets they have alone: these sets, without block, modes and basis. Their
     cells are the first of each run; others fill the columns."""
 
@@ -117,12 +117,12 @@ class ActiveSet:
     @cached_property
     def all(self) -> Measurement:
         """All cells."""
-        return self._part(len(self.cells), [len(run.cells) for run in self.own])
+        return self._part(len(self.cells), [len(run.cells) for run in self.runs])
 
     @cached_property
     def touched(self) -> Measurement:
         """The cells that the fingertip may touch."""
-        return self._part(self.near, [run.near for run in self.own])
+        return self._part(self.near, [run.near for run in self.runs])
 
     def _part(self, count: int, present: list[int]) -> Measurement:
         """Return the rows of the first `count` cells, of which the first `present` are those of the runs."""
@@ -248,5 +248,5 @@ def make_initial_state(rows: Rows, count: int, height: Any, memory: Any) -> Stat
         height,
         0,
     )
-    modes, aged = np.full((count, *runs), Mode.REST, np.int8), np.zeros((count, *runs))
+    modes, aged = np.full((count, *runs), REST, np.int8), np.zeros((count, *runs))
     return State(0, values, modes, aged, height, none, memory)

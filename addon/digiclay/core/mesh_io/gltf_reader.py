@@ -6,7 +6,6 @@ Materials and pictures are not opened; a file of vertices must lie in the glTF's
 import base64
 import binascii
 import json
-import math
 import re
 import struct
 from collections.abc import Iterator
@@ -20,6 +19,7 @@ from ..base.arrays import Array, Floats, Indices
 from ..base.errors import ParameterError
 from ..files.formats import read_count
 from ..files.tables import Record
+from ..model.fingertip import make_matrices
 from .mesh_limits import (
     IDENTITY,
     join_meshes,
@@ -221,13 +221,7 @@ def _placement(node: Any) -> Floats:
     if "matrix" in node:  # column by column
         return np.array(node["matrix"], np.float64).reshape(4, 4)[:, :3]
     x, y, z, w = map(float, node.get("rotation", (0.0, 0.0, 0.0, 1.0)))
-    length = math.sqrt(x * x + y * y + z * z + w * w) or 1.0
-    x, y, z, w = x / length, y / length, z / length, w / length
-    turn = np.array([
-        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-    ])  # fmt: skip
+    (turn,) = make_matrices(np.array([[w if any((x, y, z, w)) else 1.0, x, y, z]]))
     scale = np.array(node.get("scale", (1.0, 1.0, 1.0)), np.float64).reshape(3, 1)
     shift = np.array(node.get("translation", (0.0, 0.0, 0.0)), np.float64).reshape(1, 3)
     return np.concatenate([scale * turn.T, shift])

@@ -20,7 +20,7 @@ from .touch import Ahead, Touch, trace_periods
 MOST_FINGERS = 32
 
 
-class Places(NamedTuple):
+class Positions(NamedTuple):
     """Positions under g fingers, up to w each."""
 
     fingers: Cells
@@ -30,7 +30,7 @@ class Places(NamedTuple):
     """(k,): Which of all g w are positions, those of the first finger first."""
 
 
-def gather_places(inside: Flags, basis: Floats) -> Places:
+def gather_positions(inside: Flags, basis: Floats) -> Positions:
     """Return which positions with a basis (6, k) are `inside` the reach of each finger, (f, k), if any."""
     (fingers,) = inside.any(axis=1).nonzero()
     sizes = np.count_nonzero(inside[fingers], axis=1)
@@ -38,7 +38,7 @@ def gather_places(inside: Flags, basis: Floats) -> Places:
     cells = np.zeros(present.shape, np.intp)
     cells[present] = inside[fingers].nonzero()[1]
     of_fingers = np.ascontiguousarray(np.moveaxis(basis[:, cells], 0, 1))
-    return Places(fingers, of_fingers, np.flatnonzero(present))
+    return Positions(fingers, of_fingers, np.flatnonzero(present))
 
 
 @dataclass(frozen=True)
@@ -90,15 +90,15 @@ class HandPath:
     def __post_init__(self) -> None:
         self._ahead = Ahead()
 
-    def under(self, number: int, places: Places) -> Floats:
+    def under(self, number: int, positions: Positions) -> Floats:
         """Return the undersides in a period at the positions of all fingers, (p, k), m."""
-        return self._ahead.find(number, places, self.join.shape[3] * places.basis.size, self._compute)
+        return self._ahead.find(number, positions, self.join.shape[3] * positions.basis.size, self._compute)
 
-    def _compute(self, several: slice, places: Places) -> Floats:
+    def _compute(self, several: slice, positions: Positions) -> Floats:
         """Return the undersides in several periods, (t, p, k), m."""
-        forms, join = self.forms[places.fingers, several], self.join[places.fingers, several]
-        under = compute_underside(forms, join, places.basis[:, None]).transpose(1, 2, 0, 3)
-        return under.reshape(*under.shape[:2], -1).take(places.at, axis=2)
+        forms, join = self.forms[positions.fingers, several], self.join[positions.fingers, several]
+        under = compute_underside(forms, join, positions.basis[:, None]).transpose(1, 2, 0, 3)
+        return under.reshape(*under.shape[:2], -1).take(positions.at, axis=2)
 
 
 class HandPeriod(NamedTuple):
@@ -109,9 +109,9 @@ class HandPeriod(NamedTuple):
     window: Window
     """(6, f)."""
 
-    def under(self, places: Places) -> Floats:
+    def under(self, positions: Positions) -> Floats:
         """Return the undersides at the positions of all fingers, (p, k), m."""
-        return self.path.under(self.number, places)
+        return self.path.under(self.number, positions)
 
 
 def join_touches(touches: Sequence[Touch]) -> HandTouch:

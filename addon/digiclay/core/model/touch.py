@@ -43,15 +43,17 @@ class Ahead:
     """Cache of the undersides in coming periods, at the last positions, which mostly stay the same."""
 
     def __init__(self) -> None:
-        self._places: Any = None
+        self._positions: Any = None
         self._first, self._unders = 0, np.empty((0, 0, 0))
 
-    def find(self, index: int, places: Any, numbers: int, compute: Callable[[slice, Any], Floats]) -> Floats:
+    def find(
+        self, index: int, positions: Any, numbers: int, compute: Callable[[slice, Any], Floats]
+    ) -> Floats:
         """Return the undersides of a period, (p, k), m; `numbers`: their count p k."""
-        if places is not self._places or not self._first <= index < self._first + len(self._unders):
+        if positions is not self._positions or not self._first <= index < self._first + len(self._unders):
             count = max(1, min(AHEAD, MOST // max(1, numbers)))
-            self._unders = compute(slice(index, index + count), places)
-            self._places, self._first = places, index
+            self._unders = compute(slice(index, index + count), positions)
+            self._positions, self._first = positions, index
         under: Floats = self._unders[index - self._first]
         return under
 

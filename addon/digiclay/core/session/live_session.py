@@ -11,7 +11,7 @@ from typing import TypeVar
 import numpy as np
 
 from ..base.arrays import Floats
-from ..base.modes import Mode
+from ..base.modes import BLISTER, LOCKED
 from ..control.orders import ORDER, Orders, Verb, order_periods
 from ..engine.simulation import advance, trace_fingers
 from ..engine.state import State
@@ -147,7 +147,7 @@ def simulate_path(
 ) -> Iterator[State]:
     """Yield the states along the path (t + 1, f, 7), each valid until the next one; overwrites `state`."""
     fingers = trace_fingers(system, interpolate_poses(path, system.instants / system.period))
-    locked = bool((state.mode() == Mode.LOCKED).any())
+    locked = bool((state.mode() == LOCKED).any())
     systems: Iterator[System] = repeat(system, len(fingers))
     if orders is not None or locked:
         systems = _order(system, orders or Orders(np.zeros((len(fingers), ORDER))), locked=locked)
@@ -166,7 +166,7 @@ def _order(system: System, orders: Orders, *, locked: bool) -> Iterator[System]:
 
 def has_arrived(state: State) -> bool:
     """Return whether all pins that orders move have reached their heights."""
-    return not bool((state.mode() == Mode.BLISTER).any())
+    return not bool((state.mode() == BLISTER).any())
 
 
 @dataclass(frozen=True, eq=False)

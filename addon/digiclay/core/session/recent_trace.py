@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..base.arrays import Floats
-from ..base.modes import Mode
+from ..base.modes import FORCE_FOLLOW
 from ..engine.state import State
 from ..engine.system import System
 from ..model.control_interface import SetPoint, find_set_point
@@ -114,7 +114,7 @@ def sample(system: System, state: State, set_point: SetPoint | None, pins: Seque
     for column, pin in enumerate(pins):
         (at,) = np.nonzero(active.cells == pin)
         heights[column] = float(active.block[0, at[0]] if at.size else state.rows[0, pin])
-    wanted = find_set_point(set_point, np.count_nonzero(active.mode == Mode.FORCE_FOLLOW))
+    wanted = find_set_point(set_point, np.count_nonzero(active.mode == FORCE_FOLLOW))
     row = [state.period * system.period, measure_total_force(system, state), float(wanted), *heights]
     return [*row, *state.finger_forces().tolist()] if system.fingers > 1 else row
 

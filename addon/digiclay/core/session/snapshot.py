@@ -16,7 +16,7 @@ import numpy as np
 
 from ..base.arrays import Array, Floats
 from ..base.errors import StateError
-from ..base.modes import Mode
+from ..base.modes import HOLD, REST, Mode
 from ..control.pin_division import Hands
 from ..engine.simulation import begin
 from ..engine.state import ActiveSet, Rows, State
@@ -196,7 +196,7 @@ def transfer_heights(system: System, data: bytes) -> State:
     actuator, state = system.cell.actuator, begin(system)
     height = np.clip(height, 0.0, actuator.stroke)
     state.rows[0] = state.rows[system.rows.target] = height
-    state.modes[:] = np.where(height == actuator.rest_height, np.int8(Mode.REST), np.int8(Mode.HOLD))
+    state.modes[:] = np.where(height == actuator.rest_height, REST, HOLD)
     return state._replace(peak=float(height.max()))
 
 

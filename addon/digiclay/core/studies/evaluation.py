@@ -38,7 +38,7 @@ RUNS = 32
 BUDGET, BYTES_A_ROW = 2**30, 41
 #: Key in a record of the reason why its point ran alone although it belongs to a batch.
 ALONE = "alone"
-#: What a record says beside its figures, where there is anything to say.
+#: Notes of a record beside its figures, if any.
 NOTED = ("errors_absent", "lost")
 
 
@@ -74,7 +74,7 @@ class Bundles:
         return (*self.batches, *self.alone)
 
     def describe(self) -> list[str]:
-        """Return lines that tell how the points run."""
+        """Return lines on how the points run."""
         count, noun = sum(map(len, self.batches)), "batch" if len(self.batches) == 1 else "batches"
         lines = [f"{count} points run in {len(self.batches)} {noun}"] if self.batches else []
         return [*lines, *self.why]
@@ -87,7 +87,7 @@ def require_recorder(points: Iterable[Point]) -> None:
 
 
 def judge_all(points: Iterable[Point]) -> list[Point]:
-    """Return the points with estimation of errors."""
+    """Return the points with an estimate of their errors."""
     return [replace(point, errors=True) for point in points]
 
 
@@ -97,7 +97,7 @@ def has_errors(record: Record) -> bool:
 
 
 def describe_effort(records: Mapping[int, Record]) -> str:
-    """Return the run time of points and their largest errors, and where these were estimated."""
+    """Return the run time of points and their largest estimated errors, with their points."""
     figures = {index: record["figures"] for index, record in sorted(records.items()) if "figures" in record}
     judged = {index: row for index, row in figures.items() if row.get("height_error") is not None}
     spent = sum(row.get("run_time") or 0.0 for row in figures.values())
@@ -112,11 +112,10 @@ def describe_effort(records: Mapping[int, Record]) -> str:
 
 
 def make_bundles(points: Sequence[Point]) -> Bundles:
-    """Return all points of a sweep in bundles; those of a batch have the same structure, in their order.
+    """Return all points of a sweep in bundles; the points of a batch have one structure.
 
-    The bundles depend only on the points, not on finished ones or the number of workers: the same sweep has
-    the same results to the last bit. If errors are estimated, the references of a batch must have the same
-    structure too.
+    The bundles do not depend on finished points or the number of workers, so that a sweep always has the same
+    results to the last bit. If errors are estimated, the references of a batch must have one structure too.
     """
     alike: dict[object, list[Point]] = {}
     findings = Findings()
@@ -197,7 +196,7 @@ def evaluate(
             return measure(scene, stopped)
         done = run(scene, stopped=stopped)
         result = done.estimate_errors(stopped=stopped) if errors else done
-    except Exception as error:  # the other points are independent of this failure
+    except Exception as error:  # other points do not depend on it
         return {"error": describe_error(error)}
     return None if result is None or result.incomplete else _make_record(result, errors=errors)
 
@@ -233,7 +232,7 @@ def evaluate_bundle(bundle: Sequence[Point], stopped: Stopped = None) -> list[Re
                     records[number] = _make_record(result, errors=errors)
         except MemoryError:
             why = "there is not enough memory for a batch"
-        except Exception as error:  # each point then raises it alone, for its record
+        except Exception as error:  # the points then run one by one
             why = describe_error(error)
             if not isinstance(error, DigiclayError):
                 warnings.warn(f"A batch of {len(scenes)} runs failed: {why}", BatchWarning, stacklevel=2)

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..base.arrays import Array, Floats
-from ..base.modes import Mode
+from ..base.modes import FORCE_FOLLOW
 from ..control.blister import Blister
 from ..metrics.summary import compute_cell_area, find_contact_rows, find_stretches, split_fingers
 from ..scene.schema import Scene
@@ -57,7 +57,7 @@ def measure_relief(scene: Scene, history: Mapping[str, Array], pressed: float | 
     nominal = np.zeros(scene.cells)
     clear = np.ones(scene.cells, dtype=bool)
     for part in split_fingers(history):
-        following = np.count_nonzero(part["mode"] == Mode.FORCE_FOLLOW, axis=1)
+        following = np.count_nonzero(part["mode"] == FORCE_FOLLOW, axis=1)
         touching = find_contact_rows(part["total_force"]) & (following > 0)
         rows = np.flatnonzero(touching)[::THINNED]
         path = {"fingertip": part["fingertip"][rows], "position": part["position"]}

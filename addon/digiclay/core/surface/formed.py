@@ -167,40 +167,42 @@ class Formed:
         return cls(position, top, before, pressed, codes, rows, columns)
 
     @property
+    def points(self) -> Floats:
+        """The positions row by row, (rows, columns, 2), m."""
+        return self.position.reshape(self.rows, self.columns, 2)
+
+    @property
     def pitch(self) -> float:
         """Distance between neighbors in a row, m."""
         return float(np.hypot(*(self.position[1] - self.position[0])))
 
     @property
-    def _along(self) -> float:
+    def along(self) -> float:
         """Step from a pin to the next one in a row, m."""
         return float(self.position[1, 0] - self.position[0, 0])
 
     @property
-    def _across(self) -> float:
+    def across(self) -> float:
         """Step from a row to the next one, m."""
         return float(self.position[self.columns, 1] - self.position[0, 1])
 
     @property
     def shift(self) -> float:
         """Shift of every other row in the direction of the columns, m; 0 in an aligned bed."""
-        shift = float(np.sign(self._along) * (self.position[self.columns, 0] - self.position[0, 0]))
+        shift = float(np.sign(self.along) * (self.position[self.columns, 0] - self.position[0, 0]))
         return shift if abs(shift) > 1e-3 * self.pitch else 0.0
 
     @property
     def row_spacing(self) -> float:
         """Distance between rows, m."""
-        return abs(self._across)
+        return abs(self.across)
 
     def nearest(self, points: Floats) -> Indices:
         """Return the pin in the nearest row that is nearest to each of points (k, 2), m."""
-        row = (
-            np.rint((points[:, 1] - self.position[0, 1]) / self._across)
-            .clip(0, self.rows - 1)
-            .astype(np.int64)
-        )
+        row = np.rint((points[:, 1] - self.position[0, 1]) / self.across).clip(0, self.rows - 1)
+        row = row.astype(np.int64)
         first = self.position[row * self.columns, 0]
-        column = np.rint((points[:, 0] - first) / self._along).clip(0, self.columns - 1).astype(np.int64)
+        column = np.rint((points[:, 0] - first) / self.along).clip(0, self.columns - 1).astype(np.int64)
         return np.asarray(row * self.columns + column)
 
     @property
@@ -221,10 +223,10 @@ class Formed:
     def at(self, values: Floats, points: Floats) -> Floats:
         """Return values (n,) at points (..., 2), m: linear along rows, then across; NaN off the bed."""
         first = self.position[:: self.columns]
-        row = (points[..., 1] - first[0, 1]) / self._across
+        row = (points[..., 1] - first[0, 1]) / self.across
         low = np.clip(np.floor(row), 0, self.rows - 2).astype(np.int64)
         up = row - low
-        columns = [(points[..., 0] - first[low + step, 0]) / self._along for step in (0, 1)]
+        columns = [(points[..., 0] - first[low + step, 0]) / self.along for step in (0, 1)]
         parts = []
         for step, column in enumerate(columns):
             left = np.clip(np.floor(column), 0, self.columns - 2).astype(np.int64)

@@ -113,10 +113,9 @@ def _counted(counts: Indices) -> tuple[Indices, Indices]:
 def _squares(formed: Formed) -> tuple[Floats, Indices]:
     """Return corners and loops of an aligned bed: where four parts meet are two corners, mostly the same."""
     rows, columns = formed.rows, formed.columns
-    position = formed.position.reshape(rows, columns, 2)
-    step_x, step_y = position[0, 1, 0] - position[0, 0, 0], position[1, 0, 1] - position[0, 0, 1]
-    x = position[0, 0, 0] + step_x * (np.arange(columns + 1) - 0.5)
-    y = position[0, 0, 1] + step_y * (np.arange(rows + 1) - 0.5)
+    (first_x, first_y), step_x, step_y = formed.position[0], formed.along, formed.across
+    x = first_x + step_x * (np.arange(columns + 1) - 0.5)
+    y = first_y + step_y * (np.arange(rows + 1) - 0.5)
     corner = np.stack(np.meshgrid(x, y), axis=-1)
     top = formed.height.reshape(rows, columns)
     a, b, c, d = take_corners(top)
@@ -144,8 +143,7 @@ def _squares(formed: Formed) -> tuple[Floats, Indices]:
 def _hexagons(formed: Formed) -> tuple[Floats, Indices]:
     """Return corners and loops of a bed whose rows are shifted by half a pitch."""
     rows, columns = formed.rows, formed.columns
-    pitch = formed.position[1, 0] - formed.position[0, 0]
-    spacing = formed.position[columns, 1] - formed.position[0, 1]
+    pitch, spacing = formed.along, formed.across
     near = (spacing**2 - pitch**2 / 4.0) / (2.0 * spacing)
     side = 1 if formed.shift > 0.0 else -1
     row, column = np.divmod(np.arange(rows * columns), columns)

@@ -150,11 +150,15 @@ def _is_simple(code: int, directions: int) -> bool:
     return sum(crossings) == 1
 
 
-_SIMPLE = {ways: [_is_simple(code, ways) for code in range(1 << ways)] for ways in (6, 8)}
+_SIMPLE = {
+    directions: [_is_simple(code, directions) for code in range(1 << directions)] for directions in (6, 8)
+}
 #: Neighbors of a line's end by these bits: one, or two side by side; 0 where it is no end.
 _ENDS = {
-    ways: [code.bit_count() if simple and code.bit_count() < 3 else 0 for code, simple in enumerate(table)]
-    for ways, table in _SIMPLE.items()
+    directions: [
+        code.bit_count() if simple and code.bit_count() < 3 else 0 for code, simple in enumerate(table)
+    ]
+    for directions, table in _SIMPLE.items()
 }
 #: Steps to the neighbors, x + i y, in pitches.
 _STEPS = {

@@ -33,7 +33,7 @@ SKINS: dict[str, str] = {
 
 def place_points(formed: Formed, parts: int) -> Floats:
     """Return the points of a skin, m, shape (rows, columns, 2), with `parts` points per pitch."""
-    across = _linear(formed.position.reshape(formed.rows, formed.columns, 2), parts)
+    across = _linear(formed.points, parts)
     return np.swapaxes(_linear(np.swapaxes(across, 0, 1), parts), 0, 1)
 
 
@@ -105,7 +105,7 @@ def _join_rows(
 ) -> Floats:
     """Return a skin interpolated along the rows of pins, then across them, shape of its points."""
     point = place_points(formed, parts)
-    first = formed.position.reshape(formed.rows, formed.columns, 2)
+    first = formed.points
     fine = np.empty(point.shape[:2])
     lines = np.arange(len(point))
     period = 2 * parts if formed.shift else 1
@@ -125,16 +125,12 @@ def _join_rows(
 def _bound(formed: Formed, pins: Floats, x: Floats, fine: Floats, parts: int) -> Floats:
     """Return a skin bounded by the heights of the pins beyond the end of a shifted row."""
     row = np.minimum(np.arange(len(fine)) // parts, formed.rows - 2)
-    along = formed.position.reshape(formed.rows, formed.columns, 2)[..., 0]
-    direction = np.sign(along[0, 1] - along[0, 0])
+    along, direction = formed.points[..., 0], np.sign(formed.along)
     for end, inner in ((0, 1), (-1, -2)):
         # The ends of the two rows beside a line, and the four pins of the last cell.
         ends = np.stack([along[row, end], along[row + 1, end]]) * direction
-        beyond = (
-            x * direction < ends.max(axis=0)[:, None]
-            if end == 0
-            else x * direction > ends.min(axis=0)[:, None]
-        )
+        ahead = x * direction
+        beyond = ahead < ends.max(axis=0)[:, None] if end == 0 else ahead > ends.min(axis=0)[:, None]
         cell = np.stack([pins[row, end], pins[row, inner], pins[row + 1, end], pins[row + 1, inner]])
         bounded = np.clip(fine, cell.min(axis=0)[:, None], cell.max(axis=0)[:, None])
         fine = np.where(beyond, bounded, fine)
