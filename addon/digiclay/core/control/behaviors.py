@@ -1,4 +1,4 @@
-"""Elastic, plastic and viscous behaviors: what a pressed pin does, and where it goes when left alone."""
+"""Elastic, plastic and viscous behaviors of pins: motion under a force, and after its release."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ from .device_info import DeviceInfo, check_floor
 from .drive import CellwiseControl, Drive, TouchParameters, check_damping, make_drive, raise_felt_force
 from .exchange import Exchange, make_exchange
 
-#: Share of the felt force down to which a touched cell stays touched: its spring may press no harder.
+#: Share of the felt force above which a touched cell remains touched: its spring may press no harder.
 STILL = 0.2
-#: Displacement below which the border of the displaced region is of no interest, in dead bands.
+#: Displacement at the border of the displaced region, in dead bands.
 BORDER = 0.1
 
 
@@ -37,13 +37,13 @@ class Elastic(TouchParameters):
 class ElasticControl(CellwiseControl):
     """Controller of the elastic behavior: a pressed pin yields like a spring and returns.
 
-    Pressed: ``c dH/dt = k (H_0 - H) - F``. Left alone: back to rest, ``dH/dt = (H_0 - H) / τ_s``.
+    Pressed: ``c dH/dt = k (H_0 - H) - F``. Released: back to rest, ``dH/dt = (H_0 - H) / τ_s``.
     """
 
     parameters: Elastic
 
     def command(self, memory: Memory, seen: Measurement) -> tuple[Memory, Commands]:
-        """Let pressed cells give way, and the others spring back; see `Controller`."""
+        """Let pressed cells yield, and the others spring back; see `Controller`."""
         gains, rest = self.parameters, self.actuator.rest_height
         error = rest - seen.height
         pressed = seen.force >= gains.felt_force * np.where(seen.mode == SPRING, STILL, 1.0)
@@ -72,21 +72,21 @@ class Plastic(TouchParameters):
 
 @dataclass(frozen=True, eq=False)
 class PlasticControl(CellwiseControl):
-    """Controller of the plastic behavior: a pin above its yield force gives way and keeps its lowest height.
+    """Controller of the plastic behavior: a pin above its yield force yields and keeps its lowest height.
 
-    Above yield: ``c dH/dt = -(F - F_y)``, and the height reached is kept as the cell's target. Below:
-    the pin stays; left alone, it goes to the deepest height it was pressed to.
+    Above yield: ``c dH/dt = -(F - F_y)``, and the height becomes the cell's target. Below it the pin does
+    not move; released, it goes to the lowest height to which it was pressed.
     """
 
     parameters: Plastic
 
     def command(self, memory: Memory, seen: Measurement) -> tuple[Memory, Commands]:
-        """Let cells give way that are pressed beyond yield, hold the others; see `Controller`."""
+        """Let cells above their yield force yield, and hold the others; see `Controller`."""
         limits = self.parameters
         pressed = seen.force >= limits.felt_force
         yielding = seen.force > limits.yield_force
         target = np.where(yielding, np.minimum(seen.target, seen.height), seen.target)
-        # A pin under the fingertip is not pushed back up: what it sank after yielding is felt as no force.
+        # A pin under the fingertip is not raised again after it has sunk beyond its target.
         back = self.drive.approach(target - seen.height)
         speed = np.where(pressed, np.minimum(back, 0.0), back)
         np.putmask(speed, yielding, (limits.yield_force - seen.force) / limits.damping)
@@ -100,7 +100,7 @@ class PlasticControl(CellwiseControl):
 class Viscous(TouchParameters):
     """Spring and damper in parallel under every pin, and the exchange between neighbors.
 
-    What Materiable calls viscosity: every cell a spring and a damper, and neighbors evened out.
+    Materiable calls this viscosity: a spring and a damper per cell, and exchange between neighbors.
     """
 
     damping: float = quantity(10.0, "force over speed of a sinking pin", unit="N s/m", symbol="c", above=0.0)
@@ -121,7 +121,7 @@ class Spot(NamedTuple):
     top: float = -math.inf
 
     def around(self, basis: Floats) -> Spot:
-        """Return a box that holds some places, by rows 1, x, y, ... of (6, m), as well."""
+        """Return the box extended to positions with the basis (6, m)."""
         if not basis.shape[1]:
             return self
         (left, bottom), (right, top) = basis[1:3].min(axis=1).tolist(), basis[1:3].max(axis=1).tolist()
@@ -130,7 +130,7 @@ class Spot(NamedTuple):
         )
 
     def disc(self, margin: float) -> Disc | None:
-        """Return a disc that holds the box and a margin, m; None for an empty one."""
+        """Return a disc around the box with a margin, m; None for an empty box."""
         if self.left > self.right:
             return None
         across = math.hypot(self.right - self.left, self.top - self.bottom)
@@ -152,7 +152,7 @@ class ViscousControl:
     exchange: Exchange
     period: float
     margin: float
-    """How far beyond the displaced cells cells take part, m."""
+    """Margin of active cells around the displaced ones, m."""
 
     rows = 0
 
@@ -182,7 +182,7 @@ class ViscousControl:
         else:
             memory = memory.around(seen.quadratic_basis[:, size > BORDER * gains.dead_band])
         target, formed = rest + shift, size > gains.dead_band
-        # The surface creeps by less than the dead band a period: its own speed is asked for as well.
+        # The surface creeps by less than the dead band per period: its speed is added.
         creep = np.where(formed, (target - seen.target) / self.period, 0.0)
         command = self.drive.command(creep + self.drive.approach(target - seen.height), seen.force)
         return memory, Commands(target, self._modes(seen.cells, pressed, formed), command)

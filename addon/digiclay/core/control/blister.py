@@ -64,9 +64,9 @@ class Blister(Parameters):
         return Constants((self.flat_radius,))
 
 
-#: Share of the radius of the flat top within which no cell freezes when the blister sinks into uneven ground.
+#: Share of the flat top's radius within which no cell freezes while the blister sinks into uneven ground.
 HELD = 0.4
-#: It is freed when it lies less far behind than this share of the cosine from which cells freeze.
+#: A frozen cell is freed when its cosine is less negative than this share of the limit at which cells freeze.
 FREED = 0.3
 CODES = Constants((EDGE, BLISTER, FROZEN), np.int8)
 
@@ -101,16 +101,16 @@ class BlisterRule:
         return BlisterCells(distance, ahead, inside, ring)
 
     def find_edge(self, cells: BlisterCells) -> Flags:
-        """Return which cells give the surface's height: those ahead, for the finished ridge is no edge."""
+        """Return the cells that give the surface's height: those ahead, for the finished ridge is no edge."""
         facing: Flags = cells.ahead >= self._limits[cells.ahead.shape][0]
         facing &= cells.ring
         return facing
 
     def find_frozen(self, cells: BlisterCells, seen: Measurement, uneven: Any = False) -> Flags:
-        """Return which cells are left behind, and which of those left before stay so: none that is pressed.
+        """Return the frozen cells: those left behind now or before, except pressed ones.
 
-        Cells that sink into uneven ground, bool (m[, b]), freeze nearer to the fingertip, and are freed when
-        they lie ahead of it again.
+        `uneven` (m[, b]): cells that sink into uneven ground. They freeze nearer to the fingertip, and are
+        freed when they are ahead of it again.
         """
         *_, flat_radius, behind, release, _ = self._limits[cells.distance.shape]
         limit = behind * cells.distance

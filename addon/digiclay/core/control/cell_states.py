@@ -1,8 +1,8 @@
 """Method II: a state machine in every cell, driven by its own force (Fig. 5 of the paper).
 
-No coordinator: a cell pressed hard enough follows the force, its neighbors become a blister
-around it, those of them that feel the fingertip follow the force in turn, and so the contact
-set spreads and moves with the fingertip.
+There is no coordinator: a cell under enough force follows it, and its neighbors become a blister
+around it. Those that feel the fingertip follow the force in turn, so that the contact set spreads and
+moves with the fingertip.
 """
 
 import math
@@ -37,7 +37,7 @@ class Arrow(NamedTuple):
 
 
 class Arrows(tuple[Arrow, ...]):
-    """Arrows that are followed at once; of two from one mode the later wins."""
+    """Arrows that are followed simultaneously; of two from one mode the later one holds."""
 
     @cached_property
     def conditions(self) -> list[str]:
@@ -46,7 +46,7 @@ class Arrows(tuple[Arrow, ...]):
 
     @cached_property
     def goals(self) -> Modes:
-        """Modes that follow, by the conditions, the first one counting most, and the mode before."""
+        """New modes by conditions, as the digits of a number, the first one leading, and by the old mode."""
         goals = np.tile(np.arange(len(Mode), dtype=np.int8), (2,) * len(self.conditions) + (1,))
         for source, goal, condition in self:
             holds = np.moveaxis(goals, self.conditions.index(condition), 0)[1]
@@ -54,7 +54,7 @@ class Arrows(tuple[Arrow, ...]):
         return goals.ravel()
 
 
-#: What a cell's own force decides.
+#: Transitions by the force on a cell.
 BY_FORCE = Arrows(
     (
         Arrow(VIRTUAL_SPRING, Mode.FORCE_FOLLOW, "above_spring_trigger"),
@@ -65,7 +65,7 @@ BY_FORCE = Arrows(
     )
 )
 
-#: What the distance to the nearest cell under the fingertip decides.
+#: Transitions by the distance to the nearest cell under the fingertip.
 BY_PLACE = Arrows(
     (
         Arrow(VIRTUAL_SPRING, Mode.BLISTER, "in_blister"),
@@ -77,7 +77,7 @@ BY_PLACE = Arrows(
 
 
 def follow_arrows(mode: Modes, arrows: Arrows, conditions: dict[str, Flags]) -> Modes:
-    """Return the modes (m,) after all arrows were followed at once."""
+    """Return the modes (m,) after all arrows were followed simultaneously."""
     at = np.zeros(mode.shape, np.int16)
     for name in arrows.conditions:
         at += at
@@ -102,12 +102,12 @@ class Patch(NamedTuple):
 
     @property
     def position(self) -> tuple[float, float] | None:
-        """Where the fingertip is, m; None: none is felt."""
+        """Position of the fingertip, m; None if none is felt."""
         return (self.x, self.y) if self.felt else None
 
     @property
     def top(self) -> float:
-        """Height of the blister's top, m: as far as is known that of the surface around it."""
+        """Height of the blister's top, m, estimated as that of the surface around it."""
         return self.edge
 
     @property
@@ -178,24 +178,24 @@ class CellStatesControl:
 
     parameters: CellStates
     blister: Blister
-    """Its radii count from the nearest cell under the fingertip."""
+    """Its radii are measured from the nearest cell under the fingertip."""
     actuator: Actuator
     rim: Rim
     lift: float
-    """Force the high reservoir can lift, N."""
+    """Largest force that the high reservoir lifts, N."""
     period: float
     """Control period, s."""
     floor: float = 0.0
-    """Force from which on the reading of a cell is no noise, N."""
+    """Noise floor of a cell's reading, N."""
 
-    #: A cell remembers how many periods it has been critical, and of several fingers whose it is.
+    #: Row of a cell: periods since it became critical; of several fingers, also whether it obeys another one.
     rows = 1
     #: See `following.FollowingControl`.
     division, pin_rows = "CellDivision", ()
 
     @property
     def blister_radius(self) -> float:
-        """How far from the fingertip pins may be in its blister, m: it begins at the pressed cells."""
+        """Largest distance of pins in the blister from the fingertip, m: it begins at the pressed cells."""
         return self.blister.radius + self.parameters.jump
 
     def begin(self) -> Patch:
@@ -205,9 +205,9 @@ class CellStatesControl:
     def locate(
         self, memory: Patch, touched: Measurement, part: slice = WHOLE.parts[0]
     ) -> tuple[Patch, Disc | None]:
-        """Find where a fingertip presses, of a part of the cells, and how far its blister can reach."""
-        # A cell that follows counts with what it reads: of a fingertip that rises the few readings above the
-        # noise would draw the centroid to and fro.
+        """Locate a fingertip by a part of the cells, and the largest extent of its blister."""
+        # Cells that follow count with any reading: under a rising fingertip the few readings above the noise
+        # would move the centroid to and fro.
         force = touched.force[part]
         pressed = force > (~_under_finger(touched.mode[part]) * self.floor if self.floor else TIE)
         if not any_true(pressed):
@@ -230,13 +230,13 @@ class CellStatesControl:
         return memory, commands
 
     def sort(self, memory: Patch) -> bool:
-        """Return one key for all fingers: they are served together."""
+        """Return one key for all fingers: one call serves them."""
         return True
 
     def locate_all(
         self, memories: list[Patch], touched: Measurement, sections: Whole
     ) -> tuple[list[Patch], list[Disc | None]]:
-        """Find where the fingertips press, each in its section; see `Controller.locate`."""
+        """Locate each fingertip by its section of the cells; see `Controller.locate`."""
         fingers = zip(memories, sections.parts, strict=True)
         located = [self.locate(memory, touched, part) for memory, part in fingers]
         return [memory for memory, _ in located], [disc for _, disc in located]
@@ -250,7 +250,7 @@ class CellStatesControl:
         under = _under_finger(mode)
         target = seen.target.copy()
         np.putmask(target, under, seen.height)
-        # Where no cell is under a fingertip none is near one, and the shape does not count.
+        # Without a cell under the fingertip no cell is near it, and its shape is unused.
         around, shape = np.zeros((3, *mode.shape), np.bool_), np.empty(mode.shape)
         after = list(memories)
         for i, (memory, part) in enumerate(zip(memories, sections.parts, strict=True)):
@@ -269,7 +269,7 @@ class CellStatesControl:
         return after, Commands(target, mode, self._commands(seen, mode, target, under, most))
 
     def _leaves(self, memory: Patch) -> bool:
-        """Tell whether the fingertip leaves the bed: then no cell is to rise for it."""
+        """Tell whether the fingertip leaves the bed: then no cell rises for it."""
         x, y, (_, _, *toward), *_ = memory
         return any(toward) and (self.rim.is_under(x, y) or self.rim.is_ahead(x, y, *toward))
 

@@ -1,9 +1,9 @@
 """Data of the device that a controller may use, and the noise floor of its sensors.
 
-The noise floor is the force from which on one reading is no noise, five standard deviations of a cell's
-sensor (`sensors.Sensing.force_floor`); 0 with sensors without noise. Touch is decided cell by cell: a sum of
-n readings would need five times √n, more than a fingertip at the rim of its contact presses with. A force
-that is controlled is the sum of the readings as they are, which has no bias.
+The noise floor is five standard deviations of a cell's force sensor (`sensors.Sensing.force_floor`): a larger
+reading is not noise. It is 0 without noise. Touch is detected cell by cell: a sum of n readings would need
+five times √n, more than the force of a fingertip at the rim of its contact. The controlled force is the sum
+of all readings, which has no bias.
 """
 
 import math
@@ -23,7 +23,7 @@ from .travel import Rim
 
 @dataclass(frozen=True, eq=False)
 class DeviceInfo:
-    """The device, as its maker would describe it to a controller."""
+    """Description of the device for a controller."""
 
     grid: Grid
     cell: Cell
@@ -32,16 +32,16 @@ class DeviceInfo:
     """Control period, s."""
     blister: Blister | None = None
     heights: Floats | None = None
-    """For the methods that form one; (n,): the shape from outside that is to be displayed, m."""
+    """Blister of methods that form one; heights (n,) of an input shape to be displayed, m."""
     force_floor: float = 0.0
     height_floor: float = 0.0
-    """Force from which on the reading of a cell is no noise, N; how far that of a height may be off, m."""
+    """Noise floor of a cell's force, N, and largest error of a height reading, m."""
     dead_time: float = 0.0
-    """Of the valves' commands, s."""
+    """Dead time of valve commands, s."""
 
     @cached_property
     def rim(self) -> Rim:
-        """Where the bed ends for a fingertip that leads the blister."""
+        """Outer cells of the bed for a fingertip that leads the blister."""
         assert self.blister is not None
         plan, (left, bottom), reach = self.grid.layout, self.grid.corner, 0.5 * self.blister.flat_radius
         x, y = TIE - left - 0.5 * (plan.pitch + plan.shift), TIE - bottom - 0.5 * plan.row_spacing
@@ -49,17 +49,17 @@ class DeviceInfo:
 
     @property
     def lift(self) -> float:
-        """Force the high reservoir can lift, ``P_high A_a``, N."""
+        """Largest force that the high reservoir lifts, ``P_high A_a``, N."""
         return self.cell.supply.high * self.cell.actuator.area
 
 
 def suppress_noise(force: Floats, floor: Any) -> Floats:
-    """Return forces (m[, b]), N, but 0 where they are below the noise floor (b,), N."""
+    """Return forces (m[, b]), N, with 0 for those below the noise floor (b,), N."""
     return np.where(force >= floor, force, 0.0)
 
 
 def check_floor(carried: float, field: str, asked: float, floor: float) -> None:
-    """Refuse a noise floor above the force that a cell carries, N: contact would not be detected."""
+    """Refuse a noise floor above the force on a cell, N: contact would not be detected."""
     if floor >= carried:
         rule = f"must keep five standard deviations below {carried:.3g} N, what a cell carries at most"
         raise ParameterError(

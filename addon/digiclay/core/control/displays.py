@@ -1,4 +1,4 @@
-"""Displays: a commanded field of forces under the fingertip; heights for all cells, refreshed in three ways.
+"""Displays: a commanded field of forces under the fingertip, or heights of all cells, with three refreshes.
 
 After a display of heights a control method takes over (`Handover`).
 """
@@ -53,7 +53,7 @@ SHAPES: dict[str, Callable[[Floats, Floats], Floats]] = {
 
 
 def check_shape(owner: str, field: str, shape: str) -> None:
-    """Refuse what is neither a shape's name nor a file's; `owner`, `field`: what the message calls it."""
+    """Refuse other than a shape's name or a file; `owner`, `field`: of the message."""
     if shape not in SHAPES and not shape.endswith(FILE):
         rule = f"must be one of {', '.join(SHAPES)}, or a file {FILE}"
         raise ParameterError(owner, field, rule, repr(shape))
@@ -120,8 +120,8 @@ class ForceDisplay(TouchParameters):
 class ForceDisplayControl(CellwiseControl):
     """Controller of the force display for a bed.
 
-    A cell that feels the fingertip: ``c dH/dt = F_com - F``, up to `rise` above rest. Let go: back to rest.
-    A cell remembers for how many periods it has felt nothing. `field`: F_com of all cells, (n[, b]), N.
+    A cell that feels the fingertip: ``c dH/dt = F_com - F``, up to `rise` above rest; a released one returns
+    to rest. Row of a cell: periods without force. `field`: F_com of all cells, (n[, b]), N.
     """
 
     parameters: ForceDisplay
@@ -227,8 +227,8 @@ class ShapeDisplay(DriveParameters):
 class ShapeDisplayControl:
     """Controller of the shape display for a bed.
 
-    A move is over when its cells are within the dead band of their heights, or the patience is over.
-    While there are moves all cells take part; afterwards those that stand at their heights are let go.
+    A move ends when its cells are within the dead band of their heights, or after the patience. All cells are
+    active during the moves; afterwards only those that have not arrived.
     """
 
     parameters: ShapeDisplay
@@ -241,7 +241,7 @@ class ShapeDisplayControl:
     patience: int
     """Control periods."""
     whole: Disc
-    """That holds the bed, m."""
+    """Disc around the bed, m."""
 
     rows = 0
 
@@ -254,7 +254,7 @@ class ShapeDisplayControl:
         return memory, self.whole if memory.move < len(self.moves) else None
 
     def command(self, memory: Progress, seen: Measurement) -> tuple[Progress, Commands]:
-        """Set the heights of the move under way, and command every cell; see `Controller`."""
+        """Set the heights of the current move, and command every cell; see `Controller`."""
         target = seen.target
         if memory.move < len(self.moves):
             memory, target = self._make_moves(memory, seen)
@@ -265,7 +265,7 @@ class ShapeDisplayControl:
         return memory, Commands(target, mode, command)
 
     def _make_moves(self, memory: Progress, seen: Measurement) -> tuple[Progress, Floats]:
-        """Return the progress and the targets of the move under way; on to the next if it is over."""
+        """Return the progress and the targets of the current move, or of the next one if it has ended."""
         cells, rest = seen.cells, self.actuator.rest_height
         row, target = cells // self.grid.layout.columns, seen.target.copy()
         goal = self.heights.take(cells)
@@ -281,7 +281,7 @@ class ShapeDisplayControl:
 
 
 def make_shape_display(parameters: ShapeDisplay, device: DeviceInfo) -> ShapeDisplayControl:
-    """Put shape display together, of a scene's shape first; ParameterError when it leaves the stroke."""
+    """Return the shape display, of a scene's shape if it has one; ParameterError beyond the stroke."""
     actuator, grid = device.cell.actuator, device.grid
     if device.heights is not None:
         heights = device.heights
@@ -327,12 +327,12 @@ class Handover:
     display: ShapeDisplayControl
     method: Controller | None
     raised: Floats | None
-    """(n,): Heights of the shape above the bed at rest, m, for a method whose cells go back to rest: it sees
-    the bed without them, so that the shape is what its cells go back to."""
+    """(n,): Heights of the shape above the bed at rest, m, for a method whose cells return to rest: it sees
+    the bed without the shape, so that its cells return to the shape."""
 
     @property
     def rows(self) -> int:
-        """State rows a cell needs."""
+        """State rows per cell."""
         return self.method.rows if self.method else 0
 
     def begin(self) -> Handed:
@@ -340,7 +340,7 @@ class Handover:
         return Handed(self.display.begin(), self.method.begin() if self.method else None)
 
     def is_displayed(self, memory: Handed) -> bool:
-        """Return whether the shape stands, and the method has taken over."""
+        """Return whether the display has ended, and the method has taken over."""
         return memory.display.move >= len(self.display.moves)
 
     def locate(self, memory: Handed, touched: Measurement) -> tuple[Handed, Disc | None]:
@@ -365,7 +365,7 @@ class Handover:
         return memory._replace(method=remembered), orders
 
     def _subtract_shape(self, seen: Measurement) -> Measurement:
-        """Return the bed without the shape, for a method whose cells go back to rest."""
+        """Return the bed without the shape, for a method whose cells return to rest."""
         if self.raised is None:
             return seen
         raised = self.raised.take(seen.cells)
@@ -373,9 +373,9 @@ class Handover:
 
 
 def make_handover(shape: Shape, device: DeviceInfo, method: Controller | None, *, recovers: bool) -> Handover:
-    """Put a shape's display in front of a method; `recovers`: whether the method's cells go back to rest."""
+    """Return a shape's display followed by a method; `recovers`: whether its cells return to rest."""
     assert device.heights is not None
-    # As quick as a display is by itself, and never quicker than its control period allows.
+    # As fast as a display alone, within the limit of the control period.
     settling = max(DriveParameters().settling_time, 2.0 * device.period)
     parameters = ShapeDisplay(
         refresh=shape.refresh, surfaces=shape.surfaces, patience=shape.patience, settling_time=settling

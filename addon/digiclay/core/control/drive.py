@@ -1,8 +1,8 @@
 """Pin motion by speed, height or force: common part of the behaviors.
 
-A valve's flow goes with the square of its opening, so a height control that is proportional in the
-opening comes in like 1/t. Here the opening follows from the wanted speed instead, by the flow law
-of a pin without load, and heights come in exponentially.
+The flow of a valve is proportional to the square of its opening, so that a height control proportional in
+the opening converges like 1/t. Here the opening is computed from the requested speed by the flow law of a
+pin without load, and heights converge exponentially.
 """
 
 from dataclasses import dataclass, replace
@@ -19,7 +19,7 @@ from ..model.physics import Cell
 from .methods import ControlParameters
 from .servo import BatchControl, Tracking, declare_again, lock_overloaded, mark_formed
 
-#: Openings at which the speed is tabulated; in between it is interpolated.
+#: Openings at which the speed is tabulated; between them it is interpolated.
 OPENINGS = np.linspace(0.0, 1.0, 129)
 
 
@@ -60,11 +60,10 @@ class Drive:
 
     settling_time: float
     dead_band: float
-    """Time constant of the approach to a height, s, and error that is none, m."""
+    """Time constant of the approach to a height, s, and dead band of the error, m."""
     up: Floats
     down: Floats
-    """(129,) or (129, b): Speed of a pin without load at `OPENINGS`, towards either reservoir, growing,
-    m/s."""
+    """(129,) or (129, b): Speeds of a pin without load at `OPENINGS`, towards each reservoir, m/s."""
     lift: float
     """Force the high reservoir can lift, N."""
 
@@ -98,7 +97,7 @@ class CellwiseControl(BatchControl):
     rows = 0
 
     def begin(self) -> None:
-        """Nothing to remember but the cells' own rows."""
+        """Return no memory: cells have only their rows."""
 
     def locate(self, memory: None, touched: Measurement) -> tuple[None, None]:
         """Request the cells near the fingertip and those in motion only; see `Controller`."""
@@ -138,11 +137,11 @@ def make_drive(parameters: DriveParameters, cell: Cell, period: float) -> Drive:
 
 
 def check_damping(damping: float, cell: Cell, period: float, stiffness: float = 0.0) -> None:
-    """Refuse a damping at which finger and pin would swing.
+    """Refuse a damping at which finger and pin would oscillate.
 
-    A pin that gives way by ``c dH/dt = -F`` under a pulp of stiffness k loses ``k T_c / c`` of the
-    force in a control period. With the dead time and the lag of the default valve it swings from about
-    2 on, so 1 is allowed. The pulp is stiffest at the largest force a pin can lift,
+    A pin that yields by ``c dH/dt = -F`` under a pulp of stiffness k loses ``k T_c / c`` of the force in a
+    control period. With the dead time and the lag of the default valve it oscillates from about 2 on, so 1
+    is permitted. The pulp is stiffest at the largest force a pin can lift,
     ``k = f_d b exp(m (x - x0)) = f_d b + m F``; a spring under the pin, `stiffness` in N/m, adds to it.
     """
     if cell.touch is None:

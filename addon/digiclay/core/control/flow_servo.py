@@ -18,9 +18,9 @@ from .drive import OPENINGS, find_free_speeds
 
 #: Instants of a control period at which the lag of the valve is evaluated.
 INSTANTS = 64
-#: Speeds smaller than this share of the free speed are none: a valve must not stay open for them.
+#: Speeds below this share of the free speed are set to 0: a valve must not stay open for them.
 STILL = 1e-6
-#: Share of the speed without load below which a load leaves a pin so slow that it rises more slowly still.
+#: Share of the free speed below which a loaded pin is raised more slowly still.
 LOADED = 0.3
 
 
@@ -47,12 +47,12 @@ class FlowServo:
 
     @property
     def rows(self) -> int:
-        """Rows a cell needs: the speeds of the commands that still act."""
+        """State rows per cell: speeds of the commands that still act."""
         return len(self.left)
 
     @cached_property
     def span(self) -> float:
-        """How long a new command acts until the heights aimed at, s."""
+        """Time for which a new command acts until the heights aimed at, s."""
         return self.ahead - sum(self.left)
 
     def find_limits(self, force: Floats) -> Floats:
@@ -78,24 +78,24 @@ class FlowServo:
 
     @cached_property
     def _times(self) -> Floats:
-        """How long earlier commands still act, (q,), s."""
+        """Times for which earlier commands still act, (q,), s."""
         return np.array(self.left)
 
     @cached_property
     def _numbers(self) -> Constants:
-        """What `serve` is made with: one over the span, 1/s; the dead band, m; the slowest speed, m/s; 0;
-        and one over the speed of a loaded pin, s/m.
+        """Constants of `serve`: inverse of the span, 1/s; dead band, m; slowest speed, m/s; 0; and inverse of
+        the speed of a loaded pin, s/m.
         """
         slowest, loaded = STILL * self.rise, LOADED * self.rise
         return Constants((1.0 / self.span, self.dead_band, slowest, 0.0, 1.0 / loaded))
 
     def serve(self, error: Floats, limits: Floats, force: Floats, speeds: Floats) -> Floats:
-        """Return commands (m,) for errors off the coast (m,), m; speeds (q, m) get theirs in place."""
+        """Return commands (m,) for errors of coasted heights (m,), m; updates speeds (q, m) in place."""
         fall, rise = limits
         per_span, band, slowest, none, per_loaded = self._numbers[error.shape]
         speed = error * per_span
         np.maximum(speed, fall, out=speed)
-        # Raised at full opening, a loaded pin presses harder than its reservoir lifts, and is let down again.
+        # At full opening a loaded pin would exceed the force of its reservoir, and be lowered again.
         np.minimum(speed, np.minimum(rise, rise * rise * per_loaded), out=speed)
         still = np.abs(error) <= band
         still |= np.abs(speed) < slowest
@@ -110,7 +110,7 @@ class FlowServo:
         return command
 
     def _refine(self, command: Floats, speed: Floats, force: Floats) -> Floats:
-        """Return commands at which the flow law gives the speeds: a step from those of a load that scales."""
+        """Return commands for which the flow law gives the speeds: one correction of the scaled ones."""
         moving = np.flatnonzero(command)
         opening, wanted = command[moving], speed[moving]
         drop = self.cell.supply.pressure(opening) - self.cell.actuator.pressure(force[moving])
@@ -122,7 +122,7 @@ class FlowServo:
 
 
 def make_flow_servo(cell: Cell, period: float, dead_time: float, dead_band: float) -> FlowServo:
-    """Make the servo of a device; it aims two periods ahead, plus the whole periods of the dead time, s."""
+    """Return a servo that aims two periods ahead, plus the whole periods of the dead time, s."""
     area, supply = cell.actuator.area, cell.supply
     up, down = find_free_speeds(cell, supply.high), find_free_speeds(cell, -supply.low)
     ratios = np.concatenate((-down[::-1] / down[-1], up[1:] / up[-1]))
@@ -149,6 +149,6 @@ def make_flow_servo(cell: Cell, period: float, dead_time: float, dead_band: floa
 
 
 def _measure_lag(cell: Cell, period: float) -> float:
-    """Return how much later the valve's opening is than its command, over a control period, s."""
+    """Return the mean delay of the valve's opening behind its command over a control period, s."""
     times = (np.arange(INSTANTS) + 0.5) * (period / INSTANTS)
     return period * float(np.mean(1.0 - cell.lag.response(Queue(), times.tolist())[:, -1]))

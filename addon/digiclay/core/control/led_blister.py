@@ -1,4 +1,4 @@
-"""Blister of Method III: about the predicted place of the fingertip, led ahead of it; the method's memory."""
+"""Blister of Method III around the predicted fingertip, led ahead of it; memory of the method."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from .virtual_master import IDLE, Master, Phase
 
 #: A fingertip slower than this has no direction, m/s.
 SLOWEST = 1e-3
-#: Slope where pins are not led: it puts them below every surface.
+#: Slope without lead: pins are below every surface.
 STEEP = 1e9
 
 
@@ -33,9 +33,9 @@ class LeadProfile:
     """Radius within which pins are level with the top, m."""
     rise: float
     fall: float
-    """Speeds of free pins that are counted on, m/s."""
+    """Assumed speeds of free pins, m/s."""
     skirt: float
-    """Speed of the drags expected from rest, m/s; 0: no skirt."""
+    """Speed of expected drags from rest, m/s; 0: no skirt."""
 
     def find_reach(self, height: float, speed: float) -> float:
         """Return the radius within which pins may be led, m, for a height over the surface and a speed."""
@@ -43,13 +43,13 @@ class LeadProfile:
         return self.level + abs(height) * quickest / (self.rise if height > 0.0 else self.fall)
 
     def find_slopes(self, speed: float, *, raised: bool) -> tuple[float, float]:
-        """Return how steep heights may be around and ahead, at a speed, m/s, up to the top if `raised`."""
+        """Return the largest slopes around and ahead at a speed, m/s, up to the top if `raised`."""
         free = self.rise if raised else self.fall
         around = free / self.skirt if self.skirt else STEEP
         return around, min(free / speed if speed >= SLOWEST else STEEP, around)
 
     def find_drop(self, distance: Floats, ahead: Floats, around: Any, forward: Any) -> Floats:
-        """Return how far from the top pins may stand, (m,), m, of slopes (m,) by `find_slopes`."""
+        """Return the largest distances of pins from the top, (m,), m, by slopes of `find_slopes`."""
         drop: Floats = distance - self.level
         np.maximum(drop, 0.0, out=drop)
         drop *= around if forward is around else np.where(ahead > TIE, forward, around)
@@ -57,7 +57,7 @@ class LeadProfile:
 
 
 class Follower(NamedTuple):
-    """What Method III remembers of the fingertip that it follows, see `following.Follower`."""
+    """Memory of Method III about its fingertip, see `following.Follower`."""
 
     phase: Phase = IDLE
     period: int = 0
@@ -72,17 +72,17 @@ class Follower(NamedTuple):
     felt: float = 0.0
     alone: int = 0
     losses: int = 0
-    """Top when the fingertip was last felt, m; control periods since then; how often it was lost."""
+    """Top when the fingertip was last felt, m; control periods since then; number of losses."""
     led_x: float = 0.0
     led_y: float = 0.0
     led_radius: float = 0.0
-    """Disc within which pins may stand where they will not be left, m; a radius of 0: none does."""
+    """Disc within which pins may be led, m; a radius of 0: none is."""
     due: tuple[float, ...] = ()
     doubt: float = 0.0
-    """Total forces predicted for this and the next periods, N, below 0: none is; mean square by which those
-    of the last periods were off, N²."""
+    """Total forces predicted for this and the next periods, N, below 0: none; mean square error of the last
+    predictions, N²."""
     master: Master = Master()
-    """Memory of Method I while it takes over; IDLE: it does not."""
+    """Memory of Method I while it has taken over; else IDLE."""
 
     @property
     def ground(self) -> float:
@@ -91,7 +91,7 @@ class Follower(NamedTuple):
 
     @property
     def position(self) -> tuple[float, float] | None:
-        """Where the fingertip is, m; None: none is followed."""
+        """Position of the fingertip, m; None if none is followed."""
         if self.phase is IDLE or self.master.phase is not IDLE:
             return self.master.position
         x, y, *_ = self.estimate.mean.tolist()
@@ -100,7 +100,7 @@ class Follower(NamedTuple):
 
 #: Surface from which the blister rises.
 GROUND = EdgeGround()
-#: How much farther than the estimated place and the reach of the period before pins may be led, m.
+#: Margin of the disc of led pins around the estimated position and reach, m.
 MARGIN = 2e-3
 
 
@@ -115,7 +115,7 @@ class Region(NamedTuple):
     """Lowest point of each fingertip then, m, and its speed in the plane, m/s."""
     cells: BlisterCells
     drop: Floats
-    """About the aims, and how far they may stand from the top, (m,), m; see `LeadProfile.find_drop`."""
+    """Cells around the aims, and largest distances from the top, (m,), m; see `LeadProfile.find_drop`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,7 +127,7 @@ class LedBlister:
     ahead: float
 
     def find_disc(self, memory: Follower) -> Disc | None:
-        """Return the disc of the pins to command: those led now, and those led before."""
+        """Return the disc of the pins to command: those led now or before."""
         led = (memory.led_x, memory.led_y, memory.led_radius)
         if memory.phase is IDLE:
             return led if memory.led_radius else None
@@ -139,7 +139,7 @@ class LedBlister:
     def survey(
         self, memories: list[Follower], basis: Floats, left: Floats, sections: Whole = WHOLE
     ) -> Region:
-        """Return the cells about predicted fingertips, by the heights at which pins were left, (m,), m."""
+        """Return the cells around predicted fingertips, by the heights at which pins were left, (m,), m."""
         time, aims, speeds, poses = self.ahead, [], [], []
         for memory in memories:
             x, y, z, vx, vy, vz, *_ = memory.estimate.mean.tolist()
@@ -164,7 +164,7 @@ class LedBlister:
     ) -> Floats:
         """Return the heights at which pins are left by fingertips, m; modes, (m,), are set in place.
 
-        `heights` of surface and top, m, one of all cells or (m,).
+        `heights`: surface and top, m, numbers or (m,).
         """
         return raise_blister(
             self.rule, GROUND, cells, seen._replace(target=left), (*heights, FORCE_FOLLOW, False), mode

@@ -1,7 +1,7 @@
-"""Masters of a batch: of few runs decided about one by one, of many side by side.
+"""Masters of a batch: those of few runs are led one by one, those of many in arrays.
 
-What most of many masters do in a control period they do at once. One that is touched, lost, turns or comes
-near the rim decides in plain numbers, as that of a single run does: all come out the same, bit for bit.
+Array formulas lead the masters in the usual situation. A master that is touched or lost, turns, or comes near
+the rim is led in plain numbers like that of a single run. All results are the same, bit for bit.
 """
 
 from __future__ import annotations
@@ -32,16 +32,16 @@ from .virtual_master import (
 #: Rows of the masters' numbers.
 PHASE, X, Y, HEIGHT, OPENING, REFERENCE, EDGE = range(7)
 FROM_X, FROM_Y, TOWARD_X, TOWARD_Y, FELT, ALONE, LOSSES = range(7, 14)
-#: Phases as plain numbers: numpy takes an enumeration's member ten times as long.
+#: Phases as plain numbers, which numpy takes ten times as fast as members of an enumeration.
 AWAY, SPRUNG, SHAPED = float(IDLE), float(SPRINGING), float(SHAPING)
-#: Share of the travel that settles a direction within which none is settled for certain.
+#: Share of the travel within which no new direction is certain.
 SHORT = 0.99
 
 
 def _decide_by_run(
     decide: Callable[..., Any], join: Callable[[Iterable[Any]], Any] = list
 ) -> Callable[..., Any]:
-    """Return a method of a batch's controller: each run's decision on its memory and numbers, joined."""
+    """Return a method of a batch that calls a method of each run with its memory and numbers."""
 
     def decide_all(batch: VirtualMasterBatch, memory: list[Master], *columns: list[Any]) -> Any:
         return join(map(decide, batch.runs, memory, *columns))
@@ -146,7 +146,7 @@ class VirtualMasterColumns(VirtualMasterControl):
         return masters
 
     def is_new(self, memory: Memory) -> bool:
-        """Tell whether some master has found a fingertip, and has no height yet."""
+        """Tell whether some master has located a fingertip, and has no height yet."""
         return bool(np.isnan(memory.numbers[HEIGHT]).any())
 
     def lead(self, memory: Memory, force: Any, surface: Any, noise: Any = 0.0) -> Any:
@@ -189,7 +189,7 @@ class VirtualMasterColumns(VirtualMasterControl):
         return bool(memory.numbers[PHASE].any())
 
     def get_pose(self, memory: Memory) -> tuple[Any, Any, Any, Any]:
-        """Return where the masters are, (b,), m, and their directions of travel."""
+        """Return positions of the masters, (b,), m, and directions of travel."""
         numbers = gather(memory).numbers
         idle = numbers[PHASE] == AWAY
         x, y = np.where(idle, NOWHERE, numbers[X : Y + 1])

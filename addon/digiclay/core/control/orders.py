@@ -3,22 +3,23 @@
 An order is a row of five numbers a control period: x, y and radius of a disc, m, a strength, and a `Verb`.
 
 SMOOTH
-    The commanded heights spread, ``dh/dt = ∇(w D ∇h)`` with ``D = strength r² / T``, and weights w from 1 in
-    the middle of the disc to 0 at its rim: of two neighbors the lesser. So clay is moved and none is lost; no
-    cell leaves the range of its neighbors, so that nothing swings; and cells outside the disc stay.
+    The commanded heights diffuse, ``dh/dt = ∇(w D ∇h)`` with ``D = strength r² / T``. The weight w falls from
+    1 in the middle of the disc to 0 at its rim; between two neighbors the smaller one holds. Clay is moved,
+    but not lost. No cell leaves the range of its neighbors, so that nothing oscillates, and cells outside the
+    disc do not change.
 AVERAGE
-    What smoothed before there was SMOOTH, for takes of that time: ``dh = w D ∇²h T_c``, where the greater of
-    what rises and what sinks is scaled down to the other.
+    Predecessor of SMOOTH, for older takes: ``dh = w D ∇²h T_c``, with the larger of the total rise and the
+    total fall scaled down to the other.
 ERASE
-    The commanded heights go back to rest with these weights, ``dh/dt = w strength (h_rest - h) / T``.
+    The commanded heights return to rest with these weights, ``dh/dt = w strength (h_rest - h) / T``.
 LOCK, UNLOCK, INVERT
-    Pins in the disc get or lose the mode LOCKED, or change over: valve shut, whatever anything commands.
+    Pins in the disc get, lose or toggle the mode LOCKED: their valves are shut, whatever is commanded.
 PLACE
-    Pins go to the heights of a surface, the one of the number in column x; NaN is a pin that is left alone.
+    Pins go to the heights of a surface, whose number is in column x; NaN: the pin is not driven.
 
-Of what has weights a strength of 0 changes no height more, and drives on those pins that have not arrived.
-A radius of 0 is no order, but for PLACE: the method is on its own. Driven pins are in the mode BLISTER until
-they have arrived.
+A weighted order of strength 0 changes no height, but pins that have not arrived are driven further. A radius
+of 0 is no order, except for PLACE: the method commands all pins. Driven pins have the mode BLISTER until they
+arrive.
 """
 
 import math
@@ -43,19 +44,19 @@ from .travel import measure_square
 
 #: Numbers of an order.
 ORDER = 5
-#: How long strength 1 takes, s, to spread heights over the radius, SMOOTH and AVERAGE, and to erase all
-#: but 1/e. At 100 mm/s one pass of SMOOTH leaves 15 to 45 % of what varies on the beds of `settings.devices`.
+#: Time in which strength 1 spreads heights over the radius, SMOOTH and AVERAGE, and erases all but 1/e, s.
+#: One pass of SMOOTH at 100 mm/s leaves 15 to 45 % of the variation on the beds of `settings.devices`.
 SPREADING, AVERAGING, ERASING = 0.25, 1.0, 5e-3
-#: How far the neighbors of a cell are at most, in pitches or distances of rows: 1.12 where rows are shifted.
+#: Largest distance of neighbors, in pitches or distances of rows: 1.12 if rows are shifted.
 MARGIN = 1.5
-#: Least radius of an order, m, the farthest number in one, m, and the largest strength.
+#: Least radius, m, largest number, and largest strength of an order.
 SMALLEST, FARTHEST, STRONGEST = 1e-6, 1e3, 100.0
-#: Height error that is none where pins are erased or placed, m: they stand within 1 µm.
+#: Dead band of heights while pins are erased or placed, m: they stand within 1 µm.
 BAND = 0.5e-6
 
 
 class Verb(IntEnum):
-    """What an order does."""
+    """Effect of an order."""
 
     AVERAGE = 0
     SMOOTH = 1
@@ -91,32 +92,32 @@ class Orders:
 def repeat_order(
     periods: int, verb: Verb, x: float = 0.0, y: float = 0.0, radius: float = 0.0, strength: float = 0.0
 ) -> Floats:
-    """Return the rows (t, 5) of one order in so many periods."""
+    """Return the rows (t, 5) of an order that lasts for `periods` control periods."""
     return np.tile((x, y, radius, strength, float(verb)), (periods, 1))
 
 
 def place(periods: int, surface: Floats) -> Orders:
-    """Return the orders that drive pins to a surface (n,), m, NaN: not driven, for so many periods."""
+    """Return the orders that drive pins to a surface (n,), m, for `periods`; NaN: not driven."""
     return Orders(repeat_order(periods, Verb.PLACE), (surface,))
 
 
 def add_verbs(rows: Floats) -> Floats:
-    """Return orders (t, 5) of rows (t, 4) without verbs: all of them average."""
+    """Return orders (t, 5) for rows (t, 4) without verbs, which all average."""
     return np.column_stack([rows, np.zeros(len(rows))])
 
 
 @dataclass(frozen=True, eq=False)
 class Around:
-    """Controller around the method's, whose memory it has.
+    """Controller around that of the method, with the same memory.
 
-    Cells remember nothing of it: after any period the method alone can continue the session.
+    It has no rows of cells: after any period the method alone can continue the session.
     """
 
     method: Controller
 
     @property
     def rows(self) -> int:
-        """State rows a cell needs."""
+        """State rows per cell."""
         return self.method.rows
 
     def begin(self) -> Memory:
@@ -133,14 +134,14 @@ Change = Callable[[Measurement, Floats], Floats]
 
 @dataclass(frozen=True, eq=False)
 class DrivingControl(Around):
-    """Controller of one control period with an order: the method's, but for the cells the valves drive."""
+    """Controller of a period with an order, which drives some cells; the method commands the others."""
 
     free: bool
     """Whether the bed has no method."""
     drive: Drive
     actuator: Actuator
     reach: Disc
-    """Cells to be driven, and those whose heights that takes, m."""
+    """Disc of the driven cells, and of those whose heights they depend on, m."""
     aim: Aim
 
     def locate(self, memory: Memory, touched: Measurement) -> tuple[Memory, Disc | None]:
@@ -213,15 +214,15 @@ def approach(surface: Floats, seen: Measurement) -> tuple[Floats, Flags, Flags]:
 
 @dataclass(frozen=True, eq=False)
 class LockingControl(Around):
-    """Controller of a bed with locked pins: the method's, which takes them for pins that hold or rest.
+    """Controller of a bed with locked pins, which the method sees as holding or at rest.
 
-    A locked pin is commanded to where it is, so that it stays there when it is unlocked.
+    A locked pin is commanded to its height, so that it stays there when unlocked.
     """
 
     actuator: Actuator
     verb: Verb
     disc: Disc | None = None
-    """Pins to be locked or unlocked; None: the locked ones stay as they are."""
+    """Pins to be locked or unlocked; None: locked pins do not change."""
 
     def locate(self, memory: Memory, touched: Measurement) -> tuple[Memory, Disc | None]:
         """Request the disc, and the method's; see `Controller`."""
@@ -250,7 +251,7 @@ class LockingControl(Around):
         return locked | inside if self.verb is Verb.LOCK else locked & ~inside
 
     def _mask(self, seen: Measurement) -> Measurement:
-        """Return what a method sees that knows no locks."""
+        """Return the measurement for a method without locks."""
         locked = seen.mode == LOCKED
         if not any_true(locked):
             return seen
@@ -271,13 +272,13 @@ def order_periods(
 ) -> Iterator[Controller]:
     """Yield the controller of each control period, s.
 
-    `latency`: from a command to what is measured of it, s; `floor`: distance from which on a height that is
-    read is not the true one, m; `locked`: whether pins are locked at the start.
+    `latency`: time from a command to the measurement of its effect, s; `floor`: largest error of a height
+    reading, m; `locked`: whether pins are locked at the start.
     """
     quick, plan = 2.0 * period, grid.layout
-    # As quick as a display is, and never quicker than the control period allows.
+    # As fast as a display, within the limit of the control period.
     drive = make_drive(DriveParameters(max(DriveParameters().settling_time, quick)), cell, period)
-    # A loop of the gain 1/T swings below T = e times its dead time; a control period adds half of its own.
+    # A loop of gain 1/T oscillates if T is below e times its dead time; sampling adds half a control period.
     settling = max(quick, math.e * (latency + 0.5 * period))
     exact = make_drive(DriveParameters(settling, max(BAND, floor)), cell, period)
     margin, free = MARGIN * max(plan.pitch, plan.row_spacing), isinstance(method, Uncontrolled)
@@ -309,7 +310,7 @@ def order_periods(
 
 
 def find_fault(orders: Orders, periods: int, pins: int, stroke: float) -> str:
-    """Return what is wrong with orders for so many periods, pins and a stroke, m; empty when nothing is."""
+    """Return the fault of orders for numbers of periods and pins and a stroke, m; empty if there is none."""
     rows = orders.rows
     if rows.shape != (periods, ORDER) or rows.dtype != np.float64:
         return f"an array of the shape {rows.shape} of {rows.dtype}"

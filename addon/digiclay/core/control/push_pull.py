@@ -1,8 +1,8 @@
 """Push and pull: contact from commanded less measured height, without a force sensor.
 
-A shut valve locks its pin, and a locked pin does not give: nothing would show. So the pins near the hand
-listen: their valves open a little to the high and to the low reservoir in turn. A free pin ends every such
-cycle where it began; a loaded one rises less than it falls, drifts off, and so gives the hand away.
+A shut valve locks its pin, and a locked pin does not move under a force. So pins near the hand listen: their
+valves open slightly to the high and to the low reservoir in turn. A free pin ends each cycle where it began;
+a loaded one rises less than it falls, and its drift reveals the hand.
 """
 
 from dataclasses import dataclass, replace
@@ -68,9 +68,9 @@ class PushPull(DriveParameters):
 class PushPullControl:
     """Controller of push and pull for a bed.
 
-    With e = H_com - H at the end of a cycle, a cell is pushed where e > θ and pulled where e < -θ; its
-    commanded height is then dragged along, to within θ of the measured one. A cell remembers how many
-    cycles it will still count as touched, and how fast it was last dragged, m/s.
+    With e = H_com - H at the end of a cycle, a cell is pushed if e > θ and pulled if e < -θ; its commanded
+    height then follows to within θ of the measured one. Rows of a cell: remaining cycles in which it counts
+    as touched, and its last drift speed, m/s.
     """
 
     parameters: PushPull
@@ -86,7 +86,7 @@ class PushPullControl:
         return Listening()
 
     def locate(self, memory: Listening, touched: Measurement) -> tuple[Listening, Disc | None]:
-        """Listen where a hand may be: farther pins would stay where they are; see `Controller`."""
+        """Listen near a possible hand: pins farther away do not move; see `Controller`."""
         memory = memory._replace(period=memory.period + 1, radius=-1.0)
         if not touched.height.size:
             return memory, None
@@ -101,12 +101,12 @@ class PushPullControl:
         limit = memory.radius * memory.radius * (1.0 + RELATIVE_TOLERANCE) if memory.radius >= 0.0 else -1.0
         listening = measure_square(memory.x, memory.y, seen.quadratic_basis) <= limit
         rising = memory.period % CYCLE == 0
-        if rising:  # a whole cycle lies behind: what is left of it is no ripple
+        if rising:  # a whole cycle is over: the remaining error is no ripple
             target = self._drag_targets(seen, listening)
         touched = seen.own[0] > 0.0
         error = target - seen.height
         stroke = np.where(touched, speeds.following_speed, speeds.listening_speed)
-        # Brought back in the rising half alone, and so at twice the speed.
+        # Centering acts only in the rising half, and so at twice the speed.
         centering = CYCLE * error / speeds.centring_time
         swing = stroke + centering if rising else -stroke
         speed = np.where(listening, swing + speeds.assist * seen.own[1], self.drive.approach(error))
@@ -115,10 +115,10 @@ class PushPullControl:
         return memory, Commands(target, mode, self.drive.open_for(speed))
 
     def _drag_targets(self, seen: Measurement, listening: Flags) -> Floats:
-        """Return the targets after a cycle; what the cells remember is brought up to date in place."""
+        """Return the targets after a cycle; updates the rows of the cells in place."""
         gains, left = self.parameters, seen.own[0]
         error = seen.target - seen.height
-        # A height dragged to the threshold lies on it, but for rounding.
+        # A height dragged to the threshold is on it, except for rounding.
         moved = (np.abs(error) > gains.threshold * (1.0 + RELATIVE_TOLERANCE)) & listening
         was = left > 0.0
         cycles = 1.0 + round(gains.release_time / (CYCLE * self.period))

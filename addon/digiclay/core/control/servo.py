@@ -1,7 +1,7 @@
 """Common parts of the controllers: height control, lock of overloaded cells, one run or a batch.
 
-The cells of one run are arrays (m,), those of a batch of b runs (m, b). A number that differs from run to run
-is an array (b,), which numpy puts against the last axis by itself.
+The cells of one run are arrays (m,), those of a batch of b runs (m, b). A number that differs between runs is
+an array (b,), which numpy broadcasts along the last axis.
 """
 
 from __future__ import annotations
@@ -36,8 +36,8 @@ class Tracking(ControlParameters):
     def command(self, target: Floats, height: Floats) -> Floats:
         """Return ``K_com = K_p (H_com - H)``, limited to [-1, 1], zero within the dead band.
 
-        The flow goes with the square of the opening, so a cell comes in like 1/t and would
-        never be at rest without the dead band.
+        The flow is proportional to the square of the opening, so that a cell converges like 1/t,
+        and would never be at rest without the dead band.
         """
         gain, band, most, least, none = self._constants[target.shape]
         error = target - height
@@ -50,12 +50,12 @@ class Tracking(ControlParameters):
 
     @cached_property
     def _constants(self) -> Constants:
-        """What `command` is made with: gain, 1/m; dead band, m; the command's bounds; no command."""
+        """Constants of `command`: gain, 1/m; dead band, m; bounds of the command; no command."""
         return Constants((self.position_gain, self.dead_band, 1.0, -1.0, 0.0))
 
 
 def declare_again(owner: type[Parameters], name: str, default: float | None = None) -> Any:
-    """Declare a parameter as another class does, with a default of its own or the same one."""
+    """Declare a parameter of another class again, with another default if given."""
     field = next(field for field in dataclasses.fields(owner) if field.name == name)
     return dataclasses.field(default=field.default if default is None else default, metadata=field.metadata)
 
@@ -70,7 +70,7 @@ def mark_formed(target: Floats, rest: float | Floats, band: float | Floats) -> M
 
 
 def lock_overloaded(command: Floats, force: Floats, limit: float | Floats) -> Floats:
-    """Lock cells pressed harder than the high reservoir lifts, N, in place: opening would lower them."""
+    """Lock cells under more force than the high reservoir lifts, N, in place: opening would lower them."""
     overload = force >= limit
     if any_true(overload):
         overload &= command > 0.0
@@ -82,24 +82,24 @@ def lock_overloaded(command: Floats, force: Floats, limit: float | Floats) -> Fl
 class BatchControl:
     """Controller whose formulas hold for the cells of one run and for those of a batch.
 
-    The memory of a batch is a list, one memory a run.
+    The memory of a batch is a list, with one memory per run.
     """
 
     runs: tuple[Any, ...] = field(default=(), kw_only=True)
-    """In a batch the controllers of its runs, with plain numbers; empty in a single run."""
+    """In a batch the controllers of the runs, with plain numbers; empty in a single run."""
 
     def find_batch_class(self, count: int) -> type[BatchControl]:
-        """Return the class of the controller of a batch of so many runs, with the same fields."""
+        """Return the class of the controller of a batch of `count` runs, with the same fields."""
         return type(self)
 
 
 def take_cells(values: Array, cells: Cells) -> Array:
-    """Return the values of cells (m[, b]) out of those of the bed, (n,), or of each run's bed, (n, b)."""
+    """Return the values of cells (m[, b]) of a bed, (n,), or of the bed of each run, (n, b)."""
     return values.take(cells) if values.ndim == 1 else np.take_along_axis(values, cells, axis=0)
 
 
 def sum_weighted(rows: Floats, weights: Floats | Flags) -> Floats:
-    """Return the sums ([k][, b]) over cells of rows ([k,] m[, b]) times weights, or where a test holds."""
+    """Return the sums ([k][, b]) over cells of rows ([k,] m[, b]) times weights (m[, b]), or a test."""
     if weights.ndim == 1:
         sums: Floats = rows.dot(weights)
     elif rows.shape[-1] == 1:  # the same rows for all runs

@@ -1,8 +1,8 @@
 """Direction of the fingertip, and the cells behind it (Fig. 6 of the paper).
 
-The direction is settled by distance traveled, not by speed: a fingertip that slows down or
-rests keeps its direction, and what it has formed is not called back. The basis of cells are rows
-1, x, y, x², x y, y², (6, m) of one run or (6, m, b) of a batch; what differs from run to run is (b,).
+The direction depends on the distance traveled, not on speed: a fingertip that slows down or rests
+keeps its direction, and cells that it has formed are not called back. The basis of cells has the rows
+1, x, y, x², x y, y², (6, m) of one run or (6, m, b) of a batch; numbers that differ between runs are (b,).
 """
 
 from __future__ import annotations
@@ -16,31 +16,31 @@ from ..base.arrays import TIE, Floats
 
 #: A direction is opposite to another when the cosine of the angle between them is below this.
 BACK = -0.5
-#: A fingertip goes off the bed where the cosine of its direction to outward is above this: under one that
-#: goes along the rim the centroid of the forces moves about.
+#: A fingertip moves off the bed if the cosine between its direction and the outward normal is above this:
+#: under one that moves along the rim the centroid of the forces varies.
 OUTWARD = 0.1
 
 
-#: To how many parts of a meter the place of a fingertip counts. A blister that rises under one on a line of
-#: symmetry may be unstable across it: what rounding leaves there must not grow.
+#: Parts of a meter to which the position of a fingertip is rounded. A blister that rises under a fingertip on
+#: a line of symmetry may be unstable across it: rounding errors must not grow.
 PARTS = 1e13
 
 
 class Rim(NamedTuple):
-    """Outer cells of a bed: a fingertip that leaves over them is carried by fewer, which are not to rise."""
+    """Outer cells of a bed: fewer of them carry a fingertip that leaves the bed, and must not rise for it."""
 
     x: float
     y: float
-    """How far from the middle of the bed they begin, m; infinite: the bed is no wider than a fingertip."""
+    """Distances of the outer cells from the middle, m; infinite in a bed no wider than a fingertip."""
     reach: float
-    """How far ahead of a fingertip cells carry it, m."""
+    """Distance ahead of a fingertip at which cells carry it, m."""
 
     def is_under(self, x: float, y: float, farther: float = 0.0) -> bool:
-        """Tell whether a place, m, is over the outer cells or beyond, or would be so much farther off, m."""
+        """Tell whether a position, m, moved outwards by `farther`, m, is over the outer cells or beyond."""
         return abs(x) + farther > self.x or abs(y) + farther > self.y
 
     def is_ahead(self, x: float, y: float, toward_x: float, toward_y: float) -> bool:
-        """Tell whether a fingertip at a place, m, goes off the bed in a direction, and is near the rim."""
+        """Tell whether a fingertip at a position, m, is near the rim and moves off the bed."""
         out_x, out_y = math.copysign(toward_x, toward_x * x), math.copysign(toward_y, toward_y * y)
         return (out_x > OUTWARD and abs(x) + self.reach * out_x > self.x) or (
             out_y > OUTWARD and abs(y) + self.reach * out_y > self.y
@@ -57,10 +57,10 @@ class Heading(NamedTuple):
 
 
 def update_heading(heading: Heading, x: float, y: float, travel: float, reversal: float = 0.0) -> Heading:
-    """Return the heading of a fingertip at x, y, m; a new one once it has gone a distance `travel`, m.
+    """Return the heading of a fingertip at x, y, m; a new one after a distance `travel`, m.
 
-    A direction opposite to the last one, within 60 degrees, takes `reversal`, m, if that is longer: on a
-    slope the centroid of the forces moves about under a fingertip that goes one way.
+    A direction within 60 degrees of the opposite one takes `reversal`, m, if that is longer: on a slope the
+    centroid of the forces varies under a fingertip that moves straight on.
     """
     dx, dy = x - heading.x, y - heading.y
     gone = math.hypot(dx, dy)
@@ -71,16 +71,16 @@ def update_heading(heading: Heading, x: float, y: float, travel: float, reversal
 
 
 def measure_lead(heading: Heading, x: float, y: float, basis: Floats) -> Floats:
-    """Return how far cells (6, m) lie ahead of a point, m; negative behind it, 0 before any travel."""
+    """Return the distances of cells (6, m) ahead of a point, m; negative behind it, 0 before any travel."""
     _, _, toward_x, toward_y = heading
     ahead: Floats = np.dot([-x * toward_x - y * toward_y, toward_x, toward_y], basis[:3])
     return ahead
 
 
 def measure_offsets(x: Any, y: Any, toward_x: Any, toward_y: Any, basis: Floats) -> tuple[Floats, Floats]:
-    """Return how far cells lie from a point, m, and ahead of it in a direction, (m[, b]) each, m.
+    """Return the distances of cells from a point, and ahead of it in a direction, (m[, b]) each, m.
 
-    Of cells in `sections` each has its own point and direction, (m,).
+    Points and directions (m,): one per cell, for cells of several fingers.
     """
     if basis.ndim == 2 and not isinstance(x, np.ndarray):  # one product
         forward = (-x * toward_x - y * toward_y, toward_x, toward_y, 0.0, 0.0, 0.0)
@@ -98,7 +98,7 @@ def measure_offsets(x: Any, y: Any, toward_x: Any, toward_y: Any, basis: Floats)
 
 
 def measure_excess(x: Any, y: Any, radius: Any, basis: Floats) -> Floats:
-    """Return by how much the squares of distances from a point exceed that of a radius, (m[, b]), m²."""
+    """Return squared distances from a point less the square of a radius, (m[, b]), m²."""
     if basis.ndim == 2:  # one product
         excess: Floats = np.array(_circle(x, y, radius)).dot(basis)
         return excess

@@ -4,8 +4,8 @@ Locate, control, model, create: where the fingertip presses; a virtual spring un
 reaches its set point, then force control; a cylinder and valve like a real one turns the
 effort into the master's height; the cells around follow the blister's profile.
 
-What concerns cells holds for those of one run, (m,), and of a batch, (m, b); what concerns a
-master is decided in plain numbers, run by run.
+Formulas for cells hold for one run, (m,), and for a batch, (m, b); decisions about a master are
+made in plain numbers, run by run.
 """
 
 from __future__ import annotations
@@ -34,16 +34,17 @@ from .ground import GROUNDS, EdgeGround, OwnGround, raise_blister
 from .servo import BatchControl, Tracking, lock_overloaded, mark_formed, sum_weighted
 from .travel import PARTS, Heading, Rim, measure_excess, update_heading
 
-#: Share of the total force that the cell in the middle of the fingertip carries while shaping, at least: 0.23
-#: to 0.33 of it measured while the fingertip moves slowly.
+#: Least share of the total force on the cell in the middle of the fingertip while shaping: 0.23 to 0.33 were
+#: measured under a slow fingertip.
 HEAVIEST = 0.25
 NONE = Constants((0.0,))
-#: Number of runs from which on their masters are led side by side: of fewer plain numbers take less time.
+#: Least number of runs whose masters are led side by side: for fewer, plain numbers are faster.
 MANY = 40
-#: Where an idle master stands, m: so far away that no cell is in its blister.
+#: Position of an idle master, m, so far away that no cell is in its blister.
 NOWHERE = 1e3
-#: Share of its radius that a blister in search of the fingertip may take along what is frozen: 1.5 of 15 mm.
-#: The paper's pins rise by 1.2 mm within the loss time, quick ones by 5 mm, which would be left as spikes.
+#: Largest rise of frozen cells with a blister that searches for the fingertip, as a share of its radius: 1.5
+#: of 15 mm. The paper's pins rise by 1.2 mm within the loss time, fast ones by 5 mm, which would remain as
+#: spikes.
 CARRIED = 0.1
 
 
@@ -54,27 +55,27 @@ class Phase(IntEnum):
     SPRING = 1
     SHAPING = 2
     LEAVING = 3
-    """Shaping under a fingertip that goes off the bed."""
+    """Shaping under a fingertip that moves off the bed."""
 
 
-#: Python looks a member of an enumeration up five times as long as a plain name.
+#: Python finds a plain name five times as fast as a member of an enumeration.
 IDLE, SPRINGING, SHAPING, LEAVING = Phase
 
 
 def bound(value: float, least: float, most: float) -> float:
-    """Return a number, not below the least and not above the most."""
+    """Return a number, limited to a range."""
     return least if value < least else most if value > most else value
 
 
 @dataclass(frozen=True, eq=False)
 class LossRule:
-    """Rule by which a fingertip that is not felt for a time, s, of control periods, s, is given up."""
+    """Rule to give up a fingertip that is not felt for a `time`, s; `period`: control period, s."""
 
     period: float
     time: float
 
     def is_given_up(self, alone: int) -> bool:
-        """Tell whether a fingertip not felt for some control periods has been away for the loss time."""
+        """Tell whether a fingertip has not been felt for the loss time; `alone`: control periods."""
         return alone * self.period >= self.time * (1.0 - 1e-9)
 
     def wait(self, memory: Memory) -> Any:
@@ -95,21 +96,21 @@ class Master(NamedTuple):
     y: float = 0.0
     height: float = 0.0
     opening: float = 0.0
-    """Where the master is, m, and the opening of its own valve."""
+    """Position of the master, m, and opening of its valve."""
     reference: float = 0.0
     edge: float = 0.0
-    """Surface height at first touch, from which the virtual spring is pressed down, and that around the
+    """Height of the surface at first touch, from which the virtual spring is compressed, and around the
     blister, m."""
     heading: Heading = Heading()
     felt: float = 0.0
     alone: int = 0
-    """Its height when the fingertip was last felt, m, and control periods since then."""
+    """Height when the fingertip was last felt, m, and control periods since then."""
     losses: int = 0
-    """How often the fingertip was lost while shaping."""
+    """Number of losses of the fingertip while shaping."""
 
     @property
     def position(self) -> tuple[float, float] | None:
-        """Where the fingertip is, m; None: none is followed."""
+        """Position of the fingertip, m; None if none is followed."""
         return None if self.phase is IDLE else (self.x, self.y)
 
     @property
@@ -131,7 +132,7 @@ class MasterCell:
     """At the Gauss points of a control period, then at its end, as ``a K + b K_com``."""
     flow: Flow
     laminar: bool
-    """The law of valve and conduit; whether no unloaded valve is turbulent."""
+    """Law of valve and conduit; whether the flow without load is always laminar."""
     up: float
     down: float
     area: float
@@ -157,7 +158,7 @@ class MasterCell:
 
 
 def make_master_cell(cell: Cell, period: float) -> MasterCell:
-    """Make the master's cylinder and valve like those of the real cells, for a control period, s."""
+    """Return the master's cylinder and valve, like those of the real cells; `period`: control period, s."""
     nodes = cell.lag.response(Queue(), [node * period for node in GAUSS] + [period])
     # Without a lag there is no column for the opening at the start.
     openings = tuple((row[0] if cell.lag.rows else 0.0, row[-1]) for row in nodes.tolist())
@@ -220,12 +221,12 @@ class VirtualMasterControl(BatchControl):
     blister: Blister
     actuator: Actuator
     model: MasterCell
-    """The master's own cylinder and valve."""
+    """Cylinder and valve of the master."""
     rim: Rim
     period: float
     lift: float
     floor: float = 0.0
-    """Force the high reservoir can lift, and from which on the reading of a cell is no noise, N."""
+    """Largest force that the high reservoir lifts, and noise floor of a cell's reading, N."""
     ground: EdgeGround | OwnGround = GROUNDS["edge"]
     """Surface from which the blister rises."""
 
@@ -234,21 +235,21 @@ class VirtualMasterControl(BatchControl):
 
     @property
     def rows(self) -> int:
-        """State rows a cell needs."""
+        """State rows per cell."""
         return self.ground.rows
 
     @property
     def pin_rows(self) -> range:
-        """Rows of the pin itself, whichever of several blisters it is in: its ground before the first."""
+        """Rows that fingers share: the ground of a pin before it is in the first blister."""
         return range(self.rows)
 
     @property
     def blister_radius(self) -> float:
-        """How far from the fingertip pins may be in its blister, m."""
+        """Largest distance of pins in the blister from the fingertip, m."""
         return self.blister.radius
 
     def find_batch_class(self, count: int) -> type[VirtualMasterControl]:
-        """Return the class of the controller of a batch of so many runs."""
+        """Return the class of the controller of a batch of `count` runs."""
         name = "VirtualMasterBatch" if count < MANY else "VirtualMasterColumns"
         kind: type[VirtualMasterControl] = import_part("control.masters", name)
         return kind
@@ -267,29 +268,29 @@ class VirtualMasterControl(BatchControl):
         if total < gains.felt_force:
             waiting: Master = self.loss.wait(master)
             return waiting
-        # A master that changes every period is made of all its numbers: `_replace` takes twice as long.
+        # `_make` of all numbers takes half as long as `_replace`, and happens every period.
         phase, _, _, height, opening, reference, edge, heading, felt, _, losses = master
         if phase is not IDLE:
             if near >= gains.felt_force:
                 x, y = round(near_x / near * PARTS) / PARTS, round(near_y / near * PARTS) / PARTS
                 reversal, reach = self.reversal, self.rim.reach
                 if self.rim.is_under(x, y, reach):
-                    # The patch grows and shrinks away from the rim: only farther back is another direction.
+                    # The contact patch varies beside the rim: only a longer way back is a new direction.
                     reversal = max(reversal, reach)
                 heading = update_heading(heading, x, y, gains.travel, reversal)
                 return Master._make((phase, x, y, height, opening, reference, edge, heading, felt, 0, losses))
-            # The fingertip has jumped out of reach: this is a new touch elsewhere.
+            # The fingertip has jumped out of reach: a new touch begins.
             losses += 1
         x, y = x / total, y / total
         return Master(SPRINGING, x, y, math.nan, heading=Heading(x, y), losses=losses)
 
     def is_new(self, master: Master) -> bool:
-        """Tell whether a master has found a fingertip, and has no height yet."""
-        # A comparison, since a batch asks once a run and period.
+        """Tell whether a master has located a fingertip, and has no height yet."""
+        # A comparison is faster than `isnan`: a batch calls this for each run and period.
         return not master.height > -math.inf
 
     def lead(self, master: Master, force: float, surface: float, noise: float = 0.0) -> Master:
-        """VM Control and VM Model: effort, and the height a real cell would make of it; N, N m, noise N."""
+        """VM Control and VM Model: effort, and the resulting height of a real cell; N, N m, noise N."""
         gains = self.parameters
         phase, x, y, height, opening, reference, edge, heading, felt, alone, losses = master
         if phase is IDLE:
@@ -298,7 +299,7 @@ class VirtualMasterControl(BatchControl):
             height = reference = felt = surface / force
             edge = bound(height, 0.0, self.actuator.stroke)
         if alone and self.loss.is_given_up(alone):
-            # What it rose in search of the fingertip is taken back, or every lift-off would leave a lump.
+            # The rise during the search is undone, or every lift-off would leave a lump.
             height = felt
         else:
             error = gains.force_setpoint - (force + noise)
@@ -307,7 +308,7 @@ class VirtualMasterControl(BatchControl):
                 effort = gains.position_gain * (reference - compressed - height)
             else:
                 effort = gains.force_gain * error
-                # Beyond the outer cells their forces no longer tell where the fingertip goes.
+                # Beyond the outer cells, forces no longer show where the fingertip moves.
                 leaves = self.rim.is_ahead(x, y, heading.toward_x, heading.toward_y)
                 leaves = leaves or (phase is LEAVING and self.rim.is_under(x, y))
                 phase = LEAVING if leaves else SHAPING
@@ -325,14 +326,14 @@ class VirtualMasterControl(BatchControl):
         return master.phase is not IDLE
 
     def get_pose(self, master: Master) -> tuple[float, float, float, float]:
-        """Return where a master is, m, and its direction of travel."""
+        """Return the position of a master, m, and its direction of travel."""
         _, _, toward_x, toward_y = master.heading
         if master.phase is IDLE:
             return NOWHERE, NOWHERE, toward_x, toward_y
         return master.x, master.y, toward_x, toward_y
 
     def set_edge(self, master: Master, level: float, count: int) -> Master:
-        """Put a master into a surface whose height is the mean of `count` cells; `level` is their sum, m."""
+        """Return a master with the mean height of `count` edge cells; `level`: sum of their heights, m."""
         if not count:
             return master
         phase, x, y, height, opening, reference, _, heading, felt, alone, losses = master
@@ -347,7 +348,7 @@ class VirtualMasterControl(BatchControl):
 
     @cached_property
     def loss(self) -> LossRule:
-        """When a fingertip is given up."""
+        """Rule to give up a fingertip."""
         return LossRule(self.period, self.parameters.loss_time)
 
     @cached_property
@@ -371,8 +372,8 @@ class VirtualMasterControl(BatchControl):
         (none,) = NONE[force.shape]
         total, *center = self.to_numbers(sum_weighted(basis, force))
         near = self.to_numbers(sum_weighted(basis, np.where(beyond > none, none, force)))
-        # Next to the master noise stays in the controlled force, for what is below the floor adds up; farther
-        # off only what is no noise counts, see docs/equations.md.
+        # Near the master the controlled force includes readings below the noise floor, since they add up;
+        # farther away only those above it count, see docs/equations.md.
         hidden = (beyond <= 0.0) & (touched.force < self.floor) if self._noisy else None
         noise = () if hidden is None else (self.to_numbers(sum_weighted(touched.force, hidden)),)
         memory = self.follow(memory, total, *center[:2], *near[:3])
@@ -381,7 +382,7 @@ class VirtualMasterControl(BatchControl):
         return memory, self.find_disc(memory)
 
     def command(self, memory: Memory, seen: Measurement) -> tuple[Memory, Commands]:
-        """Create the blister, freeze what is left behind, command every cell; see `Controller`."""
+        """Create the blister, freeze cells behind it, command every cell; see `Controller`."""
         target = seen.target
         mode = mark_formed(target, *self._limits[target.shape])
         if self.is_active(memory):
@@ -399,19 +400,19 @@ class VirtualMasterControl(BatchControl):
 
     @cached_property
     def _noisy(self) -> bool:
-        """Whether some reading may be noise."""
+        """Whether the sensors have noise."""
         return bool(np.any(self.floor))
 
     @cached_property
     def _rule(self) -> BlisterRule:
-        """Which cells of the blister are frozen, and which are touched."""
+        """Rule for frozen and touched cells of the blister."""
         gains = self.parameters
         release = np.maximum(gains.release_force, self.floor) if self._noisy else gains.release_force
         return BlisterRule(self.blister, gains.behind, release, self.floor)
 
     @cached_property
     def _limits(self) -> Constants:
-        """Height of a pin at rest, and how far from it one counts as formed, m."""
+        """Rest height, and distance from it of a formed pin, m."""
         return Constants((self.actuator.rest_height, self.parameters.dead_band))
 
 
