@@ -46,8 +46,8 @@ INSTANTS = {
     "two_hands_bowl": 9.0,
     "viscous_press": 2.7,
 }
-#: Area of a picture of 640 x 400 pixels beside its legend, and the size of a sample's picture, pixels.
-BESIDE, SMALL = (120, 10, 640, 400), (260, 195)
+#: Area of a picture of 640 x 400 pixels beside its legend.
+BESIDE = (120, 10, 640, 400)
 #: Film of one of them: a series, and how long a frame is shown, ms.
 HAND_FILM, SHOWN_FOR = (
     """\
@@ -142,9 +142,7 @@ def draw_hands(folder: Path, name: str) -> None:
 
 def draw_sample(folder: Path, name: str) -> None:
     """Draw a sample scene for the table of all."""
-    with Image.open(draw_instant(folder, name, "640x400")) as opened:
-        small = opened.convert("RGB").crop(BESIDE).resize(SMALL, Image.Resampling.LANCZOS)
-    small.save(PICTURES / "samples" / f"{name}.jpg", quality=85, optimize=True)
+    save_jpeg(draw_instant(folder, name, "640x400"), f"samples/{name}.jpg", 70, BESIDE)
 
 
 def draw_hand_film(folder: Path) -> None:

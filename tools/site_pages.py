@@ -276,14 +276,13 @@ def make_parameters_page() -> str:
 
 def make_samples_page() -> str:
     """Return the page of all sample scenes."""
-    rows = [("", "Scene", "Control method", "Fingers", "Pins", "Duration")]
+    rows = [("", "Scene", "Control method", "Fingers", "Duration, s")]
     for name in list_samples():
         scene = load(find(name))
-        picture = f'![{name}](../pictures/samples/{name}.jpg){{ style="min-width: 195px" }}'
+        picture = f'![{name}](../pictures/samples/{name}.jpg){{ style="min-width: 195px; max-width: 195px" }}'
         words = f"`{name}`<br>{write_cell(scene.description)}"
-        pins = f"{scene.layout.rows}\u00a0×\u00a0{scene.layout.columns}"
-        duration = f"{scene.periods * scene.simulation.control_period:.3g}\u00a0s"
-        rows.append((picture, words, f"`{scene.method}`", str(len(scene.fingers)), pins, duration))
+        duration = f"{scene.periods * scene.simulation.control_period:.3g}"
+        rows.append((picture, words, f"`{scene.method}`", str(len(scene.fingers)), duration))
     return SAMPLES + write_table(*rows)
 
 
@@ -304,7 +303,7 @@ def list_packages() -> dict[str, list[str]]:
 def make_python_page() -> str:
     """Return the page of what `digiclay` offers in Python."""
     arrays = [
-        (f"`{name}`", str(array.axes).replace("'", ""), KINDS[array.kinds], array.unit, array.meaning)
+        (f"`{name}`", f"({array.axes})", KINDS[array.kinds], array.unit, array.meaning)
         for name, array in HISTORY_ARRAYS.items()
     ]
     modes = [(str(int(mode)), mode.name.lower(), meaning) for mode, meaning in MEANINGS.items()]

@@ -30,8 +30,8 @@ KINDS = {"if": "numbers", "i": "whole numbers", "b": "truth values"}
 class HistoryArray(NamedTuple):
     """Array of a history."""
 
-    axes: tuple[str | int, ...]
-    """Sizes: t rows, n pins, f fingers; of one finger without the axis f."""
+    axes: str
+    """Shape: t rows, n pins, f fingers; of one finger without the axis f."""
     unit: str
     meaning: str
     kinds: str = "if"
@@ -42,22 +42,22 @@ class HistoryArray(NamedTuple):
 
 #: Arrays of a history, by name: those that a run records, ``history.npz`` holds and `read_run` accepts.
 HISTORY_ARRAYS: dict[str, HistoryArray] = {
-    "time": HistoryArray(("t",), "s", "time of the row; row 0 is the bed before the first control period"),
-    "height": HistoryArray(("t", "n"), "m", "height of each pin's top over the floor of the bed"),
-    "force": HistoryArray(("t", "n"), "N", "force of all fingers on each pin, positive downwards"),
+    "time": HistoryArray("t", "s", "time of the row; row 0 is the bed before the first control period"),
+    "height": HistoryArray("t, n", "m", "height of each pin's top over the floor of the bed"),
+    "force": HistoryArray("t, n", "N", "force of all fingers on each pin, positive downwards"),
     "command": HistoryArray(
-        ("t", "n"), "1", "valve command of each pin in the control period that begins with the row, -1 to 1"
+        "t, n", "1", "valve command of each pin in the control period that begins with the row, -1 to 1"
     ),
-    "mode": HistoryArray(("t", "n"), "1", "code of each pin's mode in that control period", "i"),
+    "mode": HistoryArray("t, n", "1", "code of each pin's mode in that control period", "i"),
     "fingertip": HistoryArray(
-        ("t", "f", 7), "m, 1", "pose of each fingertip: its lowest point x, y, z, its quaternion w, x, y, z"
+        "t, f, 7", "m, 1", "pose of each fingertip: its lowest point x, y, z, its quaternion w, x, y, z"
     ),
-    "total_force": HistoryArray(("t",), "N", "force of all fingers on all pins"),
-    "finger_force": HistoryArray(("t", "f"), "N", "force of each of several fingers", optional=True),
+    "total_force": HistoryArray("t", "N", "force of all fingers on all pins"),
+    "finger_force": HistoryArray("t, f", "N", "force of each of several fingers", optional=True),
     "beyond_a_finger": HistoryArray(
-        ("t",), "1", "whether a finger presses beyond the range of the contact law", "b", optional=True
+        "t", "1", "whether a finger presses beyond the range of the contact law", "b", optional=True
     ),
-    "position": HistoryArray(("n", 2), "m", "x and y of each pin's axis from the middle of the bed"),
+    "position": HistoryArray("n, 2", "m", "x and y of each pin's axis from the middle of the bed"),
 }
 
 
@@ -121,8 +121,9 @@ def _refuse(path: Path, scene: Scene, heads: Mapping[str, Head]) -> None:
         raise OutputError(f"{path} {rule} (got {rows:,}).")
     sizes = {"n": scene.cells, "t": rows, "f": len(scene.fingers)}
     for name, head in heads.items():
-        axes = (size for size in HISTORY_ARRAYS[name].axes if size != "f" or len(scene.fingers) > 1)
-        shape = tuple(sizes[size] if isinstance(size, str) else size for size in axes)
+        axes = HISTORY_ARRAYS[name].axes.split(", ")
+        several = len(scene.fingers) > 1
+        shape = tuple(sizes.get(axis) or int(axis) for axis in axes if axis != "f" or several)
         if head.shape != shape:
             raise OutputError(f"{path}: {name} must have the shape {shape} of its scene (got {head.shape}).")
         kinds = HISTORY_ARRAYS[name].kinds
