@@ -1,5 +1,7 @@
 """Export, Make Mesh with its shading, and the list of features, as a user of Blender has them."""
 
+from fnmatch import fnmatchcase
+
 import bpy
 import numpy as np
 import pytest
@@ -115,7 +117,11 @@ def test_an_obj_stands_upright_after_its_import_with_the_same_axes(bed, tmp_path
         ("five.part", None, "five.part.stl"),
     ],
 )
-def test_a_file_has_the_ending_of_its_format(bed, tmp_path, name, file_format, written):
+def test_a_file_has_the_ending_of_its_format_and_the_dialog_lists_it(
+    bed, tmp_path, name, file_format, written
+):
+    shown = bpy.ops.export_mesh.digital_clay.get_rna_type().properties["filter_glob"].default.split(";")
+    assert any(fnmatchcase(written.lower(), pattern) for pattern in shown)
     options = {"file_format": file_format} if file_format else {}
     bpy.ops.export_mesh.digital_clay(filepath=str(tmp_path / name), kind="surface", **options)
     assert [path.name for path in tmp_path.iterdir()] == [written]

@@ -68,7 +68,9 @@ def test_the_check_notices_a_request_to_another_machine(browser: Any, tmp_path: 
 
 
 @pytest.mark.parametrize("width", [390, 1400])
-@pytest.mark.parametrize("page", ["index.html", "guide.html", "reference/commands.html", "paper.html"])
+@pytest.mark.parametrize(
+    "page", ["index.html", "guide.html", "reference/commands.html", "reference/samples.html", "paper.html"]
+)
 def test_no_page_is_wider_than_the_window(site: Path, browser: Any, page: str, width: int) -> None:
     size = {"width": width, "height": 800, "deviceScaleFactor": 1, "mobile": width < 700}
     browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
