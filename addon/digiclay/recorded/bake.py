@@ -26,7 +26,18 @@ from ..core.model.fingertip import Fingertip
 from ..core.model.layout import make_grid
 from ..core.session.take import Take, play
 from ..device import view
-from ..device.node_tree import attribute, enabled, mesh_of, new_tree, node, number, sample, socket, store
+from ..device.node_tree import (
+    attribute,
+    enabled,
+    finish,
+    mesh_of,
+    new_tree,
+    node,
+    number,
+    sample,
+    socket,
+    store,
+)
 from ..roles import BAKE, PALM, ROLE, fingertips_of, owner_of
 
 #: The setting that is keyframed: which moment to show, from 0 on; between two of them heights are blended.
@@ -37,30 +48,30 @@ def playback_nodes(bake: Object, moments: int) -> NodeTree:
     """Make the node group that moves the pins of a bed to where object `bake` has them at a moment."""
     tree = new_tree("Digital Clay Bake")
     socket(tree, MOMENT, "NodeSocketFloat", 0.0, "Which baked moment to show, counted from 0")
-    settings, table = node(tree, "NodeGroupInput", 0, 0), mesh_of(tree, bake, 2, -2)
+    settings, table = node(tree, "NodeGroupInput"), mesh_of(tree, bake)
     cells = settings.outputs["Geometry"]
 
-    least = number(tree, "MAXIMUM", 1, 1, settings.outputs[MOMENT], 0.0)
-    moment = number(tree, "MINIMUM", 2, 1, least, float(moments - 1))
-    before, after = number(tree, "FLOOR", 3, 1, moment), number(tree, "CEIL", 3, 2, moment)
-    part = number(tree, "SUBTRACT", 4, 4, moment, before)
-    count = node(tree, "GeometryNodeAttributeDomainSize", 1, 3, {"Geometry": cells}).outputs["Point Count"]
-    pin = node(tree, "GeometryNodeInputIndex", 4, 3).outputs["Index"]
-    first = number(tree, "MULTIPLY_ADD", 5, 1, before, count, pin)
-    second = number(tree, "MULTIPLY_ADD", 5, 2, after, count, pin)
+    least = number(tree, "MAXIMUM", settings.outputs[MOMENT], 0.0)
+    moment = number(tree, "MINIMUM", least, float(moments - 1))
+    before, after = number(tree, "FLOOR", moment), number(tree, "CEIL", moment)
+    part = number(tree, "SUBTRACT", moment, before)
+    count = node(tree, "GeometryNodeAttributeDomainSize", {"Geometry": cells}).outputs["Point Count"]
+    pin = node(tree, "GeometryNodeInputIndex").outputs["Index"]
+    first = number(tree, "MULTIPLY_ADD", before, count, pin)
+    second = number(tree, "MULTIPLY_ADD", after, count, pin)
 
-    position = node(tree, "GeometryNodeInputPosition", 5, -1).outputs["Position"]
+    position = node(tree, "GeometryNodeInputPosition").outputs["Position"]
     ends = {
-        "A": sample(tree, table, position, "FLOAT_VECTOR", first, 7, 0),
-        "B": sample(tree, table, position, "FLOAT_VECTOR", second, 7, 1),
+        "A": sample(tree, table, position, "FLOAT_VECTOR", first),
+        "B": sample(tree, table, position, "FLOAT_VECTOR", second),
     }
-    blend = node(tree, "ShaderNodeMix", 8, 1, {"Factor": part, **ends}, data_type="VECTOR")
+    blend = node(tree, "ShaderNodeMix", {"Factor": part, **ends}, data_type="VECTOR")
     moved = {"Geometry": cells, "Position": enabled(blend.outputs, "Result")}
-    shown = node(tree, "GeometryNodeSetPosition", 9, 0, moved).outputs["Geometry"]
-    for row, (name, (kind, _, _)) in enumerate(ATTRIBUTES.items(), 3):
-        value = sample(tree, table, attribute(tree, name, kind, 6, row), kind, first, 7, row)
-        shown = store(tree, shown, name, kind, value, 9, row)
-    node(tree, "NodeGroupOutput", 10, 0, {"Geometry": shown})
+    shown = node(tree, "GeometryNodeSetPosition", moved).outputs["Geometry"]
+    for name, (kind, _, _) in ATTRIBUTES.items():
+        value = sample(tree, table, attribute(tree, name, kind), kind, first)
+        shown = store(tree, shown, name, kind, value)
+    finish(tree, shown)
     return tree
 
 
