@@ -73,36 +73,45 @@ class Readings:
         return end - self.seconds, end
 
 
-@dataclass(frozen=True)
+@dataclass
 class Pen:
-    """Target of a section's drawing: picture, colors, position, width, scale."""
+    """Draws the readings of a session from the top down: colors, position, width, scale, pixels."""
 
-    picture: Picture
+    readings: Readings
     look: Look
     x: float
+    #: Top of what is drawn next.
+    y: float
     width: float
     scale: float
+    picture: Picture = field(default_factory=Picture)
 
-    def row(self, top: float, left: str, right: str = "", small: bool = False) -> float:
-        """Write a row of two texts, left and right; return the top of the next one, pixels."""
+    def row(self, left: str, right: str = "", small: bool = False) -> None:
+        """Write a row of two texts, left and right."""
         size = (SMALL if small else LETTERS) * self.scale
         size *= min(1.0, self.width / (LETTER * size * max(1, len(left) + len(right) + 1)))
         color = self.look.faint if small else self.look.ink
-        y = top - 0.75 * ROW * self.scale
+        y = self.y - 0.75 * ROW * self.scale
         for x, text, at_right in ((self.x, left, False), (self.x + self.width, right, True)):
             if text:
                 self.picture.words.append(Words(x, y, size, color, text, at_right))
-        return top - ROW * self.scale
+        self.y -= ROW * self.scale
 
-    def plot(self, readings: Readings, top: float, ends: tuple[float, float], unit: str) -> Box:
+    def leave(self, gap: float = GAP) -> None:
+        """Leave a gap, at a UI scale of 1."""
+        self.y -= gap * self.scale
+
+    def plot(self, ends: tuple[float, float], unit: str) -> Box:
         """Draw the frame of a plot, its axis and the time shown; return the box of its curves."""
-        box = Box(self.x, top - PLOT * self.scale, self.width, PLOT * self.scale, self.look.back)
+        top, height = self.y, PLOT * self.scale
+        box = Box(self.x, top - height, self.width, height, self.look.back)
         step, size = 3.0 * self.scale, SMALL * self.scale
         for y, value, lift in ((box.y, ends[0], step), (top, ends[1], -size)):
             self.level(box, y, self.look.frame, 1.0)
             label = f"{value:g} {unit}"
             self.picture.words.append(Words(box.x + step, y + lift, size, self.look.faint, label))
-        self.row(box.y, "", localize("last {:g} s", readings.seconds), small=True)
+        self.y = box.y
+        self.row("", localize("last {:g} s", self.readings.seconds), small=True)
         return box
 
     def level(self, box: Box, y: float, color: Color, width: float, *, dashed: bool = False) -> None:
@@ -111,26 +120,24 @@ class Pen:
         line = np.array([[start, y], [box.x + box.width, y]])
         self.picture.lines.append(Line(line, color, width * self.scale, dashed))
 
-    def curve(
-        self, readings: Readings, value: Floats, ends: tuple[float, float], box: Box, color: Color
-    ) -> None:
+    def curve(self, value: Floats, ends: tuple[float, float], box: Box, color: Color) -> None:
         """Draw a curve (t,) into the box of a plot."""
-        points = scale_curve(readings.time, value, readings.window, ends, box)
+        points = scale_curve(self.readings.time, value, self.readings.window, ends, box)
         if len(points) > 1:
             self.picture.lines.append(Line(points, color, 1.5 * self.scale))
 
-    def entries(self, top: float, columns: int, entries: Sequence[tuple[Color, str]]) -> float:
-        """Draw dots and what they stand for, row by row; return the bottom of the last row, pixels."""
+    def entries(self, columns: int, entries: Sequence[tuple[Color, str]]) -> None:
+        """Draw dots and what they stand for, row by row."""
         radius = 4.0 * self.scale
         size = (SMALL + 1.0) * self.scale
         for number, (color, text) in enumerate(entries):
             row, column = divmod(number, columns)
-            x, y = self.x + column * self.width / columns, top - (row + 0.75) * ROW * self.scale
+            x, y = self.x + column * self.width / columns, self.y - (row + 0.75) * ROW * self.scale
             middle = y + 0.36 * size
             self.picture.dots.append(Dot(x + radius, middle, radius + self.scale, self.look.frame))
             self.picture.dots.append(Dot(x + radius, middle, radius, color))
             self.picture.words.append(Words(x + 3.5 * radius, y, size, self.look.ink, text))
-        return top - math.ceil(len(entries) / columns) * ROW * self.scale
+        self.y -= math.ceil(len(entries) / columns) * ROW * self.scale
 
 
 def error_message(errors: Sequence[float] | None) -> str:
@@ -163,19 +170,21 @@ def describe_state(readings: Readings) -> str:
     return "" if readings.factor is None else localize("{:.2f} x real time", readings.factor)
 
 
-def _draw_head(readings: Readings, pen: Pen, top: float) -> float:
+def _draw_head(pen: Pen) -> None:
     """Name the bed, the method and how well the simulation keeps up."""
-    top = pen.row(top, readings.name, describe_state(readings))
-    top = pen.row(top, localize("Method: {}", localize(readings.method.replace("_", " ") or "none")))
-    return pen.row(top, error_message(readings.errors), small=True) - GAP * pen.scale
+    readings = pen.readings
+    pen.row(readings.name, describe_state(readings))
+    pen.row(localize("Method: {}", localize(readings.method.replace("_", " ") or "none")))
+    pen.row(error_message(readings.errors), small=True)
+    pen.leave()
 
 
-def _draw_force(readings: Readings, pen: Pen, top: float) -> float:
+def _draw_force(pen: Pen) -> None:
     """Draw the force over the last seconds, of several fingertips each one's, its set point dashed."""
-    now = _tell_force(readings) if readings.force.size else ""
+    readings = pen.readings
     words = "set point {:.2f} N each" if readings.hardest is not None else "set point {:.2f} N"
     asked = "" if readings.set_point is None else localize(words, readings.set_point)
-    top = pen.row(top, localize("Total force  {}", now), asked)
+    pen.row(localize("Total force  {}", _tell_force(readings)), asked)
     # A sum would flatten the force of each.
     curves = list(zip(readings.finger_force.T, (color for _, color in readings.fingers), strict=False))
     curves = curves or [(readings.force, pen.look.force)]
@@ -185,70 +194,79 @@ def _draw_force(readings: Readings, pen: Pen, top: float) -> float:
         largest = min(max(largest, 1.2 * asked_for), MOST * asked_for)
     largest = max(largest, LEAST_FORCE)
     ends = (0.0, round_axis(0.0, largest)[1])
-    box = pen.plot(readings, top, ends, "N")
+    box = pen.plot(ends, "N")
     if readings.set_point is not None:
         y = box.y + readings.set_point / ends[1] * box.height
         pen.level(box, y, pen.look.set_point, 1.5, dashed=True)
     for curve, color in curves:
-        pen.curve(readings, curve, ends, box, make_legible(color, pen.look.back, LINES))
-    return _draw_fingers(readings, pen, box.y - ROW * pen.scale) - GAP * pen.scale
+        pen.curve(curve, ends, box, make_legible(color, pen.look.back, LINES))
+    _draw_fingers(pen)
+    pen.leave()
 
 
-def _draw_fingers(readings: Readings, pen: Pen, top: float) -> float:
+def _draw_fingers(pen: Pen) -> None:
     """List the force of each of several fingertips by number."""
-    now = readings.finger_force[-1] if len(readings.finger_force) else np.zeros(len(readings.fingers))
-    texts = zip(readings.fingers, now, strict=True)
+    fingers, forces = pen.readings.fingers, pen.readings.finger_force
+    texts = zip(fingers, forces[-1] if len(forces) else np.zeros(len(fingers)), strict=True)
     entries = [(color, f"{number}: {force:.2f} N") for (number, color), force in texts]
-    return pen.entries(top, int(pen.width / (FINGER * pen.scale)), entries)
+    pen.entries(int(pen.width / (FINGER * pen.scale)), entries)
 
 
 def _tell_force(readings: Readings) -> str:
-    """Return the text of the total force now."""
+    """Return the text of the total force now; empty before there is one."""
+    if not readings.force.size:
+        return ""
     return force_message(float(readings.force[-1]), beyond=readings.beyond, hardest=readings.hardest)
 
 
-def _draw_heights(readings: Readings, pen: Pen, top: float) -> float:
+def _draw_heights(pen: Pen) -> None:
     """Draw the heights of the picked pins over the last seconds."""
-    gap = GAP * pen.scale
-    if not readings.pins:
-        return pen.row(top, localize("Pick pins to see their heights (Laboratory)"), small=True) - gap
-    top = pen.row(top, localize("Heights of picked pins"))
+    readings = pen.readings
+    if readings.pins:
+        _plot_heights(pen)
+    else:
+        pen.row(localize("Pick pins to see their heights (Laboratory)"), small=True)
+    pen.leave()
+
+
+def _plot_heights(pen: Pen) -> None:
+    """Draw the curve of each picked pin, and list its height now."""
+    readings = pen.readings
+    pen.row(localize("Heights of picked pins"))
     values = readings.heights * 1e3
     recent = values[readings.time >= readings.window[0]]
     finite = recent[np.isfinite(recent)]
     low, high = (float(finite.min()), float(finite.max())) if finite.size else (0.0, 0.0)
     spare = max(0.0, LEAST_SPAN - (high - low)) / 2
     ends = round_axis(low - spare, high + spare)
-    box = pen.plot(readings, top, ends, "mm")
+    box = pen.plot(ends, "mm")
     entries = []
     for pin, color, curve in zip(readings.pins, pen.look.pins, values.T, strict=False):
-        pen.curve(readings, curve, ends, box, color)
+        pen.curve(curve, ends, box, color)
         now = f" {curve[-1]:.1f} mm" if np.isfinite(curve[-1:]).any() else ""
         entries.append((color, f"{pin}:{now}"))
-    return pen.entries(box.y - ROW * pen.scale, 3, entries) - gap
+    pen.entries(3, entries)
 
 
-def _draw_scale(readings: Readings, pen: Pen, top: float) -> float:
+def _draw_scale(pen: Pen) -> None:
     """Draw the colors of the force on a pin, if the pins wear them."""
-    if readings.top is None:
-        return top
-    top = pen.row(top, localize("Force on a pin"))
+    if pen.readings.top is None:
+        return
+    pen.row(localize("Force on a pin"))
     width, height = pen.width / len(heat.COLORS), 0.5 * ROW * pen.scale
+    pen.y -= height
     for level, color in enumerate(heat.COLORS):
-        pen.picture.boxes.append(Box(pen.x + level * width, top - height, width, height, color))
-    # A tenth of a row is left below.
-    return pen.row(top - height, "0 N", f"{readings.top:.3g} N", small=True) - 0.1 * ROW * pen.scale
+        pen.picture.boxes.append(Box(pen.x + level * width, pen.y, width, height, color))
+    pen.row("0 N", f"{pen.readings.top:.3g} N", small=True)
+    pen.leave(0.1 * ROW)
 
 
-def _draw_modes(readings: Readings, pen: Pen, top: float) -> float:
+def _draw_modes(pen: Pen) -> None:
     """List how many pins are in each mode that occurs, with its color."""
-    top = pen.row(top, localize("Pins by mode"), f"{int(readings.modes.sum())}")
-    entries = []
-    for mode in Mode:
-        if readings.modes[mode]:
-            name = localize(mode.name.lower().replace("_", " "))
-            entries.append((readings.colors[mode], f"{readings.modes[mode]} {name}"))
-    return pen.entries(top, 2, entries)
+    modes, colors = pen.readings.modes, pen.readings.colors
+    pen.row(localize("Pins by mode"), f"{int(modes.sum())}")
+    names = {mode: localize(mode.name.lower().replace("_", " ")) for mode in Mode if modes[mode]}
+    pen.entries(2, [(colors[mode], f"{modes[mode]} {name}") for mode, name in names.items()])
 
 
 def _size(error: float, unit: str) -> str:
@@ -256,18 +274,19 @@ def _size(error: float, unit: str) -> str:
     return f"{error:.2g} {unit}" if error >= 0.01 else localize("0.01 {} or less", unit)
 
 
-def _draw_brief(readings: Readings, pen: Pen, top: float) -> float:
+def _draw_brief(pen: Pen) -> None:
     """Write force, set point, simulated time and state in two rows."""
-    now = _tell_force(readings) if readings.force.size else localize("no force yet")
+    readings = pen.readings
     words = "{:.2f} N each" if readings.hardest is not None else "of {:.2f} N"
     asked = "" if readings.set_point is None else localize(words, readings.set_point)
-    top = pen.row(top, now, asked)
+    pen.row(_tell_force(readings) or localize("no force yet"), asked)
     time = float(readings.time[-1]) if readings.time.size else 0.0
-    return _draw_fingers(readings, pen, pen.row(top, f"{time:.1f} s", describe_state(readings)))
+    pen.row(f"{time:.1f} s", describe_state(readings))
+    _draw_fingers(pen)
 
 
-#: Draws readings with a pen from the top of a section, pixels; returns its bottom.
-Section = Callable[[Readings, Pen, float], float]
+#: Draws a section with a pen.
+Section = Callable[[Pen], None]
 
 
 class Content(NamedTuple):
@@ -348,11 +367,11 @@ def lay_out(
     # How high it stands follows from its height, so it is drawn below 0 and then moved up.
     shown, height, space = Picture(), 0.0, SHARE * (top - bottom) - 2 * padding
     for section in content.sections:
-        pen = Pen(Picture(), look, x + padding, width - 2 * padding, scale)
-        below = -section(readings, pen, -height)
-        if below <= space:
+        pen = Pen(readings, look, x + padding, -height, width - 2 * padding, scale)
+        section(pen)
+        if -pen.y <= space:
             shown.add(pen.picture)
-            height = below
+            height = -pen.y
     if not height:
         return Picture()
     tall = height + 2 * padding
