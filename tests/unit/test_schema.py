@@ -89,6 +89,7 @@ WRONG = [
         {"control": {"method": "hybrid", "force_gain": 1}},
         "control.force_gain must be a parameter of hybrid (got 1). It is one of virtual_master, cell_states.",
     ),
+    ({"layout": {"pitch": 4}}, "layout.pitch must be at most 0.5 m (got 4 m)."),
     ({"valve": {"orifice_diamater": 1}}, "valve.orifice_diamater must be a known key (got 1). Did you mean"),
     ({"fluid": {"xyz": 1}}, "fluid.xyz must be a known key (got 1). Known here: density, viscosity."),
     ({"valv": {"a": 1}}, "valv must be a known key (got a section). Did you mean valve?"),

@@ -62,8 +62,15 @@ class Layout(Parameters):
     columns: int = quantity(
         25, "number of cells in a row, along x", symbol="n_x", source="P", at_least=1, at_most=10_000
     )
+    # More is a number in millimeters whose unit was forgotten.
     pitch: float = quantity(
-        3e-3, "distance of neighboring cells in a row", unit="m", symbol="p", source="P", above=0.0
+        3e-3,
+        "distance of neighboring cells in a row",
+        unit="m",
+        symbol="p",
+        source="P",
+        above=0.0,
+        at_most=0.5,
     )
     arrangement: str = quantity(
         "aligned",
