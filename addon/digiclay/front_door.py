@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import base64
-import importlib.util
+import io
+import itertools
 import os
-import tempfile
 import warnings
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
@@ -16,27 +16,34 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .core.base.errors import DigiclayError, OutputError, ParameterError, SceneError
+from .core.base.errors import OutputError, ParameterError, SceneError
 from .core.control.methods import list_added
 from .core.files.run_folder import write_folder
 from .core.files.tables import Record, Table, format_html
-from .core.mesh_io.export_model import Model, find_features, make_bodies
+from .core.mesh_io.export_model import Model, make_bodies
 from .core.mesh_io.mesh_writer import write
-from .core.metrics.metric_table import describe_losses
 from .core.scene.scene_source import Setting, Source, list_changes, make_scene, read_source, write_word
 from .core.scene.schema import Scene
 from .core.session import finished_run, run_scene
 from .core.session.probes import require_scene
 from .core.studies.axes import make_axis, make_columns, make_points
-from .core.studies.evaluation import evaluate_bundle, find_figure, judge_all, make_bundles, require_recorder
-from .core.studies.sweep_plan import EFFORT
-from .core.surface.features import Feature, Finding
+from .core.studies.evaluation import (
+    evaluate_bundle,
+    find_figure,
+    judge_all,
+    make_bundles,
+    require_any,
+    require_recorder,
+)
+from .core.studies.sweep_plan import EFFORT, make_rows
+from .core.surface.features import Finding
 from .core.surface.formed import Formed, make_formed
+from .plots.figure import save
+from .plots.run import session_figure
 from .plugins.method_loader import (
     describe_origin,
     find_code,
     is_in_memory,
-    load_class,
     load_method,
     write_code,
 )
@@ -90,10 +97,6 @@ class Surface:
         """
         model = Model(kind=kind, skin=skin, cap=self.scene.actuator.bore / 2.0)
         return write(make_bodies(self.formed, model, Finding()), read_path(path), unit)
-
-    def features(self) -> list[Feature]:
-        """Return bosses and creases, at least 0.5 mm off the former surface; lengths in m."""
-        return find_features(self.formed, Model(), Finding())
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -153,13 +156,12 @@ class Result(run_scene.Result):
         """
         self.require_history("surface")
         finished_run.require_surface(self.scene, "surface")
-        for name, moment in (("time", time), ("former", former)):
-            if not (moment is None or isinstance(moment, (int, float))):
-                raise ParameterError("surface", name, "must be a number of seconds", repr(moment))
-        row = -1 if time is None else finished_run.find_row(self.history, time, "time")
-        return Surface(
-            self.scene, make_formed(self.history, row, finished_run.find_row(self.history, former, "former"))
+        last = self.history["time"][-1]
+        row, before = (
+            finished_run.find_row(self.history, moment, name)
+            for name, moment in (("time", last if time is None else time), ("former", former))
         )
+        return Surface(self.scene, make_formed(self.history, row, before))
 
     def plot(self, path: str | os.PathLike[str]) -> Path:
         """Draw heights of selected pins and force over time; needs ``digiclay[plots]``.
@@ -179,9 +181,6 @@ class Result(run_scene.Result):
         DigiclayError
             Without matplotlib or a history, for another ending, or if the file cannot be written.
         """
-        from .plots.figure import save
-        from .plots.run import session_figure
-
         self.require_history("plot")
         out = read_path(path)
         if out.suffix not in PLOTS:
@@ -191,40 +190,33 @@ class Result(run_scene.Result):
     def _repr_html_(self) -> str:
         """Return a table for a notebook, with the plot where matplotlib is installed."""
         table = format_html(f"Run of {self.scene.name or 'a scene'}", self.describe())
-        if not self.history or importlib.util.find_spec("matplotlib") is None:
+        try:
+            self.require_history("plot")
+            figure = session_figure(self.history, self.scene.set_point)
+        except OutputError:
             return table
-        with tempfile.TemporaryDirectory() as folder:
-            picture = base64.b64encode(self.plot(Path(folder) / "run.png").read_bytes()).decode()
-        source = f"data:image/png;base64,{picture}"
+        content = io.BytesIO()
+        figure.savefig(content, format="png")
+        source = f"data:image/png;base64,{base64.b64encode(content.getvalue()).decode()}"
         return f'{table}<img alt="heights and force over time" width="800" src="{source}">'
-
-
-def name_method(value: Any) -> Any:
-    """Return the name of a method that is given as a class or as the word of a file; else the value."""
-    if isinstance(value, type):
-        return load_class(value)
-    return load_method(value) if isinstance(value, str) else value
 
 
 def write_value(key: str, value: Any) -> str:
     """Return the word of a value in a scene file, with the method loaded that it names."""
-    return write_word(name_method(value) if key == METHOD else value)
+    return write_word(load_method(value) if key == METHOD and isinstance(value, (str, type)) else value)
 
 
 def change_scene(source: Source, changes: Table | None) -> Scene:
     """Return the scene of a source with changes, whose methods are loaded."""
     if changes is not None and not isinstance(changes, Mapping):
         raise SceneError(f"Changes must be a table of keys and values (got {changes!r:.60}).")
+    path, table = read_source(source)
+    control, given = table.get("control"), list(list_changes(changes or {}))
     if isinstance(source, Scene):
         find_code(source)  # refuses one of former code
-    path, table = read_source(source)
-    control = table.get("control")
-    if isinstance(source, Mapping) and isinstance(control, Mapping) and "method" in control:
-        table = {**table, "control": {**control, "method": name_method(control["method"])}}
-    settings = []
-    for key, value in list_changes(changes or {}):
-        settings.append(Setting(key, write_value(key, value), "changes"))
-    return make_scene(path, table, settings)
+    elif isinstance(source, Mapping) and isinstance(control, Mapping) and "method" in control:
+        given.insert(0, (METHOD, control["method"]))
+    return make_scene(path, table, [Setting(key, write_value(key, value), "changes") for key, value in given])
 
 
 def run(scene: Scene, progress: Callable[[int, int], None] | None, *, errors: bool) -> Result:
@@ -269,17 +261,11 @@ def sweep(
         if progress:
             progress(len(records), len(points))
     rows = [records[point.index] for point in points]
-    failed = [row["error"] for row in rows if "error" in row]
-    if len(failed) == len(rows):
-        raise DigiclayError(f"Every point failed; the first one: {failed[0]}")
-    grid = np.meshgrid(*(column.values for column in make_columns(points, axes)), indexing="ij")
-    columns = {axis.key: values.ravel() for axis, values in zip(axes, grid, strict=True)}
-    for name in dict.fromkeys((*names, *EFFORT)):
-        figures = [row.get("figures", {}).get(name) for row in rows]
-        columns[name] = np.array([np.nan if figure is None else figure for figure in figures])
-    columns["lost"] = np.array([describe_losses(row) for row in rows])
-    columns["error"] = np.array([row.get("error", "") for row in rows])
-    table = np.empty(len(rows), [(name, values.dtype) for name, values in columns.items()])
-    for name, values in columns.items():
-        table[name] = values
-    return table
+    require_any(rows)
+    names = list(dict.fromkeys((*names, *EFFORT)))
+    values = itertools.product(*(column.values for column in make_columns(points, axes)))
+    lines = zip(*make_rows(values, rows, names), strict=True)
+    columns = [np.array([np.nan if cell is None else cell for cell in column]) for column in lines]
+    heads = [*varied, *names, "lost", "error"]
+    kinds = [(head, column.dtype) for head, column in zip(heads, columns, strict=True)]
+    return np.array(list(zip(*columns, strict=True)), kinds)

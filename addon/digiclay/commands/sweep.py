@@ -6,7 +6,7 @@ import sys
 from functools import partial
 from pathlib import Path
 
-from ..core.base.errors import DigiclayError, OutputError
+from ..core.base.errors import OutputError
 from ..core.files.run_folder import write_whole
 from ..core.files.tables import Record
 from ..core.metrics.metric_table import ERRORS
@@ -18,6 +18,7 @@ from ..core.studies.evaluation import (
     judge_all,
     make_bundles,
     read_metrics,
+    require_any,
     require_recorder,
 )
 from ..core.studies.sweep_plan import format_table, make_grid, open_sweep
@@ -67,9 +68,7 @@ def carry_out(arguments: argparse.Namespace) -> int:
         table = format_table([(column.key, column.unit) for column in columns], values, rows, names)
         write_whole(arguments.out / "sweep.csv", table.encode("utf-8"))
         notes = _draw_pictures(arguments.out, columns, axes, records, names)
-        failed = [record["error"] for record in rows if "error" in record]
-        if len(failed) == len(points):
-            raise DigiclayError(f"Every point failed; the first one: {failed[0]}")
+        failed = require_any(rows)
         tail = f", {len(failed)} of them failed: see the column error" if failed else ""
         ways = [*bundles.describe(), *explain_failed_batches(records), describe_effort(records)]
         return [f"{len(points)} points{tail}", *ways, *notes, f"written to {arguments.out}"]

@@ -226,8 +226,13 @@ class OwnRow(Method):
         return guard(lambda: parameters.build(info), source.label, source.file, info.period)
 
 
-def load_method(word: str) -> str:
-    """Load the method that a word of the command line names; return its name, or a word that names none."""
+def load_method(word: str | type) -> str:
+    """Load the method that a word of the command line names, or a class; return its name.
+
+    A word that names none is returned as it is.
+    """
+    if isinstance(word, type):
+        return load_class(word)
     if word in METHODS or word in list_added():
         return word
     source = read_source(word)

@@ -122,7 +122,7 @@ class Sums:
         moments, tip, cells = self._ways[same]
         metrics = {
             **compute_metrics_from_sums(sums, moments, tip, grid.positions, scene.set_point, cells),
-            **measure_losses(scene, play.batch.systems[index], moments, [(total, tip[:, 2])]),
+            **measure_losses(scene, play.batch.systems[index].fastest, moments, [(total, tip[:, 2])]),
         }
         return report(scene, now.ended(index), metrics)
 

@@ -93,6 +93,16 @@ MOST_STEPS = 1000
 #: to a gigabyte.
 MOST_CUT = {"adaptive": 10, "richardson": 500}
 
+#: Names of the classes of what a section may hold; those of the control depend on its method.
+KINDS: dict[str, tuple[str, ...]] = {
+    section: (*names, "None") if section in (*OPTIONAL, *NEEDS) else names
+    for section, names in {
+        **{section: (name,) for section, (_, name) in PARTS.items()},
+        **{section: tuple(name for _, name in laws.values()) for section, laws in LAWS.items()},
+        "trajectory": ("Path",),
+    }.items()
+}
+
 
 def import_parameters(section: str, method: str) -> type[Parameters]:
     """Import the class of a section's parameters; `method`: the control method."""
@@ -205,39 +215,23 @@ class Scene:
             raise ParameterError("delay", "dead_time", rule, f"{self.delay.dead_time:g} s")
 
     def _refuse_wrong_parts(self) -> None:
-        """Refuse parts that are not those of their sections, or not of the control method."""
+        """Refuse parts that are not of the classes of their sections, or not of the control method.
 
-        def require(holds: bool, section: str, rule: str, part: object, hint: str = "") -> None:
-            if not holds:
-                raise ParameterError(section, "", rule, type(part).__name__, hint)
-
-        require(isinstance(self.fingers, tuple), "fingers", "must be a tuple of Finger", self.fingers)
-        for finger in self.fingers:
-            require(isinstance(finger, Finger), "fingers", "must be a tuple of Finger", finger)
-            require(isinstance(finger.trajectory, Path), "trajectory", "must be a Path", finger.trajectory)
-        for section in SECTIONS:
-            kinds = (
-                {PARTS[section][1]}
-                if section in PARTS
-                else {name for _, name in LAWS.get(section, {}).values()}
-            )
+        By the names of the classes: the file of a method of one's own may have been run again since.
+        """
+        if not all(isinstance(finger, Finger) for finger in self.fingers):
+            raise ParameterError("fingers", "", "must be a tuple of Finger", str(self.fingers))
+        kinds = KINDS
+        if self.control is not None:
+            row = find_method(self.method)
+            blister = "None" if row.blister is None else "Blister"
+            kinds = {**KINDS, "control": (row.parameters,), "blister": (blister,)}
+        for section, names in kinds.items():
             for part in self.list_parts(section):
-                if part is None:
-                    needed = section in REQUIRED and section not in NEEDS
-                    require(not needed, section, "must not be omitted", part)
-                elif kinds:
-                    require(type(part).__name__ in kinds, section, f"must be a {' or a '.join(kinds)}", part)
-        if self.control is None:
-            return
-        row, kind = find_method(self.method), type(self.control)
-        rule = f"must be {row.parameters}, the parameters of the method {self.method}"
-        hint = "digiclay.scene(scene, {'control.method': ...}) changes both."
-        # By name: the file of a method of one's own may have been run again since.
-        is_its_own = kind.__name__ == row.parameters and kind.__module__.endswith(row.module)
-        require(is_its_own, "control", rule, self.control, hint)
-        formed = row.blister is not None
-        rule = f"must {'not ' if formed else ''}be omitted with the method {self.method}"
-        require((self.blister is not None) == formed, "blister", rule, self.blister, hint)
+                name = "None" if part is None else type(part).__name__
+                if name not in names:
+                    method = f" with the method {self.method}" if section in ("control", "blister") else ""
+                    raise ParameterError(section, "", f"must be {' or '.join(names)}{method}", name)
 
     def describe(self) -> dict[str, str]:
         """Return what matters most of it, by name."""

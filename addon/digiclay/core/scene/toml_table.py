@@ -111,8 +111,7 @@ def tabulate(scene: Scene) -> Record:
     def tabulate_finger(finger: Finger) -> Record:
         path, tables = finger.trajectory, tabulate_parts(FINGER_PARTS, finger)
         if path != press:
-            points = [list_changed(point, Waypoint()) for point in path.waypoints]
-            points = [{"time": 0.0, "position": Waypoint().position, **point} for point in points]
+            points = list(map(vars, path.waypoints))
             tables["trajectory"] = {"interpolation": path.interpolation, "waypoints": points}
         return tables
 

@@ -162,12 +162,11 @@ def is_whole(folder: Path, scene: Scene) -> bool:
 
 def find_row(history: Mapping[str, Array], time: float, called: str) -> int:
     """Return the row nearest to a time within the session, s; `called`: its name in messages."""
-    moments = history["time"]
-    if not moments[0] <= time <= moments[-1]:
-        raise OutputError(
-            f"{called} must be between {moments[0]:g} s and {moments[-1]:g} s (got {time:g} s)."
-        )
-    return int(np.argmin(np.abs(moments - time)))
+    first, last = history["time"][[0, -1]]
+    if not (isinstance(time, (int, float)) and first <= time <= last):
+        shown = f"{time:g} s" if isinstance(time, (int, float)) else repr(time)
+        raise OutputError(f"{called} must be between {first:g} s and {last:g} s (got {shown}).")
+    return int(np.argmin(np.abs(history["time"] - time)))
 
 
 def find_last_touch(history: Mapping[str, Array]) -> int:

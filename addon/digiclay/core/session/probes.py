@@ -16,7 +16,7 @@ from ..engine.simulation import begin, periods
 from ..model.fingertip import LEVEL, compute_forms, compute_underside
 from ..model.layout import Layout, make_grid
 from ..model.physics import Speeds, find_contact_force, find_speeds
-from ..model.trajectory import Path, Trajectory, Waypoint
+from ..model.trajectory import Path, Waypoint
 from ..scene.assembly import assemble, make_motion
 from ..scene.schema import Finger, Scene
 from .accuracy import Replay, reference_settings
@@ -74,8 +74,8 @@ def require_scene(scene: object) -> Scene:
     return scene
 
 
-def force(scene: Scene, pose: ArrayLike, height: ArrayLike | None = None, finger: int = 1) -> Floats:
-    """Return the force of a finger on each pin of a bed whose pins are held.
+def force(scene: Scene, pose: ArrayLike) -> Floats:
+    """Return the force of a finger on each pin of a bed whose pins are held at their rest height.
 
     It is the elastic force of the first instant, ``F = f_d (b / m) (exp(m (δ - x0)) - 1)`` of the indentation
     δ (equation 11); held on, it falls as ``G(t) F`` (equation 12, with the scene's ``relaxation``).
@@ -83,57 +83,35 @@ def force(scene: Scene, pose: ArrayLike, height: ArrayLike | None = None, finger
     Parameters
     ----------
     scene : Scene
-        With a fingertip; control, valves and paths have no effect.
+        With one finger. Control, valves and paths have no effect.
     pose : array_like, (3,) or (7,)
         Lowest point of the finger, m, and its quaternion w, x, y, z; without one the finger is level.
-    height : array_like, scalar or (n,), optional
-        Heights of the held pins, m, row by row; by default the rest height.
-    finger : int
-        Number of the finger, from 1 on.
 
     Returns
     -------
     ndarray, (n,)
-        Force on each pin, N; their sum is the force on the finger.
+        Force on each pin, N, row by row; their sum is the force on the finger.
 
     Raises
     ------
     DigiclayError
-        Without a fingertip; for a pose or heights of another shape or with numbers that are not finite; for
-        a finger deeper in the bed than half its thickness. The law was measured up to 2 N and 3 mm.
+        Without a fingertip or with several; for a pose of other than 3 or 7 finite numbers; for a finger
+        deeper in the bed than half its thickness. The law was measured up to 2 N and 3 mm.
     """
-    if not (isinstance(finger, int) and 1 <= finger <= len(require_scene(scene).fingers)):
-        raise ParameterError("force", "finger", f"must be from 1 to {len(scene.fingers)}", repr(finger))
-    alone = replace(scene, fingers=scene.fingers[finger - 1 : finger])
-    cell, bed = make_motion(alone).cell, make_grid(scene.layout)
+    cell, bed = make_motion(require_scene(scene)).cell, make_grid(scene.layout)
     if cell.touch is None:
         raise ParameterError("fingertip", "", "must be given to press a bed", "absent")
-    held = _read_array("height", scene.actuator.rest_height if height is None else height, (), (bed.count,))
-    lowest = _read_array("pose", pose, (3,), (7,))
-    pose = np.append(lowest, LEVEL) if lowest.size == 3 else lowest
-    path = Trajectory(np.zeros(1), pose[None, :3], pose[None, 3:])
-    forms = compute_forms(cell.touch.fingertip.outline(path.poses(np.zeros(1))))
+    numbers = np.ravel(pose).tolist()
+    point = Waypoint(position=numbers[:3], orientation=numbers[3:] or LEVEL)
+    pose = Path("linear", (point,)).trajectory().poses(np.zeros(1))
+    forms = compute_forms(cell.touch.fingertip.outline(pose))
     under = compute_underside(*forms, bed.compute_basis(np.arange(bed.count)))[0]
-    depth, thickness = float((held - under).max()), cell.touch.fingertip.height
+    depth, thickness = scene.actuator.rest_height - float(under.min()), cell.touch.fingertip.height
     if depth > thickness:
         raise ParameterError("force", "pose", f"must press at most {thickness:g} m deep", f"{depth:g} m")
     state = np.zeros((cell.rows, bed.count))
-    state[0] = held
+    state[0] = scene.actuator.rest_height
     return find_contact_force(cell, state, under)
-
-
-def _read_array(name: str, values: ArrayLike, *shapes: tuple[int, ...]) -> Floats:
-    """Return finite numbers in one of the shapes."""
-    try:
-        array = np.asarray(values, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise ParameterError("force", name, "must be numbers", repr(values)) from None
-    if array.shape not in shapes:
-        rule = f"must have the shape {' or '.join(map(str, shapes))}"
-        raise ParameterError("force", name, rule, str(array.shape))
-    if not np.isfinite(array).all():
-        raise ParameterError("force", name, "must be finite numbers", f"{array[~np.isfinite(array)][0]:g}")
-    return array
 
 
 def free_speed(scene: Scene) -> Speeds:

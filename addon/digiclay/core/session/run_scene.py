@@ -28,9 +28,10 @@ from ..metrics.summary import (
     take_worst,
 )
 from ..model.control_interface import count_losses
+from ..model.physics import find_speeds
 from ..model.touch import describe_excess, find_indentations, is_beyond
 from ..model.trajectory import sample_poses
-from ..scene.assembly import assemble
+from ..scene.assembly import assemble, make_motion
 from ..scene.recorder import RunRecording, write
 from ..scene.schema import Scene
 from ..scene.toml_table import ABSENT, format_scene
@@ -88,11 +89,16 @@ class Result:
     @property
     def fingers(self) -> tuple[Contact, ...]:
         """Contact of each finger: its time, losses, and the time these lasted."""
-        weights = compute_weights(self.history["time"]) if self.history else np.empty(0)
-        times = [float(weights[find_contact_rows(force)].sum()) for force in self.finger_force.T]
-        none = [{"losses": 0, "time": 0.0}] * len(times)
-        lost = self.metrics.get("lost") or none
-        return tuple(Contact(t, one["losses"], one["time"]) for t, one in zip(times, lost, strict=True))
+        self.require_history("fingers")
+        time, weights = self.history["time"], compute_weights(self.history["time"])
+        felt = [(own["total_force"], own["fingertip"][:, 2]) for own in split_fingers(self.history)]
+        alone = replace(self.scene, fingers=self.scene.fingers[:1])
+        fastest = float(find_speeds(make_motion(alone).cell).rise)
+        lost = measure_losses(self.scene, fastest, time, felt).get("lost", [NEVER] * len(felt))
+        return tuple(
+            Contact(float(weights[find_contact_rows(force)].sum()), int(one["losses"]), one["time"])
+            for (force, _), one in zip(felt, lost, strict=True)
+        )
 
     def require_history(self, name: str) -> None:
         """Refuse what needs a history, by its name, of a run without one."""
@@ -163,13 +169,17 @@ class Ended(NamedTuple):
     losses: int | None
 
 
+#: A finger that was not lost.
+NEVER = {"losses": 0, "time": 0.0}
+
+
 def measure_losses(
-    scene: Scene, system: System, time: Floats, felt: Iterable[tuple[Floats, Floats]]
+    scene: Scene, fastest: float, time: Floats, felt: Iterable[tuple[Floats, Floats]]
 ) -> dict[str, list[dict[str, float]]]:
     """Return losses and time without contact, s, of fingers by force, N, and height, m, (t,); {}: no loss."""
     lost = []
     for total_force, height in felt:
-        losses = find_losses(time, total_force, height, system.fastest)
+        losses = find_losses(time, total_force, height, fastest)
         lost.append({"losses": len(losses), "time": sum(loss.time for loss in losses)})
     # Only a method that holds a force can lose a fingertip.
     return {"lost": lost} if scene.set_point and any(finger["losses"] for finger in lost) else {}
@@ -203,7 +213,7 @@ def evaluate(
     metrics: Record = take_worst(each)
     if system.fingers > 1:
         metrics["fingers"] = each
-    metrics |= measure_losses(scene, system, moments, felt)
+    metrics |= measure_losses(scene, system.fastest, moments, felt)
     if depths:
         depth = np.max(depths, axis=0)
         metrics["max_indentation"] = float(depth.max())

@@ -86,6 +86,14 @@ def require_recorder(points: Iterable[Point]) -> None:
         raise OutputError("A sweep needs a recorder, and the scene has recorder = 'absent'.")
 
 
+def require_any(records: Sequence[Record]) -> list[str]:
+    """Return why points failed, or raise DigiclayError if all did."""
+    failed = [record["error"] for record in records if "error" in record]
+    if len(failed) == len(records):
+        raise DigiclayError(f"Every point failed; the first one: {failed[0]}")
+    return failed
+
+
 def judge_all(points: Iterable[Point]) -> list[Point]:
     """Return the points with an estimate of their errors."""
     return [replace(point, errors=True) for point in points]

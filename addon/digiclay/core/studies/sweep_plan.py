@@ -165,14 +165,17 @@ def format_table(
     """Return points as CSV: varied parameters, metrics, time and errors, losses, failure; SI units on top."""
     names = list(dict.fromkeys((*names, *EFFORT)))
     units = [*varied, *((name, FIGURES[name].unit) for name in names)]
-    table: list[Sequence[Any]] = [
-        [*(f"{name} ({unit})" if unit else name for name, unit in units), "lost", "error"]
-    ]
+    heads = [*(f"{name} ({unit})" if unit else name for name, unit in units), "lost", "error"]
+    return format_csv([heads, *make_rows(rows, records, names)])
+
+
+def make_rows(
+    rows: Iterable[Sequence[Any]], records: Iterable[Record], names: Sequence[str]
+) -> Iterator[list[Any]]:
+    """Yield the rows of a table of points: varied values, metrics, losses, and why a point failed."""
     for values, record in zip(rows, records, strict=True):
-        figures = record.get("figures", {})
-        lost, error = describe_losses(record), record.get("error", "")
-        table.append([*values, *map(figures.get, names), lost, error])
-    return format_csv(table)
+        metrics = map(record.get("figures", {}).get, names)
+        yield [*values, *metrics, describe_losses(record), record.get("error", "")]
 
 
 def format_csv(rows: Iterable[Sequence[Any]]) -> str:
