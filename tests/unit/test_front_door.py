@@ -84,6 +84,20 @@ def test_changes_are_those_of_the_command_line_also_of_a_scene_that_is_made(chan
     assert digiclay.scene("tap" if source == "name" else digiclay.scene("tap"), changes) == wanted
 
 
+@pytest.mark.parametrize(
+    "tables, changes",
+    [
+        ({"layout": {"arrangement": "hexagonal"}}, {"layout.arrangement": "aligned"}),
+        ({}, {"actuator.rest_height": 0.03}),
+        ({"control": {"method": "cell_states"}}, {"control.method": "virtual_master"}),
+        ({"preset": "design"}, {"preset": "paper"}),
+    ],
+)
+def test_what_a_scene_has_by_its_arrangement_height_method_or_preset_follows_their_change(tables, changes):
+    # As if the tables had been changed: the share of a pin, the default press, the blister, valve and lag.
+    assert digiclay.scene(digiclay.scene(tables), changes) == digiclay.scene({}, {**tables, **changes})
+
+
 @pytest.mark.parametrize("number", [np.float32(0.25), np.array(0.25), pandas.Series([0.25])[0]], ids=type)
 def test_numbers_of_numpy_and_pandas_are_numbers_in_tables(number):
     points = [{"time": number, "position": np.array([0.0, 0.0, 0.04])}]
