@@ -217,6 +217,7 @@ def test_a_run_without_a_record_is_restored_too(tap):
     with refused_in_a_line(DigiclayError, "^plot needs a recorder"):
         again.plot("a.png")
     assert "<img" not in again._repr_html_()
+    assert "force: not recorded" in repr(again)
 
 
 def test_the_surface_is_exported_by_the_ending_and_compared_with_a_former_one(here):
@@ -252,6 +253,9 @@ def test_scene_and_run_are_shown_in_a_few_lines_and_in_a_notebook_with_the_plot(
     assert "11 x 11 pins, 3 mm apart" in repr(tap)
     assert "real time" in repr(done)
     assert "height error about" in repr(done)
+    assert f"force: RFD {done.metrics['rfd']:.2g} N" in repr(done)
+    plastic = digiclay.run(digiclay.scene(tap, {"control.method": "plastic"}), errors=False)
+    assert f"force: at most {plastic.metrics['max_total_force']:.2g} N" in repr(plastic)
     named = replace(tap, name="a<b")
     assert named._repr_html_().startswith(
         "<table><caption>Scene a&lt;b</caption><tr><th>bed</th><td>11 x 11 pins"
@@ -349,6 +353,12 @@ def test_a_sweep_over_methods_has_their_names_also_of_ones_own(tap):
     assert list(table["control.method"]) == ["plastic", "soft_pad", "mine"]
     alone = simulate(digiclay.scene(tap, {"control.method": Mine}))
     assert table["max_total_force"][2] == pytest.approx(alone.metrics["max_total_force"], rel=1e-9)
+
+
+def test_points_of_one_bed_run_in_one_batch(tap):
+    counts = []
+    digiclay.sweep(tap, {"control.force_gain": [1, 2, 3, 4]}, "rfd", lambda *both: counts.append(both))
+    assert counts == [(4, 4)]
 
 
 def test_points_that_fail_have_their_reason_and_no_number(tap):

@@ -107,10 +107,12 @@ class Result:
 
     def describe(self) -> dict[str, str]:
         """Return what matters most of it, by name."""
+        largest = self.metrics.get("max_total_force")
+        reached = "not recorded" if largest is None else f"at most {largest:.2g} N"
         rows, pins = len(self.history.get("time", ())), self.scene.cells
         return {
             "time": describe_time(self.metrics) + (", stopped before its end" if self.incomplete else ""),
-            "force": self._describe_force() or "no contact",
+            "force": self._describe_force() or reached,
             "errors": describe_errors(self.metrics),
             "history": f"{rows} rows of {pins} pins: {', '.join(self.history)}" if rows else "none",
             "metrics": f"{len(self.metrics)}, in SI units",
