@@ -183,23 +183,25 @@ class Doors(AbstractContextManager["Doors"]):
             env={**os.environ, "PYTHONPATH": path},
             start_new_session=True,  # Ctrl-C on a terminal is for the session
         )
-        assert self._process.stdin is not None
+        stdin, stdout = self._process.stdin, self._process.stdout
+        assert stdin is not None
+        assert stdout is not None
+        self._input, self._output = stdin, stdout
         with suppress(BrokenPipeError):  # its answer says why
-            self._process.stdin.write(json.dumps(self._settings).encode() + b"\n")
-            self._process.stdin.flush()
+            stdin.write(json.dumps(self._settings).encode() + b"\n")
+            stdin.flush()
         answer = self._read_line(OPENING)
         if "port" not in answer:
             self._end(HEEDING)
             raise OutputError(answer.get("error", "The process of the doors has ended: see above."))
         self.port, self.osc_port = int(answer["port"]), int(answer["osc_port"])
-        self._frames.bell = self._process.stdin.fileno()
+        self._frames.bell = stdin.fileno()
         os.set_blocking(self._frames.bell, False)
 
     def wait(self, time: float) -> None:
         """Wait for an order, for a time at most, s."""
-        assert self._process.stdout is not None
-        if select.select([self._process.stdout], [], [], time)[0]:
-            os.read(self._process.stdout.fileno(), 65536)
+        if select.select([self._output], [], [], time)[0]:
+            os.read(self._output.fileno(), 65536)
 
     def read_order(self) -> Order:
         """Return the newest order."""
@@ -217,8 +219,7 @@ class Doors(AbstractContextManager["Doors"]):
 
     def close(self) -> Record:
         """Close the doors, and return what they have counted."""
-        assert self._process.stdin is not None
-        self._process.stdin.close()
+        self._input.close()
         answer = self._read_line(ENDING)
         # A process that has not answered is stopped, or hangs.
         self._end(ENDING if answer else 0.0)
@@ -229,19 +230,16 @@ class Doors(AbstractContextManager["Doors"]):
 
     def _read_line(self, patience: float) -> Record:
         """Read a line of JSON; an empty answer when there is none in time, s."""
-        stdout = self._process.stdout
-        assert stdout is not None
         line = b"\n"
-        while line == b"\n" and select.select([stdout], [], [], patience)[0]:  # bells before it
-            line = stdout.readline()
+        while line == b"\n" and select.select([self._output], [], [], patience)[0]:  # bells before it
+            line = self._output.readline()
         return dict(json.loads(line)) if line.strip() else {}
 
     def _end(self, patience: float) -> None:
         """Have the process end, by itself within a time, s, or by signals."""
-        for stream in (self._process.stdin, self._process.stdout):
-            if stream:
-                with suppress(OSError):
-                    stream.close()
+        for stream in (self._input, self._output):
+            with suppress(OSError):
+                stream.close()
         for insist in (self._process.terminate, self._process.kill):
             try:
                 self._process.wait(patience)

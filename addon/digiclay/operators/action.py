@@ -21,6 +21,11 @@ Needs = tuple[Callable[[Any], str], ...]
 Result = set[str]
 
 
+def inform(operator: Operator, text: str, *values: object, level: str = "INFO") -> None:
+    """Report a text with values in the language of the interface."""
+    operator.report({level}, localize(text, *values))
+
+
 def end_in_order(step: Callable[..., Result]) -> Callable[..., Result]:
     """Return a `modal` or `invoke` that no exception leaves: Blender would drop the operator silently."""
 

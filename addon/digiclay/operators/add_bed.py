@@ -33,7 +33,7 @@ from ..settings.devices import BEDS, FIRST, UNNAMED, make_scene
 from ..settings.groups import PRESET_WORDS, method_items
 from ..settings.shown_units import to_si
 from ..ui_text import localize
-from .action import Action, FileAction, Result, action, file_of, millimeters
+from .action import Action, FileAction, Result, action, file_of, inform, millimeters
 from .poll_messages import baked, cannot_change, edited, inside_edit, no_collection, session_runs
 
 DEFAULT = Layout()
@@ -179,7 +179,7 @@ class AddBed(Placed, Action, Operator):
 def rebuild_bed(operator: Operator, context: Context) -> None:
     """Make pins and housing from the settings; the formed surface is lost, the fingertip stays"""
     layout = rebuild(bed_of(context)).layout
-    operator.report({"INFO"}, localize("The bed has {} x {} pins now", layout.rows, layout.columns))
+    inform(operator, "The bed has {} x {} pins now", layout.rows, layout.columns)
 
 
 def add(context: Context, scene: Scene) -> Object:

@@ -22,7 +22,7 @@ from ..roles import bed_of
 from ..settings.declared import choice, flag, integer
 from ..settings.shown_units import to_si
 from ..ui_text import localize
-from .action import Action, Needs, Result, action, millimeters
+from .action import Action, Needs, Result, action, inform, millimeters
 from .add_bed import select_only
 from .poll_messages import cannot_change, cannot_form, from_rest, no_collection, no_surface
 
@@ -159,7 +159,7 @@ class MakeMesh(SurfaceOptions, Operator):
             new.select_set(True)
         groups = bodies[0].groups
         words = localize(" with vertex groups {}", ", ".join(groups)) if groups else ""
-        self.report({"INFO"}, localize("Made {}{}", ", ".join(new.name for new in things), words))
+        inform(self, "Made {}{}", ", ".join(new.name for new in things), words)
 
 
 @action("digiclay.find_features", "List Features", no_surface, bases=(FindingOptions,))
@@ -293,7 +293,7 @@ class ExportMesh(SurfaceOptions, Operator):
             write(bodies, path, self.unit, self.file_format, *self._axes())
         many = len(files) > 1
         names = localize("{} files beside {}", len(files), target) if many else str(files[0][0])
-        self.report({"INFO"}, localize("Written: {}", names))
+        inform(self, "Written: {}", names)
 
     def _axes(self) -> tuple[str, str]:
         """Return the upward and the forward axis of an OBJ; the latter gives way where both are the same."""

@@ -11,8 +11,7 @@ from ..settings import own_folder, own_presets, properties
 from ..settings.declared import text
 from ..settings.devices import change_layout
 from ..settings.groups import PRESET_WORDS
-from ..ui_text import localize
-from .action import Action, Result, action
+from .action import Action, Result, action, inform
 from .poll_messages import cannot_change, no_bed, no_own_methods, no_own_preset
 
 
@@ -62,7 +61,7 @@ class SavePreset(Action, Operator):
         alone = replace(scene, name=self.name.strip(), fingers=scene.fingers[:1])
         file = own_presets.save(self.name, alone)
         bed.digiclay.own_preset = file.stem
-        self.report({"INFO"}, localize("Saved as {}", file))
+        inform(self, "Saved as {}", file)
 
 
 class RemovePreset(Action, Operator):
@@ -79,7 +78,7 @@ class RemovePreset(Action, Operator):
         """Remove it; the bed keeps its parameters."""
         settings = bed_of(context).digiclay
         own_presets.remove(settings.own_preset)
-        self.report({"INFO"}, localize("Removed the preset {}", settings.own_preset))
+        inform(self, "Removed the preset {}", settings.own_preset)
         settings.own_preset = ""
 
 
@@ -90,4 +89,4 @@ def reload_methods(operator: Operator, context: Context) -> None:
     present = own_folder.read_present()
     for line in present.refused:
         operator.report({"WARNING"}, line)
-    operator.report({"INFO"}, localize("{} control methods loaded", len(present.names)))
+    inform(operator, "{} control methods loaded", len(present.names))

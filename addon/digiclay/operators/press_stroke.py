@@ -36,7 +36,7 @@ from ..strokes.stroke import (
 )
 from ..strokes.tracking import find_tracking
 from ..ui_text import localize
-from .action import Drawing, Modal, Polled, Result, clear_status, millimeters, show_status
+from .action import Drawing, Modal, Polled, Result, clear_status, inform, millimeters, show_status
 from .poll_messages import no_place, no_tool
 
 #: How far a turn of the wheel takes the surface up, m.
@@ -102,12 +102,8 @@ class PressSettings:
         default="NONE",
     )
     radial: integer("Radial Count", "Number of images", default=6, min=FEWEST, max=MOST)
-    center_x: millimeters(
-        "Center X", 0.0, "Center of the symmetry", soft_min=-100.0, soft_max=100.0, step=100
-    )
-    center_y: millimeters(
-        "Center Y", 0.0, "Center of the symmetry", soft_min=-100.0, soft_max=100.0, step=100
-    )
+    center_x: millimeters("Center X", 0.0, "Center of the symmetry", **PLACE)
+    center_y: millimeters("Center Y", 0.0, "Center of the symmetry", **PLACE)
     axis: number("Axis", "Turn of the mirror's axes", default=0.0, subtype="ANGLE", step=1000)
     stamp: choice("Stamp", "Shape that is stamped", items=brush.STAMP_ITEMS, default="heart")
     stamp_file: text("File", "Mesh, picture or .npy file that is stamped", subtype="FILE_PATH")
@@ -189,7 +185,7 @@ class Press(PressSettings, Modal, Operator):
         stroke = session and find_stroke(session, self.number)
         if session is None or stroke is None:
             if bed is None or session is None:
-                self.report({"WARNING"}, localize("The press stroke ended: its session or bed was removed"))
+                inform(self, "The press stroke ended: its session or bed was removed", level="WARNING")
             return self._end({"CANCELLED", "PASS_THROUGH"})
         pressed = event.value == "PRESS"
         if pressed and (event.type in ("ESC", "RIGHTMOUSE") or _is_undo_key(context, event)):
@@ -291,7 +287,7 @@ def find_pressed(operator: Operator, context: Context, xy: Place) -> aim.Target 
     """Return the place on a bed under a pixel of the region; the operator reports what hides it."""
     target, hider = aim.look_at(context, xy)
     if hider is not None:
-        operator.report({"WARNING"}, localize(HIDDEN, hider.name))
+        inform(operator, HIDDEN, hider.name, level="WARNING")
     return target if hider is None else None
 
 
@@ -313,10 +309,10 @@ def open_session(operator: Operator, context: Context, bed: Object, kind: Brush)
         return None
     if kind.needs_blister and find_tracking(session.scene, session.system) is None:
         names = brush.LABELS[kind], title(session.scene.method)
-        operator.report({"ERROR"}, localize(NO_BLISTER, *map(localize, names)))
+        inform(operator, NO_BLISTER, *map(localize, names), level="ERROR")
         return None
     if kind in (Brush.SMOOTH, *STAMPS) and session.scene.control and METHODS[session.scene.method].recovers:
-        operator.report({"WARNING"}, localize(RECOVERS, localize(title(session.scene.method))))
+        inform(operator, RECOVERS, localize(title(session.scene.method)), level="WARNING")
     if session.paused:
         words = localize("The session is paused: the fingertip follows after it resumes")
         operator.report({"WARNING"}, words)

@@ -31,7 +31,7 @@ from ..settings.declared import flag, text
 from ..strokes.sweep import estimate_time
 from ..ui_text import localize
 from . import poll_messages as poll
-from .action import Action, Modal, Polled, Result, action, become_modal
+from .action import Action, Modal, Polled, Result, action, become_modal, inform
 
 #: How often Blender gets a moment to save by itself, and how long that is, s. It tries every 10 ms.
 EVERY, MOMENT = 20.0, 0.1
@@ -184,7 +184,7 @@ def _stop(operator: Operator, context: Context) -> bool:
         handlers.end_all(handlers.STOPPED)
         return True
     if not loop.LOOP.ending:
-        operator.report({"INFO"}, localize("The sessions stop as soon as the drawn strokes are formed"))
+        inform(operator, "The sessions stop as soon as the drawn strokes are formed")
     loop.LOOP.ending = True
     return False
 

@@ -30,7 +30,7 @@ from ..sessions import running, sculpting
 from ..settings import properties
 from ..settings.declared import choice, integer, text
 from ..ui_text import localize
-from .action import FileAction, Result, TimedAction, action, file_of, show_status
+from .action import FileAction, Result, TimedAction, action, file_of, inform, show_status
 from .poll_messages import (
     baked,
     cannot_change,
@@ -69,10 +69,10 @@ def keep_take(operator: Operator, context: Context) -> Result | None:
     take = takes.read_recording(session)
     running.put(sculpting.set_recording(session, False))
     if take is None:
-        operator.report({"WARNING"}, localize("Nothing was recorded: the session was paused"))
+        inform(operator, "Nothing was recorded: the session was paused", level="WARNING")
         return {"CANCELLED"}
     entry = takes.add(bed, take, operator.name, session)
-    operator.report({"INFO"}, localize("{}: {:.1f} s kept", entry.name, entry.seconds))
+    inform(operator, "{}: {:.1f} s kept", entry.name, entry.seconds)
     return None
 
 
@@ -108,7 +108,7 @@ class ExportTake(FileAction, Operator):
             numbering = ", ".join(f"{row} = {number}" for row, number in enumerate(numbers, 1))
             scene = replace(scene, description="Numbers of the fingers here = on the bed: " + numbering)
         write_whole(file, format_scene(scene).encode())
-        self.report({"INFO"}, localize("{} written to {}", entry.name, file))
+        inform(self, "{} written to {}", entry.name, file)
 
 
 @action("digiclay.take_remove", "Remove Take", cannot_change, no_take, take=TAKE)
@@ -139,7 +139,7 @@ def play(operator: Operator, context: Context) -> None:
         tick.bring_back(context, bed, session)
     finally:  # when a stroke fails, the bed stays as it was
         tick.stop(bed.session_uid)
-    operator.report({"INFO"}, localize("{}: {} strokes", recorded.name, len(recorded.strokes)))
+    inform(operator, "{}: {} strokes", recorded.name, len(recorded.strokes))
 
 
 def read_fitting_take(bed: Object, number: str) -> Take:
@@ -261,7 +261,7 @@ class ReplayTake(TimedAction, Operator):
         view.show_state(bed, system, self._state)
         seconds = f"{self._take.duration:.1f} s"
         if state == self._take.end:
-            self.report({"INFO"}, localize("Replayed {}: it ends in the same state, bit for bit", seconds))
+            inform(self, "Replayed {}: it ends in the same state, bit for bit", seconds)
             return {"FINISHED"}
         recorded = snapshot.load(self._system, self._take.end)
         away = 1e6 * float(np.abs(self._state.row(0) - recorded.row(0)).max())
@@ -270,7 +270,7 @@ class ReplayTake(TimedAction, Operator):
             self.report({"WARNING"}, words)
         else:
             words = localize("steps {} times finer end {:.3g} µm away", self.parts, away)
-            self.report({"INFO"}, localize("Replayed {}: {}", seconds, words))
+            inform(self, "Replayed {}: {}", seconds, words)
         return {"FINISHED"}
 
     def _restore(self, context: Context) -> Result:
@@ -294,7 +294,7 @@ class ReplayTake(TimedAction, Operator):
                 tick.place_fingers(context, bed, before)
             except DigiclayError as error:
                 self.report({"WARNING"}, str(error))
-        self.report({"INFO"}, localize("Replay stopped: the bed is restored"))
+        inform(self, "Replay stopped: the bed is restored")
         return {"CANCELLED"}
 
 
@@ -340,7 +340,7 @@ class Bake(TimedAction, Operator):
         """Work for a moment, unless the user has had enough."""
         if event.type == "ESC" and event.value == "PRESS":
             self.cancel(context)
-            self.report({"INFO"}, localize("{}: stopped, nothing was changed", localize(self.bl_label)))
+            inform(self, "{}: stopped, nothing was changed", localize(self.bl_label))
             return {"CANCELLED"}
         if event.type != "TIMER":
             return {"RUNNING_MODAL"}
@@ -391,7 +391,7 @@ class Bake(TimedAction, Operator):
         bake.apply(bed, moments, self.first, fingers, numbers)
         count = len(moments.height)
         last = self.first + count - 1
-        self.report({"INFO"}, localize("Baked {} frames, {} to {}", count, self.first, last))
+        inform(self, "Baked {} frames, {} to {}", count, self.first, last)
 
 
 @action("digiclay.bake_free", "Free Bake", cannot_change, no_bake)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from pathlib import Path
 
 from ..compat import Context, Event, Object, OperatorProperties, bpy
@@ -47,26 +47,15 @@ FINGERS: Mapping[str, FingerKind] = {
 
 def find_kind(finger: Fingertip) -> FingerKind | None:
     """Return the preset finger of the same semi-axes, or None."""
-    return next((kind for kind in FINGERS.values() if _same(kind.finger, finger)), None)
-
-
-def _same(first: Fingertip, other: Fingertip) -> bool:
-    """Return whether two fingers have the same semi-axes."""
-    pairs = ((first.length, other.length), (first.width, other.width), (first.height, other.height))
-    return all(abs(a - b) < SAME for a, b in pairs)
+    axes = astuple(finger)
+    same = (kind for kind in FINGERS.values() if math.dist(astuple(kind.finger), axes) < SAME)
+    return next(same, None)
 
 
 #: Names by which Blender knows the tool, and the operator whose properties are its settings.
 TOOL, OPERATOR = "digiclay.press_tool", "digiclay.press"
 #: Modal operators that change the settings, and draw them themselves.
-ADJUSTING = frozenset(
-    {
-        "DIGICLAY_OT_press_size",
-        "DIGICLAY_OT_press_depth",
-        "DIGICLAY_OT_press_strength",
-        "DIGICLAY_OT_press_center",
-    }
-)
+ADJUSTING = {f"DIGICLAY_OT_press_{name}" for name in ("size", "depth", "strength", "center")}
 LABELS = {brush: brush.value.replace("_", " ").title() for brush in Brush}
 BRUSH_WORDS = {
     Brush.LOWER: "Press a valley of the given depth. With Ctrl: Raise",

@@ -160,8 +160,7 @@ def play_strokes(running: Running, strokes: tuple[PointerStroke, ...]) -> Iterat
     usual = running.scene
     for number, stroke in enumerate(strokes, 1):
         running = _take_finger(running, usual, stroke.size_finger(find_ellipsoid(usual)))
-        needs_blister = stroke.kind in (Brush.RAISE, Brush.LEVEL)
-        if needs_blister and find_tracking(running.scene, running.system) is None:
+        if stroke.kind.needs_blister and find_tracking(running.scene, running.system) is None:
             raise StateError(f"Stroke {number} ({stroke.kind.value.lower()}) needs a method with a blister.")
         for after in _play(running, stroke, number):
             running = after
