@@ -78,6 +78,112 @@ def refused(server, *, token="", wishes=""):
     return caught.value.response.status_code
 
 
+# Those with servers of their own come first: the one for all clients does not run yet.
+
+
+def test_a_killed_server_leaves_takes_that_can_be_replayed(tmp_path):
+    part = tmp_path / "recorded" / "take_001_part_00001.npz"
+    with serve(tmp_path, "--out", "recorded", "--part", "0.2") as one:
+        with one.connect("?format=binary&rate=200") as client:
+            client.send(pack_pose(Pose(PRESS, 1)))
+            while not part.exists():
+                next(frames(client))
+        one.process.kill()
+        one.process.wait(TIMEOUT)
+    take = from_bytes(part.read_bytes())
+    assert take.periods >= 40
+    assert sum(1 for _ in replay(take)) == take.periods
+
+
+def test_a_signal_ends_a_server_whose_doors_hang_and_finishes_its_take(tmp_path):
+    with serve(tmp_path, "--out", "recorded", "--part", "0.2") as one:
+        wait_until(lambda: list((tmp_path / "recorded").glob("*_part_00002.npz")))
+        (door,) = subprocess.check_output(["pgrep", "-P", str(one.process.pid)], text=True).split()
+        os.kill(int(door), signal.SIGSTOP)
+        began = time.monotonic()
+        report = one.stop(signal.SIGTERM)
+        assert time.monotonic() - began < 15.0  # 5 s by design; the machine may be busy
+    (found,) = (tmp_path / "recorded").iterdir()
+    assert from_bytes(found.read_bytes()).periods + report["left_out"] == report["periods"]
+    assert "doors that did not answer" in report["counts"]
+
+
+def fingers_after(client, *identities):
+    while True:
+        said = json.loads(client.recv(TIMEOUT))
+        found = {one["id"]: one for one in said["fingers"]} if said["type"] == "state" else {-1: {}}
+        if set(found) == set(identities):
+            return found
+
+
+def test_a_session_has_fingers_by_identity_as_long_as_they_are_named(tmp_path):
+    places = {5: [-0.006, 0.0, 0.039], 9: [0.006, 0.0, 0.038]}
+    fingers = [{"id": one, "position": place} for one, place in places.items()]
+    bad = [{"id": 7, "position": [0, 0, float("nan")]}]
+    with serve(tmp_path, "--fingers", "2") as one, one.connect("?rate=200") as client:
+        assert json.loads(client.recv(TIMEOUT))["fingers"] == 2
+        found = {}
+        while {name: each["position"] for name, each in found.items()} != places:
+            client.send(json.dumps({"type": "poses", "fingers": fingers}))
+            found = fingers_after(client, *places)
+        assert min(each["force"] for each in found.values()) > 0.0
+        client.send(json.dumps({"type": "poses", "fingers": [*bad, *fingers[1:]], "alive": [9]}))
+        refusal = ""
+        while not refusal:
+            refusal = json.loads(client.recv(TIMEOUT)).get("message", "")
+        assert refusal.startswith("Finger 7: pose must be finite numbers")
+        began = time.monotonic()
+        fingers_after(client)  # nobody is named any more
+        assert time.monotonic() - began < 5.0  # 0.1 s by design; the machine may be busy
+        state = json.loads(client.recv(TIMEOUT))
+        while state["total_force"] > 0.0:
+            state = json.loads(client.recv(TIMEOUT))
+
+
+def test_hands_of_a_quest_are_recorded_and_played_into_a_server(tmp_path):
+    numbers = ", ".join(["0.01"] * 63)
+    lines = f"Left wrist:, 0, 1, 0, 0, 0, 0, 1\nLeft landmarks:, {numbers}\n".encode()
+    environment = {**os.environ, "PYTHONPATH": PACKAGES, "DIGICLAY_SERVE_TOKEN": TOKEN}
+    with serve(tmp_path, "--fingers", "5") as one, one.connect("?rate=200") as client:
+        command = [sys.executable, "-m", "digiclay", "hands", "--to", f"ws://127.0.0.1:{one.port}"]
+        with socket.socket() as free:
+            free.bind(("127.0.0.1", 0))
+            port = free.getsockname()[1]
+        listen = [*command, "--port", str(port), "--record", "hands.txt"]
+        with (
+            subprocess.Popen(
+                listen, cwd=tmp_path, env=environment, stdout=subprocess.PIPE, text=True,
+                preexec_fn=partial(signal.signal, signal.SIGINT, signal.default_int_handler),
+            ) as hands,
+            ExitStack() as stack,
+        ):  # fmt: skip
+            stack.callback(hands.kill)
+            assert "listening" in hands.stdout.readline()
+            with socket.create_connection(("127.0.0.1", port)) as quest:
+                for _ in range(20):
+                    quest.sendall(lines)
+                    time.sleep(0.01)
+                quest.sendall(lines[:-2])  # the connection ends within a number
+            fingers_after(client, 0, 1, 2, 3, 4)
+            hands.send_signal(signal.SIGINT)
+            assert hands.wait(TIMEOUT) == 0
+        fingers_after(client)
+        packets = read_packets(tmp_path / "hands.txt")
+        assert {data for _, data in packets} == set(lines.splitlines(keepends=True))
+        with (tmp_path / "hands.txt").open("a") as file:
+            file.write('[1.0, "Left wr')  # the disk was full
+        one_second = time.monotonic() + 2.5  # the lease of the first
+        while time.monotonic() < one_second:
+            client.recv(TIMEOUT)
+        osc = ["--to", f"osc://127.0.0.1:{one.osc_port}", "--play", "hands.txt"]
+        played = subprocess.Popen([*command, *osc], cwd=tmp_path, env=environment)
+        fingers_after(client, 0, 1, 2, 3, 4)
+        assert played.wait(TIMEOUT) == 0
+
+
+# One server for all clients.
+
+
 def test_a_pose_comes_back_as_forces_and_heights(server):
     with server.connect("?format=binary&rate=200") as client:
         bed = json.loads(client.recv(TIMEOUT))
@@ -224,106 +330,6 @@ def test_a_thousand_silent_connections_shut_out_nobody_with_the_token(server):
             for one in silent:
                 one.close()
     is_well(server, 21)
-
-
-def test_a_killed_server_leaves_takes_that_can_be_replayed(tmp_path):
-    part = tmp_path / "recorded" / "take_001_part_00001.npz"
-    with serve(tmp_path, "--out", "recorded", "--part", "0.2") as one:
-        with one.connect("?format=binary&rate=200") as client:
-            client.send(pack_pose(Pose(PRESS, 1)))
-            while not part.exists():
-                next(frames(client))
-        one.process.kill()
-        one.process.wait(TIMEOUT)
-    take = from_bytes(part.read_bytes())
-    assert take.periods >= 40
-    assert sum(1 for _ in replay(take)) == take.periods
-
-
-def test_a_signal_ends_a_server_whose_doors_hang_and_finishes_its_take(tmp_path):
-    with serve(tmp_path, "--out", "recorded", "--part", "0.2") as one:
-        wait_until(lambda: list((tmp_path / "recorded").glob("*_part_00002.npz")))
-        (door,) = subprocess.check_output(["pgrep", "-P", str(one.process.pid)], text=True).split()
-        os.kill(int(door), signal.SIGSTOP)
-        began = time.monotonic()
-        report = one.stop(signal.SIGTERM)
-        assert time.monotonic() - began < 15.0  # 5 s by design; the machine may be busy
-    (found,) = (tmp_path / "recorded").iterdir()
-    assert from_bytes(found.read_bytes()).periods + report["left_out"] == report["periods"]
-    assert "doors that did not answer" in report["counts"]
-
-
-def fingers_after(client, *identities):
-    while True:
-        said = json.loads(client.recv(TIMEOUT))
-        found = {one["id"]: one for one in said["fingers"]} if said["type"] == "state" else {-1: {}}
-        if set(found) == set(identities):
-            return found
-
-
-def test_a_session_has_fingers_by_identity_as_long_as_they_are_named(tmp_path):
-    places = {5: [-0.006, 0.0, 0.039], 9: [0.006, 0.0, 0.038]}
-    fingers = [{"id": one, "position": place} for one, place in places.items()]
-    bad = [{"id": 7, "position": [0, 0, float("nan")]}]
-    with serve(tmp_path, "--fingers", "2") as one, one.connect("?rate=200") as client:
-        assert json.loads(client.recv(TIMEOUT))["fingers"] == 2
-        found = {}
-        while {name: each["position"] for name, each in found.items()} != places:
-            client.send(json.dumps({"type": "poses", "fingers": fingers}))
-            found = fingers_after(client, *places)
-        assert min(each["force"] for each in found.values()) > 0.0
-        client.send(json.dumps({"type": "poses", "fingers": [*bad, *fingers[1:]], "alive": [9]}))
-        refusal = ""
-        while not refusal:
-            refusal = json.loads(client.recv(TIMEOUT)).get("message", "")
-        assert refusal.startswith("Finger 7: pose must be finite numbers")
-        began = time.monotonic()
-        fingers_after(client)  # nobody is named any more
-        assert time.monotonic() - began < 5.0  # 0.1 s by design; the machine may be busy
-        state = json.loads(client.recv(TIMEOUT))
-        while state["total_force"] > 0.0:
-            state = json.loads(client.recv(TIMEOUT))
-
-
-def test_hands_of_a_quest_are_recorded_and_played_into_a_server(tmp_path):
-    numbers = ", ".join(["0.01"] * 63)
-    lines = f"Left wrist:, 0, 1, 0, 0, 0, 0, 1\nLeft landmarks:, {numbers}\n".encode()
-    environment = {**os.environ, "PYTHONPATH": PACKAGES, "DIGICLAY_SERVE_TOKEN": TOKEN}
-    with serve(tmp_path, "--fingers", "5") as one, one.connect("?rate=200") as client:
-        command = [sys.executable, "-m", "digiclay", "hands", "--to", f"ws://127.0.0.1:{one.port}"]
-        with socket.socket() as free:
-            free.bind(("127.0.0.1", 0))
-            port = free.getsockname()[1]
-        listen = [*command, "--port", str(port), "--record", "hands.txt"]
-        with (
-            subprocess.Popen(
-                listen, cwd=tmp_path, env=environment, stdout=subprocess.PIPE, text=True,
-                preexec_fn=partial(signal.signal, signal.SIGINT, signal.default_int_handler),
-            ) as hands,
-            ExitStack() as stack,
-        ):  # fmt: skip
-            stack.callback(hands.kill)
-            assert "listening" in hands.stdout.readline()
-            with socket.create_connection(("127.0.0.1", port)) as quest:
-                for _ in range(20):
-                    quest.sendall(lines)
-                    time.sleep(0.01)
-                quest.sendall(lines[:-2])  # the connection ends within a number
-            fingers_after(client, 0, 1, 2, 3, 4)
-            hands.send_signal(signal.SIGINT)
-            assert hands.wait(TIMEOUT) == 0
-        fingers_after(client)
-        packets = read_packets(tmp_path / "hands.txt")
-        assert {data for _, data in packets} == set(lines.splitlines(keepends=True))
-        with (tmp_path / "hands.txt").open("a") as file:
-            file.write('[1.0, "Left wr')  # the disk was full
-        one_second = time.monotonic() + 2.5  # the lease of the first
-        while time.monotonic() < one_second:
-            client.recv(TIMEOUT)
-        osc = ["--to", f"osc://127.0.0.1:{one.osc_port}", "--play", "hands.txt"]
-        played = subprocess.Popen([*command, *osc], cwd=tmp_path, env=environment)
-        fingers_after(client, 0, 1, 2, 3, 4)
-        assert played.wait(TIMEOUT) == 0
 
 
 pin_display = load_example("pin_display")
