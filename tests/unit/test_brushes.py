@@ -266,7 +266,7 @@ def crossed(bed, degrees, brush):
 
 @pytest.mark.parametrize(
     "bed, degrees",
-    [("paper", 30.0), ("paper", 90.0), ("design", 30.0), ("design", 45.0)],
+    [("paper", 90.0), ("design", 30.0), ("design", 45.0)],
 )
 def test_a_ridge_across_a_ridge_cuts_nothing_off_and_leaves_no_spikes(bed, degrees):
     before, after = crossed(bed, degrees, Brush.RAISE)

@@ -242,7 +242,7 @@ def test_what_near_images_leave_does_not_depend_on_the_periods_of_a_tick(name):
     assert_array_equal(left, meet(name)[2])
 
 
-@pytest.mark.parametrize("drawn", [0, 12, 29])
+@pytest.mark.parametrize("drawn", [0, 12])
 def test_rays_leave_their_nominal_surface_whenever_the_hand_lets_go(drawn):
     path = line(2, 1, 18, -6)
     session = queue(begin("hybrid"), path[: drawn + 1], RAYS, RAISE, held=True)
