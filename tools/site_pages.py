@@ -346,9 +346,8 @@ def on_config(config: Any) -> None:
     """Set the form of the anchors, and add the packages to the navigation."""
     config.mdx_configs.setdefault("toc", {})["slugify"] = make_anchor
     pages = [{name: f"reference/python/{name}.md"} for name in list_packages()]
-    sections = {title: entries for entry in config.nav for title, entries in entry.items()}
-    reference = {title: entries for entry in sections["Reference"] for title, entries in entry.items()}
-    reference["Python"].extend(pages)
+    reference = next(entry["Reference"] for entry in config.nav if "Reference" in entry)
+    next(entry["Python"] for entry in reference if "Python" in entry).extend(pages)
 
 
 def on_files(files: Any, config: Any) -> None:
