@@ -1,4 +1,4 @@
-"""Sessions of many scenes in one call: played in step, recorded, evaluated."""
+"""Runs of many scenes in one call: simulated together, recorded, evaluated."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -25,11 +25,10 @@ from .structure import Findings, describe_structure
 
 
 class Histories:
-    """Histories of runs: stretches are kept, and written into a history when it is asked for.
+    """Histories of runs, stored as stretches of active cells, and written out one run at a time.
 
-    A history of all cells of all runs would fill the memory long before the batch is large enough.
-    Scenes are by the numbers of their runs, `play` is before the sessions; without a recorder there are no
-    histories.
+    Histories of all cells of all runs would not fit into memory. `scenes`: by the numbers of the runs;
+    `play`: the batch before its first period; without a recorder there are no histories.
     """
 
     def __init__(self, scenes: Mapping[int, Scene], recorder: Recorder | None, play: Play) -> None:
@@ -40,7 +39,7 @@ class Histories:
         self._history: HistoryWriter | None = None
 
     def _store(self, stretch: Stretch) -> None:
-        """Keep a stretch of the runs that are present."""
+        """Store a stretch of the present runs."""
         for run, part in zip(self._present, stretch.split(), strict=True):
             self._stretches[run].append(part)
 
@@ -54,9 +53,9 @@ class Histories:
         self._recording.observe(now.play.state)
 
     def finish(self, now: Instant, index: int) -> Result:
-        """Return the result of a run at its end; its history is valid until that of another is requested.
+        """Return the result of a run at its end; its history is valid until the next result.
 
-        New memory for every run would take longer than all that is written into it.
+        To allocate memory for each run would take longer than to write it.
         """
         run = now.play.runs[index]
         rows = self._write(self._recording, run, now.play.state.period) if self._recording else {}
@@ -75,7 +74,7 @@ class Histories:
 
 
 class Sums:
-    """Sums what the metrics of runs need over their cells, row by row; parameters as of `Histories`."""
+    """Sums over cells that the metrics need, row by row; parameters as of `Histories`."""
 
     def __init__(self, scenes: Mapping[int, Scene], recorder: Recorder | None, play: Play) -> None:
         recorder = recorder or Recorder()
@@ -85,11 +84,11 @@ class Sums:
         self._first = play.state.row(0)
         self._sums = np.zeros((count, 5, len(play.runs)))
         self._following = np.zeros((count, len(play.runs)), np.intp)
-        # Times, poses and nearest cells of each path: most runs of a batch share one.
+        # Times, poses and nearest cells by path, which most runs of a batch share.
         self._ways: dict[Any, tuple[Floats, Floats, NDArray[np.intp]]] = {}
 
     def observe(self, now: Instant) -> None:
-        """Sum a control period up."""
+        """Add a control period."""
         if now.play.runs is not self._present:
             self._present = now.play.runs
             self._columns = [self._runs.index(run) for run in self._present]
@@ -107,7 +106,7 @@ class Sums:
         rows, following = self._sums[:count, :, column], self._following[:count, column].copy()
         if count > 1:
             rows[-1], following[-1] = self._sum(active)[:, index], _count_following(active)[index]
-        # In one piece each: they are gone through many times.
+        # Contiguous, since they are read many times.
         total, x, y, height, strongest = np.ascontiguousarray(rows.T)
         first, last = self._first[:, column], play.state.row(0)[:, index]
         sums = CellSums(total, x, y, height, strongest, following, first, last)
@@ -144,7 +143,7 @@ Outcome = Result | DigiclayError
 
 @dataclass(frozen=True, eq=False)
 class Monitor:
-    """References that follow sessions through every control period; see `accuracy.ErrorMonitor`."""
+    """References that follow the runs through every control period; see `accuracy.ErrorMonitor`."""
 
     play: Play
     """The references."""
@@ -153,14 +152,14 @@ class Monitor:
 
 
 def _start(scenes: Mapping[int, Scene]) -> Monitor:
-    """Return the monitor of sessions before their first control period."""
+    """Return the monitor of runs before their first control period."""
     references = {run: make_reference(scene) for run, scene in scenes.items()}
     systems = {run: assemble(scene) for run, scene in references.items()}
     return Monitor(begin_play(references, systems), np.zeros((3, len(scenes))))
 
 
 def _follow(monitor: Monitor, leader: Play) -> Monitor:
-    """Integrate the control period that sessions have just done."""
+    """Integrate the last control period of the runs again."""
     play, largest = monitor.play, monitor.largest
     if leader.runs != play.runs:
         largest = largest[:, [play.runs.index(run) for run in leader.runs]]
@@ -191,7 +190,7 @@ def _run(
     *,
     errors: bool = False,
 ) -> Iterator[tuple[int, Outcome]]:
-    """Yield the numbers of the scenes as they come to their ends, and what an observer makes of them."""
+    """Yield the number of each scene at its end, and its result by an observer."""
     systems: dict[int, System] = {}
     for number, scene in enumerate(scenes):
         try:
@@ -227,12 +226,12 @@ def _run(
 def run_together(
     scenes: Sequence[Scene], *, stopped: Callable[[], bool] | None = None
 ) -> Iterator[tuple[int, Outcome]]:
-    """Run scenes from rest to their ends, all at once.
+    """Run scenes from rest to their ends, all together.
 
-    The scenes are of one finger each, and of one `structure.describe_structure`. When `stopped`, asked after
-    each control period, says True, the runs that are not done are given up. Yields the number of a scene at
-    its end, and what `run_scene.run` would return or raise; the history is valid until the next result is
-    asked for, and the run time is a share, see `play.Instant`.
+    Each scene has one finger, and all have one structure, see `structure.describe_structure`. `stopped` is
+    called after each control period; if it returns True, unfinished runs are dropped. Yields the number of a
+    scene at its end, and the result or error of `run_scene.run`. The history is valid until the next result,
+    and the run time is a share, see `play.Instant`.
     """
     return _run(scenes, Histories, stopped)
 
@@ -240,9 +239,9 @@ def run_together(
 def measure_together(
     scenes: Sequence[Scene], *, errors: bool = False, stopped: Callable[[], bool] | None = None
 ) -> Iterator[tuple[int, Outcome]]:
-    """Run scenes as `run_together` does, and measure them without ever having their histories.
+    """Run scenes as `run_together`, and measure them without storing their histories.
 
-    The metrics are those with a history. With `errors`, theirs are estimated too, or it is said why not;
-    references, see `accuracy.make_reference`, must be of one structure as well.
+    The metrics are the same as with a history. `errors`: whether errors are estimated; the references, see
+    `accuracy.make_reference`, must then have one structure as well.
     """
     return _run(scenes, Sums, stopped, errors=errors)

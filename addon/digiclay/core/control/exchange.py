@@ -1,4 +1,4 @@
-"""Exchange between neighboring cells: diffusion over a bed, which keeps the sum of what is exchanged."""
+"""Exchange between neighboring cells: diffusion over a bed, which preserves the sum of the values."""
 
 import math
 from dataclasses import dataclass
@@ -11,10 +11,10 @@ from ..model.layout import Grid
 
 @dataclass(frozen=True)
 class Exchange:
-    """Exchange between neighbors in one control period, on a bed with so many columns.
+    """Exchange between neighbors in one control period.
 
-    Two neighbors in a row exchange a share `along` of their difference, those of two rows `across`. Where odd
-    rows are `shifted`, a cell has six neighbors, not four.
+    Neighbors in a row exchange a share `along` of their difference, those in two rows `across`. If odd rows
+    are `shifted`, a cell has six neighbors, not four.
     """
 
     columns: int
@@ -23,7 +23,7 @@ class Exchange:
     across: float
 
     def find_pairs(self, cells: Cells) -> list[tuple[Cells, Cells, float]]:
-        """Return where in `cells` neighbors stand, each pair once, with the share they exchange."""
+        """Return indices of neighbors among `cells`, each pair once, with the share that they exchange."""
         row, column = np.divmod(cells, self.columns)
         last = self.columns - 1
         steps = [(1, column < last, self.along), (self.columns, column <= last, self.across)]
@@ -43,9 +43,9 @@ class Exchange:
         return pairs
 
     def even_out(self, cells: Cells, values: Floats, weight: Floats | None = None) -> Floats:
-        """Return values of some cells, (m,), after neighbors among them have exchanged; their sum is kept.
+        """Return values of cells, (m,), after an exchange between neighbors among them, with the same sum.
 
-        Of two neighbors the lesser weight, (m,) from 0 to 1, is the part of the exchange that takes place.
+        The smaller weight of two neighbors, (m,) from 0 to 1, scales their exchange.
         """
         change = np.zeros(cells.size)
         for first, second, share in self.find_pairs(cells):
@@ -57,10 +57,10 @@ class Exchange:
 
 
 def make_exchange(grid: Grid, diffusivity: float, period: float) -> Exchange:
-    """Return the exchange that spreads values with a diffusivity, m²/s, in all directions in a period, s.
+    """Return the exchange of a diffusivity, m²/s, isotropic, in a period, s.
 
-    The rates come from matching ``D`` along x and y; their sum is limited so that no period,
-    however long, makes neighbors overshoot one another.
+    The rates give the diffusivity along x and y; their sum is limited so that neighbors do not overshoot in a
+    period of any length.
     """
     plan = grid.layout
     if not plan.shifted:

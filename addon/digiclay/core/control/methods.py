@@ -1,6 +1,6 @@
-"""Control methods of a scene: one row a method, one module each; and those of one's own, added by name.
+"""Table of control methods, one module each, and methods of users, added by name.
 
-What a scene, a panel or a comparison has to know of a method it finds here, by `find_method`.
+Scenes, panels and comparisons find the data of a method here, by `find_method`.
 """
 
 from collections.abc import Mapping
@@ -15,22 +15,22 @@ from ..model.laws import import_part
 
 
 class Pace(NamedTuple):
-    """How fast a method can be led by a fingertip; the default suits any."""
+    """Largest speeds of a fingertip that leads a method; the defaults suit any method."""
 
     drag: float = 2.0
-    """Fastest drag of a blister raised or leveled, in its radii a second."""
+    """Fastest drag of a raised or leveled blister, in radii per second."""
     push: float = 20.0 / 3.0
-    """Fastest drag of a fingertip that presses a valley, in radii of the blister a second."""
+    """Fastest drag of a fingertip that presses a valley, in radii of the blister per second."""
     fastest: float = 0.1
-    """Fastest drag whatever the blister, m/s."""
+    """Fastest drag of any blister, m/s."""
     ready: bool = False
-    """Whether pins ahead stand so that they come to any height in time at that speed."""
+    """Whether pins ahead are prepared to reach any height in time at that speed."""
     press: float = 20e-3
     """Fastest press, m/s: a faster one runs into pins whose valves have not opened yet."""
     lift: float = 0.7
     """Fastest rise, as a share of the speed of a pin without load."""
     gain: float = 1.0
-    """Time to gain that speed, s: at once, it leaves the pins behind, whose valves have not opened yet."""
+    """Time of acceleration to that speed, s: a faster one leaves pins behind, with valves still shut."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -53,19 +53,19 @@ class Method:
     """Module of a control method, and its requirements."""
 
     module: str
-    """Within the core; holds a function ``build(parameters, device)``."""
+    """Within the core; has a function ``build(parameters, device)``."""
     parameters: str
     """Class of its parameters there."""
     blister: Mapping[str, float] | None = None
-    """Its defaults for the blister where they differ; None: it forms no blister."""
+    """Differing defaults of the blister; None: it forms no blister."""
     recovers: bool = False
-    """Whether its cells go back to the height they had at rest."""
+    """Whether its cells return to rest."""
     by_set: bool = False
-    """Whether its orders for a cell depend on which other cells are active; see `System.by_set`."""
+    """Whether its orders for a cell depend on the active set; see `System.by_set`."""
     batched: bool = True
-    """Whether a batch of its runs takes less time than they take one by one."""
+    """Whether a batch of its runs is faster than single runs."""
     digest: str = ""
-    """Identifies the code of a method that is no part of this package; empty: it is."""
+    """Identifies the code of a user's method; empty for a built-in one."""
 
     def import_parameters(self) -> type[ControlParameters]:
         """Import the class of its parameters."""
@@ -73,17 +73,17 @@ class Method:
         return kind
 
     def build(self, parameters: Any, device: Any) -> Any:
-        """Return its controller for a `DeviceInfo`, or raise a ParameterError that says what does not fit."""
+        """Return its controller for a `DeviceInfo`; ParameterError if parameters do not fit it."""
         return import_part(self.module, "build")(parameters, device)
 
     def describe(self) -> str:
-        """Return what it does, in the first line of its class, where it has one of its own."""
+        """Return the first line of its class's documentation, if it has any."""
         kind = self.import_parameters()
         line = (kind.__doc__ or "").strip().partition("\n")[0].removesuffix(".")
         return "" if line.startswith(f"{kind.__name__}(") else line
 
 
-#: A .blend keeps a method's place in this table: new ones are added at its end.
+#: A .blend stores the index of a method in this table: new ones are added at its end.
 METHODS: dict[str, Method] = {
     "virtual_master": Method("control.virtual_master", "VirtualMaster", {}),
     "cell_states": Method(
@@ -98,9 +98,9 @@ METHODS: dict[str, Method] = {
     "hybrid": Method("control.hybrid", "Hybrid", {}, batched=False),
 }
 
-#: What has been added to this process, see `add_method`; a .blend keeps the names of these.
+#: Methods added to this process, see `add_method`; a .blend stores their names.
 _ADDED: dict[str, Method] = {}
-#: Where an unknown method may come from.
+#: Remedy for an unknown method.
 HINT = (
     "A method of your own must be loaded: by --method path/to/mine.py:Mine, in Python by "
     "digiclay.scene(..., {'control.method': Mine}), in Blender by the preferences."
@@ -108,7 +108,7 @@ HINT = (
 
 
 def add_method(name: str, method: Method) -> None:
-    """Add a method to this process or exchange it; ParameterError when a built-in one has its name."""
+    """Add or replace a method in this process; ParameterError if a built-in one has its name."""
     if name in METHODS:
         raise ParameterError("control", "method", "must not have the name of a built-in method", repr(name))
     _ADDED[name] = method
@@ -120,7 +120,7 @@ def remove_method(name: str) -> None:
 
 
 def list_added() -> dict[str, Method]:
-    """Return the methods of one's own that are known to this process, by name."""
+    """Return the added methods of this process, by name."""
     return dict(_ADDED)
 
 
@@ -130,7 +130,7 @@ def list_methods() -> dict[str, Method]:
 
 
 def find_method(name: Any, field: str = "control.method") -> Method:
-    """Return a method by its name, or raise a ParameterError about the field, with the remedy."""
+    """Return a method by its name; ParameterError about the field, with a remedy."""
     methods = list_methods()
     if isinstance(name, str) and name in methods:
         return methods[name]

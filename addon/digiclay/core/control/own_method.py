@@ -1,8 +1,8 @@
-"""Control methods of one's own: their class, what they are shown and order, and the guard around them.
+"""Control methods of users: base class, measurements and orders, and the guard around their code.
 
-An own method is one frozen dataclass: its fields are the parameters, its methods are pure functions. `begin`
-returns the memory before a session, `locate` the cells to be commanded, and `command` turns forces and
-heights into commanded heights or valve openings. A method with a controller of its own overrides `build`.
+An own method is a frozen dataclass: its fields are the parameters, its methods are pure functions. `begin`
+returns the memory before a session, `locate` the cells to be commanded, and `command` converts forces and
+heights to commanded heights or valve openings. A method with a controller of its own overrides `build`.
 """
 
 from __future__ import annotations
@@ -32,23 +32,20 @@ HIGHEST = int(Mode.FROZEN)
 
 
 class Cells(NamedTuple):
-    """Cells as an own method sees them, m of them; which ones changes from period to period.
-
-    All arrays are read-only.
-    """
+    """Cells of a period, m of them, as an own method sees them; the arrays are read-only."""
 
     x: Floats
     y: Floats
-    """(m,): Where they are, m."""
+    """(m,): Positions, m."""
     height: Floats
     force: Floats
-    """(m,): As measured, m and N."""
+    """(m,): Measured heights, m, and forces, N."""
     target: Floats
-    """(m,): Height they were last commanded to, m."""
+    """(m,): Last commanded heights, m."""
     mode: Modes
     """(m,): Their modes, see `Mode`."""
     rows: Floats
-    """(rows, m): What the method remembers of each cell, all 0 at first; see `OwnMethod.rows`."""
+    """(rows, m): State rows of the method, 0 at first; see `OwnMethod.rows`."""
     number: Numbers
     """(m,): Their numbers in the bed."""
 
@@ -138,7 +135,7 @@ class OwnControl:
         return self.parameters.locate(memory, show_cells(touched), self.device)
 
     def command(self, memory: Memory, seen: Measurement) -> tuple[Memory, Commands]:
-        """Check the method's orders, and fill in what it leaves open; see `Controller`."""
+        """Check the method's orders, and add defaults; see `Controller`."""
         given = self.parameters.command(memory, show_cells(seen), self.device)
         memory, orders = take_results(given, 2, "memory and orders")
         if not isinstance(orders, Orders):
@@ -168,7 +165,7 @@ class OwnControl:
 
 
 def show_cells(seen: Measurement) -> Cells:
-    """Return what is measured of cells as an own method sees it: of the copies in `guarded`, read-only."""
+    """Return a measurement for an own method, with read-only rows."""
     basis, rows = seen.quadratic_basis, seen.own[:]
     rows.flags.writeable = False
     return Cells(basis[1], basis[2], seen.height, seen.force, seen.target, seen.mode, rows, seen.cells)
@@ -201,7 +198,7 @@ def check_array(values: Any, name: str, shape: tuple[int, ...], kinds: str = "fi
 
 
 def check_modes(values: Any, size: tuple[int, ...]) -> Modes:
-    """Return modes as they are stored, or raise the rule where they are no codes of `Mode`."""
+    """Return modes as stored, or raise the rule if they are no codes of `Mode`."""
     modes = check_array(values, "mode", size, "iu")
     if modes.size and not (modes.min() >= 0 and modes.max() <= HIGHEST):
         raise ValueError(f"must return mode as codes of Mode, from 0 to {HIGHEST} (got {modes.max()})")
@@ -209,22 +206,22 @@ def check_modes(values: Any, size: tuple[int, ...]) -> Modes:
     return stored
 
 
-#: Control periods that the calls of one control period may take on average, in processor time; and how many
-#: calls an average is taken over. A built-in method takes a tenth of one.
+#: Largest mean processor time of the calls of a control period, in control periods, and number of calls in
+#: the mean. A built-in method takes a tenth of a period.
 MOST_PERIODS, CALLS = 20.0, 20
-#: Most numbers a method may keep of a cell.
+#: Most state rows of a method.
 MOST_ROWS = 1000
 
 
 @dataclass(eq=False)
 class Pace:
-    """Processor time of the `count` newest calls, s: the one thing of a session that is not its state."""
+    """Processor time of the `count` newest calls, s; the only part of a session outside its state."""
 
     spent: float = 0.0
     count: int = 0
 
     def add(self, spent: float) -> float | None:
-        """Add a call; return the mean over `CALLS` of them, s, each time that these are complete."""
+        """Add a call; return the mean over `CALLS` calls, s, once they are complete."""
         self.spent, self.count = self.spent + spent, self.count + 1
         if self.count < CALLS:
             return None
@@ -235,7 +232,7 @@ class Pace:
 
 @dataclass(frozen=True, eq=False)
 class Guarded:
-    """Controller that hands on to another one, and checks what that gives."""
+    """Controller that delegates to another one, and checks its results."""
 
     inner: Controller
     origin: str
@@ -277,7 +274,7 @@ class Guarded:
             commands = orders if type(self.inner) is OwnControl else self._check(orders, given)
             seen.own[:] = given.own
         mean = self.pace.add(time.thread_time() - start)
-        # A live session would stand still.
+        # Otherwise a live session would stop.
         if mean is not None and mean > MOST_PERIODS * self.period:
             rule = f"must take at most {MOST_PERIODS:g} control periods of processor time a call"
             got = f"{mean / self.period:.3g} of {self.period:.3g} s on average over {CALLS}"
@@ -323,7 +320,7 @@ def guard(build: Any, origin: str, file: str, period: float) -> Guarded:
 
 
 def describe_failure(error: BaseException, file: str) -> str:
-    """Return what an error of unknown code breaks, a rule ``must ...`` of ours, or with its file's line."""
+    """Return the rule that an error of unknown code breaks, one of ours or *must not raise* with its line."""
     text = str(error).rstrip(".")
     if text.startswith("must ") and isinstance(error, (TypeError, ValueError)):
         return text
@@ -338,7 +335,7 @@ def describe_failure(error: BaseException, file: str) -> str:
 
 
 def _copy_read_only(seen: Measurement) -> Measurement:
-    """Return copies, so that no view leads to the bed's own arrays; read-only but the controller's rows."""
+    """Return copies, so that no view leads to arrays of the bed; read-only except the controller's rows."""
     arrays: Any = seen[:-3]  # a method of unknown code is called for one run at a time
     given = Measurement(*(array.copy() for array in arrays))
     for array in given[:-3]:
@@ -347,7 +344,7 @@ def _copy_read_only(seen: Measurement) -> Measurement:
 
 
 def _check_memory(memory: Memory) -> None:
-    """Refuse a memory that a kept state could not hold; see `session.snapshot`."""
+    """Refuse a memory that cannot be stored; see `session.snapshot`."""
     if isinstance(memory, tuple):
         for item in memory:
             _check_memory(item)
@@ -359,7 +356,7 @@ def _check_memory(memory: Memory) -> None:
 
 
 def _check_alike(before: Any, after: Any) -> None:
-    """Refuse a memory of another structure than the one there was: a kept state could not be read back."""
+    """Refuse a memory of another structure than before: a stored state could not be read."""
     if after is before:
         return
     if isinstance(after, tuple) and type(after) is type(before) and len(after) == len(before):
@@ -376,7 +373,7 @@ def _check_alike(before: Any, after: Any) -> None:
         raise ValueError("must return a memory without NaN")
 
 
-#: Kinds of numbers, each by its rank; and which rank may follow which: a float may become a whole number.
+#: Kinds of numbers by rank, and permitted ranks before and after: a float may become a whole number.
 NUMBERS = ((bool, np.bool_), (int, np.integer), (float, np.floating))
 ALIKE = ((0, 0), (1, 1), (2, 2), (2, 1))
 

@@ -1,8 +1,8 @@
-"""Engine of a bed under several fingertips: its active cells, and how they move.
+"""Engine of a bed under several fingertips: active cells and their motion.
 
-A cell is moved once for each fingertip that may touch it, as if that one were alone: a pair. All pairs are
-the cells of one large bed to the stepper. The lowest of a cell's pairs is right unless two of its fingertips
-press it: then the cell is moved again under both.
+A cell and a fingertip that may touch it are a pair. Each pair is moved as if its fingertip were alone; for
+the stepper all pairs are the cells of one large bed. The lowest pair of a cell is correct unless two
+fingertips press the cell: then it is moved again under both.
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ from .active_set import Selection
 from .state import ActiveSet, State
 from .system import System
 
-#: How many times as long as that of one finger a set serves.
+#: Lifetime of a set, relative to that under one finger.
 LONGER = 8
-#: How far pins may rise until a set is made anew, m, at least as far as they can in two periods: the less,
-#: the fewer cells a fingertip may touch.
+#: Largest rise of pins while a set serves, m, at least that of two periods: the smaller, the fewer cells a
+#: fingertip may touch.
 RISE = 3e-3
-#: How far a fingertip may go until a set is made anew, m, at least a pitch: fast strokes cross a narrow one
+#: Largest motion of a fingertip while a set serves, m, at least a pitch: fast strokes cross a narrow margin
 #: in a few periods.
 ROOM = 2.25e-3
 #: Moves cells that several fingers press: heights (g,), openings and commands (l, g), filters (r, c, g),
@@ -41,21 +41,21 @@ class HandSelection(Selection):
 
     @property
     def margin(self) -> float:
-        """How much farther than it must the set goes, m."""
+        """Margin of the discs of a set, m."""
         return max(ROOM, self.grid.layout.pitch)
 
     @cached_property
     def lifetime(self) -> int:
-        """Control periods for which a set serves: to make one takes as long as a period of ten fingers."""
+        """Control periods for which a set serves: its selection takes as long as a period of ten fingers."""
         return LONGER * super().lifetime
 
     @cached_property
     def rise(self) -> float:
-        """How far pins may rise while a set serves, m."""
+        """Largest rise of pins while a set serves, m."""
         return max(RISE, 2.0 * float(self.period * self.fastest))
 
     def serves(self, active: ActiveSet, period: int, window: Any, control: Discs | None) -> bool:
-        """Return whether a set has all cells that can change; orders may ask for a disc more."""
+        """Return whether a set includes all cells that can change; orders may add a disc."""
         former = active.control
         if control is not None and (former is None or len(former[0]) != len(control[0])):
             return False
@@ -78,9 +78,9 @@ class HandSelection(Selection):
         return np.concatenate([first, *others.nonzero()]), first.size
 
     def release(self, state: State) -> Flags:
-        """Put the active cells back; the pulp of a fingertip out of reach has aged since they were taken."""
+        """Put the active cells back, and age the pulp of fingertips out of reach since the set began."""
         active, near, touch = state.active, state.active.near, self.cell.touch
-        # Of cells taken over from another number of fingertips no disc tells whose pulps have aged: none has.
+        # Without discs, after a change of the number of fingertips, no pulp has aged.
         timed = active.reach is not None and any_true(np.asarray(active.reach[2]) >= 0.0)
         if near and timed and isinstance(touch, HandTouch):
             rows = [finger.pulp.rows for finger in touch.each]
@@ -90,7 +90,7 @@ class HandSelection(Selection):
         return super().release(state)
 
     def take(self, state: State, chosen: ActiveSet) -> ActiveSet:
-        """Take chosen cells out of the bed of a state whose set is released; see `Selection`."""
+        """Return the chosen set with its rows of a state whose set is released; see `Selection`."""
         taken = super().take(state, chosen)
         taken.block[self.rows.pressing] = 0.0
         return taken
@@ -112,9 +112,9 @@ class HandSystem(System):
 
     cells: tuple[Cell, ...]
     plans: tuple[Any, ...]
-    """Those of the fingers; one and the same plan where fingers are alike."""
+    """Plan of each finger; equal fingers share one."""
     press_together: PressTogether | None
-    """None: nothing is touched."""
+    """None without contact."""
 
     @property
     def fingers(self) -> int:
@@ -129,7 +129,7 @@ class HandSystem(System):
 
 
 class Pairs:
-    """The pairs of fingers that are alike, prepared to be moved as the cells of one bed."""
+    """Pairs of equal fingers, which the stepper moves as the cells of one bed."""
 
     def __init__(
         self, system: HandSystem, active: ActiveSet, inside: Flags, fingers: list[int], others: Cells
@@ -142,7 +142,7 @@ class Pairs:
         self.columns = columns = np.concatenate([self.cells, others])
         filters = np.arange(cell.pulp_rows.start, cell.pulp_rows.stop)[:, None]
         common = [0, *range(system.rows.physics)[system.cell.lag_rows], *range(rows.count)[rows.commands]]
-        # Where in the block the rows of a pair are: height, filters of its own finger, openings and commands.
+        # Indices in the block of a pair's rows: height, filters of its finger, openings and commands.
         of_pairs = (filters + self.fingers * filters.size) * width + self.cells
         self.filters, self.forces = of_pairs, (rows.pressing.start + self.fingers) * width + self.cells
         shared = np.array(common)[:, None] * width + columns
@@ -154,7 +154,7 @@ class Pairs:
         self.move = system.stepper.prepare(system.plans[fingers[0]], self.rows, count)
 
     def advance(self, block: Floats, finger: HandPeriod | None, instants: int) -> Moved:
-        """Move the pairs of a block; their filters and forces are set in place, no heights."""
+        """Move the pairs of a block; sets their filters and forces in place, but not the heights."""
         flat, count = block.reshape(-1), self.cells.size
         np.take(flat, self.index, out=self.rows, mode="clip")  # another mode copies
         before, forces = self.rows.copy(), flat.take(self.forces)
