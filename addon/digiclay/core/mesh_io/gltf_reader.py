@@ -221,7 +221,11 @@ def _placement(node: Any) -> Floats:
     if "matrix" in node:  # column by column
         return np.array(node["matrix"], np.float64).reshape(4, 4)[:, :3]
     x, y, z, w = map(float, node.get("rotation", (0.0, 0.0, 0.0, 1.0)))
-    (turn,) = make_matrices(np.array([[w if any((x, y, z, w)) else 1.0, x, y, z]]))
+    quaternion = np.array([[w, x, y, z]])
+    with np.errstate(all="ignore"):  # numbers that are not finite are refused with the vertices
+        if not np.linalg.norm(quaternion):
+            quaternion[0, 0] = 1.0
+        (turn,) = make_matrices(quaternion)
     scale = np.array(node.get("scale", (1.0, 1.0, 1.0)), np.float64).reshape(3, 1)
     shift = np.array(node.get("translation", (0.0, 0.0, 0.0)), np.float64).reshape(1, 3)
     return np.concatenate([scale * turn.T, shift])
