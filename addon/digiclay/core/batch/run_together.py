@@ -21,7 +21,7 @@ from ..session.accuracy import Errors, compare, explain_absence, make_reference
 from ..session.memory_limit import check_memory
 from ..session.run_scene import Result, evaluate, measure_losses, report
 from .play import Instant, Play, begin_play, keep_runs, locate_fingers, make_divergence_error, play_all
-from .structure import Findings, describe_structure
+from .structure import describe_structure
 
 
 class Histories:
@@ -174,8 +174,7 @@ def _follow(monitor: Monitor, leader: Play) -> Monitor:
 
 def _refuse_unlike(scenes: Mapping[int, Scene]) -> None:
     """Refuse scenes that are not of one structure."""
-    findings = Findings()
-    structures = {run: describe_structure(scene, findings) for run, scene in scenes.items()}
+    structures = {run: describe_structure(scene) for run, scene in scenes.items()}
     first, wanted = next(iter(structures.items()))
     for run, structure in structures.items():
         if structure != wanted:

@@ -1,11 +1,10 @@
 """Structure of scenes: a batch has scenes of one structure."""
 
-from collections.abc import Callable
 from dataclasses import fields, is_dataclass, replace
 from typing import Any
 
-from ..model.layout import Grid, make_grid
-from ..scene.assembly import Motion, count_rows, make_motion
+from ..model.layout import make_grid
+from ..scene.assembly import count_rows, make_motion
 from ..scene.schema import Scene
 from ..steppers.bernoulli import BernoulliPlan
 
@@ -27,36 +26,15 @@ CLOSED_FORM = ("bernoulli", "richardson")
 PHYSICS = ("actuator", "supply", "fluid", "valve", "conduit", "valve_lag", "delay", "contact", "relaxation")
 
 
-#: Most cached kinds of parts, motions of cells, and beds: a bed can have a million cells.
-KINDS, MOTIONS, BEDS = 4096, 1024, 2
-
-
-class Findings:
-    """Cache of functions of parts, for scenes with equal parts."""
-
-    def __init__(self) -> None:
-        self._results: dict[int, dict[Any, Any]] = {KINDS: {}, MOTIONS: {}, BEDS: {}}
-
-    def find(self, most: int, key: Any, make: Callable[..., Any], *given: Any) -> Any:
-        """Return the result for a key, computed once; the oldest of `most` results is dropped."""
-        results = self._results[most]
-        if key not in results:
-            if len(results) >= most:
-                del results[next(iter(results))]
-            results[key] = make(*given)
-        return results[key]
-
-
-def describe_structure(scene: Scene, findings: Findings | None = None) -> Any:
+def describe_structure(scene: Scene) -> Any:
     """Return a key that scenes of one batch have in common.
 
     For the closed-form and the Richardson stepper it has the kinds of the parts, not their numbers. Other
-    steppers have no axis of runs: all cells must be alike. `findings`: cache of earlier scenes. Raises
-    ParameterError if the parts of the scene are not compatible.
+    steppers have no axis of runs: all cells must be alike. Raises ParameterError if parts of the scene are
+    not compatible.
     """
     if len(scene.fingers) != 1:
         return "one by one", len(scene.fingers)
-    findings = findings or Findings()
     physics = tuple(scene.section(name) for name in PHYSICS)
     fingertips = tuple(finger.fingertip for finger in scene.fingers)
     sensors = scene.sensors and replace(scene.sensors, seed=0)
@@ -66,7 +44,7 @@ def describe_structure(scene: Scene, findings: Findings | None = None) -> Any:
         scene.layout,
         scene.method if scene.control else None,
         scene.shape is None,
-        *(findings.find(KINDS, part, classify, part) for part in parts),
+        classify(parts),
         rounds,
         sensors and sensors.noisy,
         scene.recorder,
@@ -74,11 +52,9 @@ def describe_structure(scene: Scene, findings: Findings | None = None) -> Any:
     )
     if scene.simulation.stepper not in CLOSED_FORM:
         return (*common, physics, replace(scene.simulation, duration=0.0))
-    steps = scene.simulation.control_period, scene.simulation.steps, scene.simulation.stepper
-    motion: Motion = findings.find(MOTIONS, (physics, fingertips, steps), make_motion, scene)
-    bed: Grid = findings.find(BEDS, scene.layout, make_grid, scene.layout)
+    motion = make_motion(scene)
     plan = motion.plan
     plans = (plan,) if isinstance(plan, BernoulliPlan) else (plan.coarse, plan.fine)
     nodes = tuple((plan.laminar, *((part.start, part.stop) for part in plan.nodes)) for plan in plans)
-    kind = findings.find(KINDS, physics, classify, physics)
-    return (*common, kind, count_rows(scene, bed, motion), nodes, motion.instants.size)
+    rows = count_rows(scene, make_grid(scene.layout), motion)
+    return (*common, classify(physics), rows, nodes, motion.instants.size)

@@ -1,7 +1,7 @@
 """Conversion between scene files' tables and `schema.Scene`."""
 
 import dataclasses
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 
 from ..base.errors import ParameterError
 from ..base.quantity import Parameters, list_quantities
@@ -19,8 +19,6 @@ from ..files.tables import (
 from ..model.layout import ARRANGEMENTS, Layout
 from ..model.trajectory import Path, Waypoint
 from .schema import FINGER_SECTIONS, NEEDS, OPTIONAL, SECTIONS, UNASKED, Finger, Scene, import_parameters
-
-Writer = Callable[..., Iterable[str]]
 
 #: Value of the section of an omitted part.
 ABSENT = "absent"
@@ -258,16 +256,16 @@ def _read_waypoint(owner: str, row: Table) -> Waypoint:
     return read_part(owner, Waypoint, {}, row)
 
 
-def format_scene(scene: Scene, write: Writer | None = None) -> str:
-    """Return a scene file, in SI units, that resolves to an equal scene; `write`: as `write_part`.
+def format_scene(scene: Scene) -> str:
+    """Return a scene file, in SI units, that resolves to an equal scene.
 
     Raises ParameterError for a scene whose method is not loaded: its parameters are unknown here.
     """
     find_method(scene.method)
-    return "\n".join(_write_lines(scene, write or write_part)) + "\n"
+    return "\n".join(_write_lines(scene)) + "\n"
 
 
-def _write_lines(scene: Scene, write: Writer) -> Iterator[str]:
+def _write_lines(scene: Scene) -> Iterator[str]:
     """Yield the lines of a scene file; a single finger is written as by versions without several."""
     alone = len(scene.fingers) == 1
     sections = [name for name in SECTIONS if alone or name not in FINGER_SECTIONS]
@@ -279,21 +277,21 @@ def _write_lines(scene: Scene, write: Writer) -> Iterator[str]:
         yield f"{FINGERS} = []"
     for name in sections:
         method = scene.method if name == "control" else ""
-        yield from write(name, scene.section(name), method)
+        yield from _write_part(name, scene.section(name), method)
     for finger in scene.fingers:
         if alone:
-            yield from write("trajectory", finger.trajectory)
+            yield from _write_part("trajectory", finger.trajectory)
             break
         yield f"\n[[{FINGERS}]]"
         parts = {name: getattr(finger, name) for name in FINGER_PARTS}
         absent = [name for name in parts if name in OPTIONAL and parts[name] is None]
         yield from (f'{name} = "{ABSENT}"' for name in absent)
         for name, part in parts.items():
-            yield from write(f"{FINGERS}.{name}", part)
-        yield from write(f"{FINGERS}.trajectory", finger.trajectory)
+            yield from _write_part(f"{FINGERS}.{name}", part)
+        yield from _write_part(f"{FINGERS}.trajectory", finger.trajectory)
 
 
-def write_part(section: str, part: Parameters | Path | None, method: str = "") -> Iterator[str]:
+def _write_part(section: str, part: Parameters | Path | None, method: str = "") -> Iterator[str]:
     """Yield the lines of a section, for the control with its method; none for an omitted part."""
     if part is None:
         return

@@ -40,6 +40,9 @@ SLACK = 1e-6
 #: Pose of a recorded fingertip that is absent, (7,): a stroke adds fingertips for its images.
 AWAY = np.array([0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0])
 
+#: Columns of a recording: poses, orders and, last, ticks.
+POSES, ORDERS = slice(-ORDER - 1), slice(-ORDER - 1, -1)
+
 Ticks = tuple[tuple[float, float], ...]
 
 
@@ -197,12 +200,12 @@ class Recording:
     @property
     def path(self) -> Floats:
         """Poses (t + 1, f, 7), which `simulate_path` simulates again bit for bit."""
-        return self.rows[: self.count, : -ORDER - 1].reshape(self.count, -1, 7)
+        return self.rows[: self.count, POSES].reshape(self.count, -1, 7)
 
     @property
     def orders(self) -> Orders | None:
         """The orders of all periods; None: no period has one."""
-        orders = Orders(self.rows[1 : self.count, -ORDER - 1 : -1], self.surfaces)
+        orders = Orders(self.rows[1 : self.count, ORDERS], self.surfaces)
         return orders if orders.given else None
 
     @property
@@ -220,9 +223,9 @@ class Recording:
         new = rows[self.count : end]
         poses = np.tile(AWAY, (len(path), (rows.shape[1] - ORDER - 1) // 7))
         poses[:, : path[0].size] = path.reshape(len(path), -1)
-        new[:, : -ORDER - 1] = poses
+        new[:, POSES] = poses
         new[:, -1] = tick
-        given, surfaces = new[:, -ORDER - 1 : -1], self.surfaces
+        given, surfaces = new[:, ORDERS], self.surfaces
         given[:] = 0.0
         if orders is not None:
             given[:] = orders.rows
@@ -235,7 +238,7 @@ class Recording:
         """Return the recording with fingertips at poses (f, 7) from its last row on."""
         more = max(0, poses.size - (self.rows.shape[1] - ORDER - 1))
         away = np.tile(AWAY, (len(self.rows), more // 7))
-        rows = np.concatenate([self.rows[:, : -ORDER - 1], away, self.rows[:, -ORDER - 1 :]], axis=1)
+        rows = np.concatenate([self.rows[:, POSES], away, self.rows[:, -ORDER - 1 :]], axis=1)
         rows[self.count - 1, : poses.size] = poses.ravel()
         return replace(self, rows=rows)
 
@@ -251,7 +254,7 @@ class Recording:
 
     def _first(self, count: int) -> Recording:
         """Return the first rows of the recording."""
-        rows = self.rows[1:count, -ORDER - 1 : -1]
+        rows = self.rows[1:count, ORDERS]
         needed = int(rows[rows[:, 4] == Verb.PLACE, 0].max(initial=-1.0)) + 1
         return replace(self, count=count, saved=min(self.saved, count), surfaces=self.surfaces[:needed])
 

@@ -9,7 +9,7 @@ from itertools import pairwise
 from ..base.errors import DigiclayError, OutputError, ParameterError, one_line
 from ..base.quantity import find_nearest_name
 from ..batch.run_together import measure_together
-from ..batch.structure import Findings, describe_structure
+from ..batch.structure import describe_structure
 from ..control.methods import find_method
 from ..engine.simulation import Stopped
 from ..files.tables import Record
@@ -126,7 +126,6 @@ def make_bundles(points: Sequence[Point]) -> Bundles:
     results to the last bit. If errors are estimated, the references of a batch must have one structure too.
     """
     alike: dict[object, list[Point]] = {}
-    findings = Findings()
     alone: list[Point] = []
     why: Counter[str] = Counter()
     for point in points:
@@ -139,11 +138,11 @@ def make_bundles(points: Sequence[Point]) -> Bundles:
             why[reason] += 1
             continue
         try:
-            judge = describe_structure(make_reference(point.scene), findings) if point.errors else None
+            judge = describe_structure(make_reference(point.scene)) if point.errors else None
         except ParameterError:  # reported when the point runs
             alone.append(point)
         else:
-            alike.setdefault((describe_structure(point.scene, findings), judge), []).append(point)
+            alike.setdefault((describe_structure(point.scene), judge), []).append(point)
     batches: list[tuple[Point, ...]] = []
     for group in alike.values():
         most = _limit_runs(group[0].scene)

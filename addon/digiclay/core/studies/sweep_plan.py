@@ -19,7 +19,7 @@ from ..control.methods import find_method
 from ..files.run_folder import format_json, read_json, write_whole
 from ..files.tables import Record, Table
 from ..metrics.metric_table import ERRORS, describe_losses
-from ..scene.toml_table import format_scene, write_part
+from ..scene.toml_table import format_scene
 from .axes import Axis, Point
 from .evaluation import FIGURES, TIMES, evaluate
 from .series import Kind, open_series
@@ -62,19 +62,9 @@ class Folder:
 def hash_points(points: Sequence[Point]) -> str:
     """Return a number that identifies the scenes of points, without the comments of their files."""
     scenes = hashlib.sha256()
-    written: dict[tuple[Any, ...], list[str]] = {}
-
-    def write(section: str, part: Any, method: str = "") -> list[str]:
-        # Points share most parts, which all exist until the end: the address of a part identifies it.
-        # Removing the comments of all its lines at once is much faster than line by line.
-        key = section, method, id(part)
-        if key not in written:
-            lines = "\n".join(write_part(section, part, method))
-            written[key] = [NOTE.sub("", lines)] if lines else []
-        return written[key]
-
     for point in points:
-        scenes.update((format_scene(point.scene, write) if point.scene else point.error).encode())
+        text = NOTE.sub("", format_scene(point.scene)) if point.scene else point.error
+        scenes.update(text.encode())
         if point.scene is not None:
             scenes.update(find_method(point.scene.method).digest.encode())  # empty for a built-in one
     return scenes.hexdigest()
