@@ -162,5 +162,4 @@ def time_by_turns(works: Sequence[Work], repeats: int) -> list[float]:
         began = process_time()
         works[number]()
         times[turn, number] = process_time() - began
-    medians: list[float] = np.median(times, axis=0).tolist()
-    return medians
+    return np.median(times, axis=0).tolist()

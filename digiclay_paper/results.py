@@ -132,8 +132,7 @@ class Session(NamedTuple):
 
     def gain(self, name: str) -> float:
         """Return a parameter of the controller; 0 where it has none."""
-        value: float = getattr(self.scene.control, name, 0.0)
-        return value
+        return getattr(self.scene.control, name, 0.0)
 
 
 @dataclass

@@ -95,8 +95,7 @@ def format_osc(name: str, kinds: str, *values: object) -> bytes:
     builder = OscMessageBuilder(f"/digiclay/{name}")
     for kind, value in zip(kinds, values, strict=True):
         builder.add_arg(value, kind)
-    datagram: bytes = builder.build().dgram
-    return datagram
+    return builder.build().dgram
 
 
 #: Most subscribers, and how long a subscription lasts unless it is repeated, s.

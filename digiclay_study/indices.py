@@ -31,8 +31,7 @@ def sample_shares(samples: int, parameters: int, seed: int, *, second: bool) -> 
     from SALib.sample import sobol
 
     problem = describe_problem(parameters)
-    shares: Floats = sobol.sample(problem, samples, calc_second_order=second, seed=seed)
-    return shares
+    return sobol.sample(problem, samples, calc_second_order=second, seed=seed)
 
 
 #: Level of the confidence intervals, and resamples of the bootstrap they come from.

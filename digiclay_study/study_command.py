@@ -273,8 +273,7 @@ def _describe(unchanged: float | None, response: Response) -> list[object]:
 
 def _rank(order: tuple[Floats, Floats], part: Any = slice(None)) -> list[int]:
     """Return the places of indices, the largest first."""
-    places: list[int] = np.argsort(-order[0][part], kind="stable").tolist()
-    return places
+    return np.argsort(-order[0][part], kind="stable").tolist()
 
 
 def _format(indices: Indices, order: str, row: Any) -> str:

@@ -222,8 +222,7 @@ class Trials(NamedTuple):
     @property
     def sound(self) -> Flags:
         """Which runs keep the fingertip, shape (points,)."""
-        allowed: Flags = self.violation <= 0.0
-        return allowed
+        return self.violation <= 0.0
 
     def find_front(self) -> Cells:
         """Return the runs on the front, ordered by the first output."""

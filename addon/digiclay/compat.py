@@ -128,8 +128,7 @@ def keyframe_node_setting(modifier: Modifier, name: str, frame: int) -> None:
 def _identifier(modifier: Modifier, name: str) -> str:
     """Return the identifier of an input of a geometry nodes modifier's tree, also of an older file's tree."""
     inputs = modifier.node_group.interface.items_tree
-    identifier: str = inputs[name if name in inputs else FORMER_INPUTS[name]].identifier
-    return identifier
+    return inputs[name if name in inputs else FORMER_INPUTS[name]].identifier
 
 
 def curves(owner: ID) -> list[Any]:

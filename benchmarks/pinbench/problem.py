@@ -36,8 +36,7 @@ class Problem:
     @property
     def count(self) -> int:
         """Number of periods."""
-        periods: int = round(self.file["path"][-1][0] / self.file["period"])
-        return periods
+        return round(self.file["path"][-1][0] / self.file["period"])
 
     @cached_property
     def pins(self) -> Cells:
@@ -149,8 +148,7 @@ class Law:
         inward = 1.0 - across * across - along * along
         inside = np.maximum(inward, 1.0 - JOIN)
         shape = np.sqrt(inside) + (inward - inside) * (0.5 / ROOT)
-        under: Floats = (at_z + self.tip["height"]) - self.tip["height"] * shape
-        return under
+        return (at_z + self.tip["height"]) - self.tip["height"] * shape
 
     def tension(self, depth: Floats) -> Floats:
         """Return the elastic force of depths, (n,), N."""
@@ -167,8 +165,7 @@ class Law:
         lift, a = self.laminar * opening * opening, self.turbulent * np.abs(opening)
         bend = self.resistance * a
         root = bend + np.sqrt(bend * bend + 4.0 * np.abs(drop)) + 1e-300
-        conductance: Floats = np.minimum(lift / (1.0 + self.resistance * lift), 2.0 * a / root)
-        return conductance
+        return np.minimum(lift / (1.0 + self.resistance * lift), 2.0 * a / root)
 
     def change(self, time: float, state: Floats, segment: int) -> Floats:
         """Return the rates of the state, (1 + k, n)."""

@@ -124,8 +124,7 @@ def carry_out(arguments: Namespace) -> int:
     """Run every method, print the table, write the folder."""
     if arguments.suite and (suite := find_beside(*SUITE)):
         words = _list_words(arguments, suite.list_suite_methods())
-        code: int = suite.run_suite(arguments, _list_methods(words), [word for word, _ in words])
-        return code
+        return suite.run_suite(arguments, _list_methods(words), [word for word, _ in words])
     for name in SUITE_ONLY:
         if getattr(arguments, name) not in (None, False):
             raise OutputError(f"--{name.replace('_', '-')} is for --suite.")

@@ -1,7 +1,5 @@
 """Refusals of a command before any work, in one line: missing libraries, folders and files that cannot be."""
 
-from __future__ import annotations
-
 import importlib
 import importlib.util
 import os

@@ -155,5 +155,4 @@ def _join(surface: Indices, edge: int) -> Indices:
     upper = surface.size + np.arange(edge, dtype=np.int32)
     lower = upper + np.int32(edge)
     sides = np.column_stack([lower, np.roll(lower, -1), np.roll(upper, -1), upper])
-    faces: Indices = np.concatenate([top, sides]).astype(np.int32)
-    return faces
+    return np.concatenate([top, sides]).astype(np.int32)

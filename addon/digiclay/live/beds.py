@@ -1,7 +1,5 @@
 """Beds of sessions: look-up, reason to wait, selection; session data as properties of their objects."""
 
-from __future__ import annotations
-
 import json
 from enum import Enum
 

@@ -4,8 +4,6 @@ A tick looks for datagrams and never waits for one. UDP suits that: a pose that 
 the next one is newer, and a server that stalls leaves nothing half-read.
 """
 
-from __future__ import annotations
-
 import ipaddress
 import math
 import socket

@@ -3,8 +3,6 @@
 The handlers are there only while a session runs.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

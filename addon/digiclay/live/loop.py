@@ -1,7 +1,5 @@
 """Loop of all live sessions: its timer, and its text in the status bar."""
 
-from __future__ import annotations
-
 import time
 from dataclasses import dataclass
 

@@ -3,8 +3,6 @@
 No reference to Blender's data outlives a tick: undo and loading invalidate them all.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 from typing import NamedTuple

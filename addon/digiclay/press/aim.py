@@ -1,7 +1,5 @@
 """Aim of the mouse: a view's bed, the point on its pins, what hides it; a free place for a new bed."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 

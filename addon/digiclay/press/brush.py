@@ -1,7 +1,5 @@
 """Settings of the Press tool: brush, finger and presets, and the text beside the cursor."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import astuple, dataclass

@@ -4,8 +4,6 @@ It is there at once, translucent over all else, and goes where the pins have com
 of their overlays hides it.
 """
 
-from __future__ import annotations
-
 import time
 from dataclasses import dataclass, field
 from functools import lru_cache

@@ -1,7 +1,5 @@
 """Input of the hand: pressure and tilt of a pen, and a mouse button that is up. No Blender."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 

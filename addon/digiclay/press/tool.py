@@ -1,7 +1,5 @@
 """Press tool in the 3D view's toolbar: its header, and its patch under the mouse, draped over the pins."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from functools import partial

@@ -22,8 +22,7 @@ OFFERED: list[tuple[str, str, str, int]] = []
 
 def method_of(settings: PropertyGroup) -> str:
     """Return the name of a bed's control method, whether or not it is known here."""
-    name: str = settings.own_method or settings.method
-    return name
+    return settings.own_method or settings.method
 
 
 def name_pointer(name: str) -> str:

@@ -1,7 +1,5 @@
 """Strokes as they were drawn, a line of JSON each, without what is formed of them. No Blender."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import astuple
 

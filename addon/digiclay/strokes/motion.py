@@ -15,8 +15,6 @@ A brush that raises presses until the blister starts, and rises to its height th
 along at its height, up and down over what is formed.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace

@@ -7,8 +7,6 @@ the seam of a ring, nor where mirror images meet. It is what the view shows of a
 what the valves drive the pins to after the fingertip has left.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -226,8 +224,7 @@ def find_undersides(
     turn = np.array(LEVEL) if stroke.turn is None else stroke.turn
     pose = np.array([[*at, 0.0, *turn_image(lean_finger(turn, lean), image)]])
     forms = compute_forms(device.finger.outline(pose))
-    under: Floats = compute_underside(*forms, device.grid.compute_basis(cells))[0]
-    return under
+    return compute_underside(*forms, device.grid.compute_basis(cells))[0]
 
 
 #: Pins come so near to what was expected of the stroke before, m, that the ghosts of those after it stay.

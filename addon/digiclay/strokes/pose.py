@@ -1,7 +1,5 @@
 """Orientation of the fingertip along a press stroke, as quaternions w, x, y, z. No Blender."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What strokes can stamp: samples, meshes, pictures and arrays, as values from 0 to 1. No Blender."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 
 import numpy as np

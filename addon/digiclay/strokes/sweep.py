@@ -4,8 +4,6 @@ The fingertip goes along the path above the pins, never ahead of the hand and no
 where the device is at work. At the end it waits until all pins have come to their heights.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import replace

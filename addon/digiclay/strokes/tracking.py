@@ -5,8 +5,6 @@ with it. So clay is raised by a light press and a rise that the pins can follow,
 finger that goes along at one height.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -138,8 +138,7 @@ class BatchMovement:
         awake = self._near + np.flatnonzero(np.einsum("rwb,rwb->w", self._valves, self._valves))
         for part in _pieces(awake.size, force.shape[2]):
             self._move_others(awake[part], under[:, :0])
-        felt: Floats = force[0]
-        return felt
+        return force[0]
 
     def _move_others(self, cells: Any, none: Floats) -> None:
         """Move cells out of the fingertips' reach, the same ones in all runs."""

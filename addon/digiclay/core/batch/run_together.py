@@ -134,8 +134,7 @@ class Sums:
 
 def _count_following(active: ActiveSet) -> NDArray[np.intp]:
     """Return how many cells of each run follow the force, shape (b,)."""
-    count: NDArray[np.intp] = np.count_nonzero(active.mode == FORCE_FOLLOW, axis=0)
-    return count
+    return np.count_nonzero(active.mode == FORCE_FOLLOW, axis=0)
 
 
 Outcome = Result | DigiclayError

@@ -332,8 +332,7 @@ class CellStatesControl:
 
 def _under_finger(mode: Modes) -> Flags:
     """Return the cells that follow the force, or did in the last period."""
-    following: Flags = (mode == FORCE_FOLLOW) | (mode == CRITICAL)
-    return following
+    return (mode == FORCE_FOLLOW) | (mode == CRITICAL)
 
 
 def build(parameters: CellStates, device: DeviceInfo) -> CellStatesControl:

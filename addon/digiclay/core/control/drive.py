@@ -78,8 +78,7 @@ class Drive:
 
     def approach(self, error: Floats) -> Floats:
         """Return the speed of a pin to its height, m/s, ``v = e / τ_s``; 0 in the dead band, m."""
-        speed: Floats = np.where(np.abs(error) > self.dead_band, error / self.settling_time, 0.0)
-        return speed
+        return np.where(np.abs(error) > self.dead_band, error / self.settling_time, 0.0)
 
     def mark_formed(self, target: Floats, rest: float) -> Modes:
         """Return HOLD for cells commanded farther from rest than the dead band, m, REST for the others."""
@@ -107,8 +106,7 @@ class CellwiseControl(BatchControl):
 def _look_up(speed: Floats, speeds: Floats) -> Floats:
     """Return the openings of speeds (m[, b]), m/s, by tables (129[, b]) of the speeds at `OPENINGS`."""
     if speeds.ndim == 1:
-        openings: Floats = np.interp(speed, speeds, OPENINGS)
-        return openings
+        return np.interp(speed, speeds, OPENINGS)
     runs = zip(speed.T, speeds.T, strict=True)
     return np.stack([np.interp(speeds, table, OPENINGS) for speeds, table in runs], axis=-1)
 
@@ -117,8 +115,7 @@ def find_free_speeds(cell: Cell, pressure: float) -> Floats:
     """Return speeds (129,), m/s, of a free pin at `OPENINGS`, to a reservoir of a pressure, Pa; growing."""
     free = cell.flow.flow(OPENINGS, np.full(OPENINGS.size, pressure)) / cell.actuator.area
     # A reservoir that cannot move a pin gets the valve wide open.
-    rising: Floats = np.maximum(free, 0.0) + 1e-12 * OPENINGS
-    return rising
+    return np.maximum(free, 0.0) + 1e-12 * OPENINGS
 
 
 def make_drive(parameters: DriveParameters, cell: Cell, period: float) -> Drive:

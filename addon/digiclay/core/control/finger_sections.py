@@ -41,13 +41,11 @@ class Whole:
 
     def reduce(self, ufunc: np.ufunc, values: Floats) -> Floats:
         """Return the values (..., m) of each finger, reduced by a ufunc, (..., f)."""
-        reduced: Floats = ufunc.reduce(values, -1, None, None, True)
-        return reduced
+        return ufunc.reduce(values, -1, None, None, True)
 
     def add(self, values: Floats) -> list[float]:
         """Return the sum of values (m,) of each finger."""
-        sums: list[float] = self.reduce(np.add, values).tolist()
-        return sums
+        return self.reduce(np.add, values).tolist()
 
     def average(self, values: Floats, test: Flags, instead: list[float]) -> list[float]:
         """Return the mean of each finger's values where a test holds; `instead`: if it holds nowhere."""
@@ -56,8 +54,7 @@ class Whole:
 
     def multiply(self, forms: Sequence[Any], basis: Floats, out: Floats | None = None) -> Floats:
         """Return forms (k, 6) of each finger over the basis of its cells, (k, m)."""
-        rows: Floats = np.array(forms[0]).dot(basis, out=out)
-        return rows
+        return np.array(forms[0]).dot(basis, out=out)
 
     def find_bounds(self, cells: Cells) -> list[int]:
         """Return the start of each finger's cells in a selection of the cells, ascending, and the end."""
@@ -91,8 +88,7 @@ class Sections(Whole):
 
     def reduce(self, ufunc: np.ufunc, values: Floats) -> Floats:
         """See `Whole`."""
-        reduced: Floats = ufunc.reduceat(values, self.edges[:-1], -1)
-        return reduced
+        return ufunc.reduceat(values, self.edges[:-1], -1)
 
     def average(self, values: Floats, test: Flags, instead: list[float]) -> list[float]:
         """See `Whole`."""
@@ -110,8 +106,7 @@ class Sections(Whole):
 
     def find_bounds(self, cells: Cells) -> list[int]:
         """See `Whole`."""
-        bounds: list[int] = cells.searchsorted(self.edges).tolist()
-        return bounds
+        return cells.searchsorted(self.edges).tolist()
 
     def pick(self, cells: Cells, wanted: list[bool]) -> tuple[Cells, list[int], Whole]:
         """See `Whole`."""
@@ -130,8 +125,7 @@ class Shared(Whole):
 
     def multiply(self, forms: Sequence[Any], basis: Floats, out: Floats | None = None) -> Floats:
         """See `Whole`."""
-        rows: Floats = np.matmul(np.array(forms).swapaxes(0, 1), basis, out=out)
-        return rows
+        return np.matmul(np.array(forms).swapaxes(0, 1), basis, out=out)
 
 
 WHOLE, SHARED = Whole(), Shared()
@@ -164,8 +158,7 @@ class Columns:
         """Return the entry of the highest rank, (p,), of each cell in several columns, (g,)."""
         entries = self.copies.entries
         first = find_first_largest(rank[entries])
-        picked: Cells = self.copies.number[entries[first, np.arange(first.size)]]
-        return picked
+        return self.copies.number[entries[first, np.arange(first.size)]]
 
     @cached_property
     def padded(self) -> tuple[Cells, Flags, Floats, Cells]:

@@ -15,7 +15,6 @@ import numpy as np
 from ..base.arrays import Flags, Floats
 from ..base.modes import FORCE_FOLLOW, SPRING
 from ..model.control_interface import Memory
-from ..model.layout import Disc
 from .travel import PARTS, Heading
 from .virtual_master import (
     CARRIED,
@@ -179,10 +178,7 @@ class VirtualMasterColumns(VirtualMasterControl):
         """Return the discs that the masters control, m, or None of each."""
         radius = np.broadcast_to(self.blister.edge_radius, len(memory)).tolist()
         phase, x, y = memory.numbers[:3].tolist()
-        discs: list[Disc | None] = [
-            disc[1:] if disc[0] else None for disc in zip(phase, x, y, radius, strict=True)
-        ]
-        return discs
+        return [disc[1:] if disc[0] else None for disc in zip(phase, x, y, radius, strict=True)]
 
     def is_active(self, memory: Memory) -> bool:
         """Tell whether some master follows a fingertip."""

@@ -69,8 +69,7 @@ class Method:
 
     def import_parameters(self) -> type[ControlParameters]:
         """Import the class of its parameters."""
-        kind: type[ControlParameters] = import_part(self.module, self.parameters)
-        return kind
+        return import_part(self.module, self.parameters)
 
     def build(self, parameters: Any, device: Any) -> Any:
         """Return its controller for a `DeviceInfo`; ParameterError if parameters do not fit it."""

@@ -202,8 +202,7 @@ def check_modes(values: Any, size: tuple[int, ...]) -> Modes:
     modes = check_array(values, "mode", size, "iu")
     if modes.size and not (modes.min() >= 0 and modes.max() <= HIGHEST):
         raise ValueError(f"must return mode as codes of Mode, from 0 to {HIGHEST} (got {modes.max()})")
-    stored: Modes = modes.astype(np.int8, copy=False)
-    return stored
+    return modes.astype(np.int8, copy=False)
 
 
 #: Largest mean processor time of the calls of a control period, in control periods, and number of calls in

@@ -103,8 +103,7 @@ class PinDivision:
     @cached_property
     def captures(self) -> Floats:
         """Largest distance of a finger's pins from it, (f, 1), m."""
-        captures: Floats = CAPTURE * (1.0 + RELATIVE_TOLERANCE) * self._radii
-        return captures
+        return CAPTURE * (1.0 + RELATIVE_TOLERANCE) * self._radii
 
     # Before the controllers locate their fingertips.
 
@@ -119,8 +118,7 @@ class PinDivision:
 
     def find_positions(self, memory: Hands) -> Floats:
         """Return the positions of the fingers, (2, f), m."""
-        positions: Floats = np.array([follower.position or NOWHERE for follower in memory.fingers]).T
-        return positions
+        return np.array([follower.position or NOWHERE for follower in memory.fingers]).T
 
     def find_undersides(self, memory: Hands, basis: Floats, height: Floats) -> Floats:
         """Return the undersides of fingers over pins of a `height`, (f, q), m; infinite: too far away."""
@@ -176,8 +174,7 @@ class PinDivision:
 
     def share_whole(self, owner: Cells) -> Floats:
         """Return the shares of fingers in forces, (f, q): 1 in pins of the finger or of none, else 0."""
-        shares: Floats = ((owner == self.fingers) | (owner == NOBODY)).astype(np.float64)
-        return shares
+        return ((owner == self.fingers) | (owner == NOBODY)).astype(np.float64)
 
     # Before the controllers command their pins.
 

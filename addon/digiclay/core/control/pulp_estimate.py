@@ -105,8 +105,7 @@ class PulpEstimate:
 
     def predict_loss(self, pulp: Floats) -> Floats:
         """Return the tension at which there would be no force at the end of the prediction, (m,), N."""
-        lost: Floats = self.later.remaining[-1].dot(pulp)
-        return lost
+        return self.later.remaining[-1].dot(pulp)
 
     def predict_force(self, depth: Floats, lost: Floats) -> Floats:
         """Return the forces at the end of the prediction, N, of indentations then, (..., m), m."""

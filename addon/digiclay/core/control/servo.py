@@ -65,8 +65,7 @@ def mark_formed(target: Floats, rest: float | Floats, band: float | Floats) -> M
     off = target - rest
     np.abs(off, off)
     # True and False are the codes of these modes.
-    modes: Modes = (off > band).view(np.int8)
-    return modes
+    return (off > band).view(np.int8)
 
 
 def lock_overloaded(command: Floats, force: Floats, limit: float | Floats) -> Floats:

@@ -73,8 +73,7 @@ def update_heading(heading: Heading, x: float, y: float, travel: float, reversal
 def measure_lead(heading: Heading, x: float, y: float, basis: Floats) -> Floats:
     """Return the distances of cells (6, m) ahead of a point, m; negative behind it, 0 before any travel."""
     _, _, toward_x, toward_y = heading
-    ahead: Floats = np.dot([-x * toward_x - y * toward_y, toward_x, toward_y], basis[:3])
-    return ahead
+    return np.dot([-x * toward_x - y * toward_y, toward_x, toward_y], basis[:3])
 
 
 def measure_offsets(x: Any, y: Any, toward_x: Any, toward_y: Any, basis: Floats) -> tuple[Floats, Floats]:
@@ -100,8 +99,7 @@ def measure_offsets(x: Any, y: Any, toward_x: Any, toward_y: Any, basis: Floats)
 def measure_excess(x: Any, y: Any, radius: Any, basis: Floats) -> Floats:
     """Return squared distances from a point less the square of a radius, (m[, b]), m²."""
     if basis.ndim == 2:  # one product
-        excess: Floats = np.array(_circle(x, y, radius)).dot(basis)
-        return excess
+        return np.array(_circle(x, y, radius)).dot(basis)
     dx, dy = basis[1] - x, basis[2] - y
     dx *= dx
     dy *= dy

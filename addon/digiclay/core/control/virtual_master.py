@@ -152,8 +152,7 @@ class MasterCell:
         """Return the speed of the unloaded pin, m/s."""
         drive = self.up if opening > 0.0 else self.down
         if self.laminar:
-            speed: float = self.flow.laminar_conductance(opening) * drive
-            return speed
+            return self.flow.laminar_conductance(opening) * drive
         return float(self.flow.conductance(np.array(opening), np.array(drive * self.area))) * drive
 
 
@@ -251,8 +250,7 @@ class VirtualMasterControl(BatchControl):
     def find_batch_class(self, count: int) -> type[VirtualMasterControl]:
         """Return the class of the controller of a batch of `count` runs."""
         name = "VirtualMasterBatch" if count < MANY else "VirtualMasterColumns"
-        kind: type[VirtualMasterControl] = import_part("control.masters", name)
-        return kind
+        return import_part("control.masters", name)
 
     def begin(self) -> Master:
         """Return the memory before a session."""
@@ -266,8 +264,7 @@ class VirtualMasterControl(BatchControl):
         """VM Locate: centroid of the forces near the master; at first touch, of all (equation 13); N, N m."""
         gains = self.parameters
         if total < gains.felt_force:
-            waiting: Master = self.loss.wait(master)
-            return waiting
+            return self.loss.wait(master)
         # `_make` of all numbers takes half as long as `_replace`, and happens every period.
         phase, _, _, height, opening, reference, edge, heading, felt, _, losses = master
         if phase is not IDLE:

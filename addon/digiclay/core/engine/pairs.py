@@ -102,8 +102,7 @@ def find_pairs(active: ActiveSet) -> Flags:
         return np.zeros((active.rows.fingers, 0), np.bool_)
     x, y, radius = (np.asarray(part)[:, None] for part in active.reach)
     _, at_x, at_y = active.quadratic_basis[:3, : active.near]
-    inside: Flags = (at_x - x) ** 2 + (at_y - y) ** 2 <= radius * np.abs(radius) * (1.0 + RELATIVE_TOLERANCE)
-    return inside
+    return (at_x - x) ** 2 + (at_y - y) ** 2 <= radius * np.abs(radius) * (1.0 + RELATIVE_TOLERANCE)
 
 
 @dataclass(frozen=True, eq=False)

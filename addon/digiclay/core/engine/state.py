@@ -214,8 +214,7 @@ class State(NamedTuple):
         """Return the total force of each finger, (f,), N."""
         rows = self.active.rows
         pressing = rows.pressing if rows.fingers else slice(rows.force, rows.force + 1)
-        forces: Floats = self.active.block[pressing].sum(axis=1)
-        return forces
+        return self.active.block[pressing].sum(axis=1)
 
     def mode(self) -> NDArray[np.int8]:
         """Return the control modes of all cells, shape (n,) or (n, b), as a new array."""

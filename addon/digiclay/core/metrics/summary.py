@@ -362,8 +362,7 @@ def split_fingers(history: Mapping[str, Any]) -> Iterator[Mapping[str, Any]]:
 
     def square(finger: int) -> Floats:
         beside, along, above = tips[:, finger, :3].T[:, :, None]
-        apart: Floats = (x - beside) ** 2 + (y - along) ** 2 + (low - above) ** 2
-        return apart
+        return (x - beside) ** 2 + (y - along) ** 2 + (low - above) ** 2
 
     for finger in range(tips.shape[1]):
         np.minimum(least, square(finger), out=least)

@@ -57,8 +57,7 @@ class Commands(NamedTuple):
 
 def count_losses(memory: Memory) -> int | None:
     """Return how often the fingertip was lost; None: the method does not count it."""
-    losses: int | None = getattr(memory, "losses", None)
-    return losses
+    return getattr(memory, "losses", None)
 
 
 class Controller(Protocol):
@@ -92,8 +91,7 @@ class SetPoint:
         count = np.asarray(following, dtype=np.float64)
         if not self.per_cell:
             return np.full(count.shape, self.force)
-        total: Floats = np.where(count > 0.0, self.force * count, np.nan)
-        return total
+        return np.where(count > 0.0, self.force * count, np.nan)
 
 
 def find_set_point(set_point: SetPoint | None, following: ArrayLike) -> Floats:

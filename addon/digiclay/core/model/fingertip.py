@@ -35,8 +35,7 @@ _SLOPE = 0.5 / _ROOT
 def continue_ball(square: Floats) -> Floats:
     """Return the underside of a ball of radius 1 about 0, continued, at squared distances from its axis."""
     low = np.sqrt(np.maximum(1.0 - square, 1.0 - JOIN))
-    under: Floats = _SLOPE * np.maximum(square - JOIN, 0.0) - low
-    return under
+    return _SLOPE * np.maximum(square - JOIN, 0.0) - low
 
 
 def require_one(fingers: Sequence[Item]) -> Item:

@@ -28,8 +28,7 @@ class ValveLag(Parameters):
 
     def opening(self, rows: Floats, command: Floats) -> Floats:
         """Return the opening K, shape (n,)."""
-        opening: Floats = rows[0]
-        return opening
+        return rows[0]
 
     def rate(self, rows: Floats, command: Floats) -> Floats:
         """Return dK/dt, 1/s (equation 9), (1, n), for held commands (n,)."""

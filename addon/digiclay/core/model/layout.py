@@ -160,8 +160,7 @@ class Grid:
             """Return the rows, or columns, of each disc, as many as of the widest, (f, 1, k)."""
             most = min(int(min(width, count)) + 2, count)
             least = np.clip(np.ceil(first - RELATIVE_TOLERANCE), 0, count - most)
-            lines: Cells = least.astype(np.intp) + np.arange(most)
-            return lines
+            return least.astype(np.intp) + np.arange(most)
 
         row = span((y - size - bottom) / plan.row_spacing, 2.0 * size / plan.row_spacing, plan.rows)
         first = (x - size - left - plan.shift) / plan.pitch
@@ -186,16 +185,14 @@ class Grid:
         x, y, radius = discs
         square = (self.x[:, None] - x) ** 2
         square += (self.y[:, None] - y) ** 2
-        covered: Flags = square <= radius * np.abs(radius) * (1.0 + RELATIVE_TOLERANCE)
-        return covered
+        return square <= radius * np.abs(radius) * (1.0 + RELATIVE_TOLERANCE)
 
     def at(self, x: Floats, y: Floats) -> Cells:
         """Return the cells nearest to positions, m, (k,)."""
         plan, (left, bottom) = self.layout, self.corner
         row = np.clip(np.rint((y - bottom) / plan.row_spacing), 0, plan.rows - 1)
         column = np.clip(np.rint((x - left - (row % 2) * plan.shift) / plan.pitch), 0, plan.columns - 1)
-        cells: Cells = (row * plan.columns + column).astype(np.intp)
-        return cells
+        return (row * plan.columns + column).astype(np.intp)
 
     def compute_basis(self, cells: Cells) -> Floats:
         """Return rows 1, x, y, x², x y, y² of cells (m,) or (m, b), shape (6, m) or (6, m, b)."""

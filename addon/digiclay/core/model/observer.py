@@ -90,8 +90,7 @@ class ValveObserver(Sensors):
 
     def _average(self, values: Floats) -> Floats:
         """Return the mean over a period of values at the nodes."""
-        mean: Floats = apply_map(self.weights[None], values)[0]
-        return mean
+        return apply_map(self.weights[None], values)[0]
 
 
 def make_valve_observer(

@@ -60,8 +60,7 @@ class Relaxation(Parameters):
 
     def relaxed(self, filters: Floats) -> Floats:
         """Return the force lost to relaxation S = Σ ĉ_i z_i, N, shape (n[, b]), of filters z (k, n[, b])."""
-        relaxed: Floats = apply_map(self.shares[None], filters)[0]
-        return relaxed
+        return apply_map(self.shares[None], filters)[0]
 
     def rate(self, filters: Floats, tension: Floats) -> Floats:
         """Return dz/dt = ν (T - z), N/s (equation 13), of filters z (k, n) under tensions T (n,), N."""

@@ -116,8 +116,7 @@ def _mix(words: Words) -> Words:
 
 def _draw_uniform(counter: Words) -> Floats:
     """Return uniform numbers in (0, 1), without both ends."""
-    uniform: Floats = ((_mix(counter) >> np.uint64(12)).astype(np.float64) + 0.5) * 2.0**-52
-    return uniform
+    return ((_mix(counter) >> np.uint64(12)).astype(np.float64) + 0.5) * 2.0**-52
 
 
 class NoiseAhead:

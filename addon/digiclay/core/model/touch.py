@@ -54,8 +54,7 @@ class Ahead:
             count = max(1, min(AHEAD, MOST // max(1, numbers)))
             self._unders = compute(slice(index, index + count), positions)
             self._positions, self._first = positions, index
-        under: Floats = self._unders[index - self._first]
-        return under
+        return self._unders[index - self._first]
 
 
 @dataclass(eq=False)

@@ -110,8 +110,7 @@ def import_parameters(section: str, method: str) -> type[Parameters]:
         return law_parameters(section)
     if section == "control":
         return find_method(method).import_parameters()
-    kind: type[Parameters] = import_part(*PARTS[section])
-    return kind
+    return import_part(*PARTS[section])
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -300,8 +300,7 @@ class LiveSession:
     @property
     def pose(self) -> Floats:
         """Pose of the first fingertip, (7,)."""
-        first: Floats = self.poses[0]
-        return first
+        return self.poses[0]
 
 
 Session = TypeVar("Session", bound=LiveSession)

@@ -94,8 +94,7 @@ class Take:
         """Number of fingers in each period."""
         fingers = len(self.scene.fingers)
         present = (self.poses[:, fingers:] != AWAY).any(axis=2)
-        counts: list[int] = (fingers + (present[1:] & present[:-1]).sum(axis=1)).tolist()
-        return counts
+        return (fingers + (present[1:] & present[:-1]).sum(axis=1)).tolist()
 
     @property
     def duration(self) -> float:

@@ -374,8 +374,7 @@ class StepWorkspace:
 
     def _seen(self, row: int) -> Floats:
         """Return the result of a row of the plan's `path` for the fingertip's underside."""
-        seen: Floats = apply_map(self.plan.path[row : row + 1], self.under)[0]
-        return seen
+        return apply_map(self.plan.path[row : row + 1], self.under)[0]
 
     def _find_near_overflow(self, s: int, beyond: Flags) -> Flags:
         """Clear the cells (5, k[, b]) beyond the limits of step s if their limit is that of laminar flow."""

@@ -210,5 +210,4 @@ def _limit(m: Floats | float, to_load: Floats | float, start: StepStart, rise: F
 
 def _exponential(exponent: Floats) -> Floats:
     """Return exp(e); 1 in a gap."""
-    grown: Floats = np.exp(np.minimum(np.maximum(exponent, 0.0), LARGEST_EXPONENT))
-    return grown
+    return np.exp(np.minimum(np.maximum(exponent, 0.0), LARGEST_EXPONENT))

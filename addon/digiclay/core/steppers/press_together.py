@@ -158,8 +158,7 @@ def _append(rows: Any, row: Any) -> Any:
 
 def _tension(exponent: Floats) -> Floats:
     """Return the elastic force in units of b/m; 0 in a gap."""
-    tension: Floats = np.expm1(np.clip(exponent, 0.0, LARGEST_EXPONENT))
-    return tension
+    return np.expm1(np.clip(exponent, 0.0, LARGEST_EXPONENT))
 
 
 def plan_together(cells: Sequence[Cell], queue: Queue, segments: tuple[Segment, ...]) -> TogetherPlan:
