@@ -27,9 +27,9 @@ def add(commands: Any) -> None:
     description = "Reproduce the paper's figures, and set its claims beside what is measured."
     options: Options = {
         "--out DIR": (Path, "default ./paper", Path("paper")),
-        "--overwrite": "replace an older one when all is done",
-        "--quick": "coarse: few speeds and gains, for a first look",
-        "--quiet": "print nothing but errors, and no progress",
+        "--overwrite": "replace an older one at the end",
+        "--quick": "few speeds and gains, for a first look",
+        "--quiet": "print errors only, without progress",
     }
     purpose = "reproduce the paper's results"
     add_options(add_command(commands, "paper", purpose, EXAMPLES, description, carry_out=carry_out), options)

@@ -28,7 +28,7 @@ from .tracked_fingers import Tracking
 
 EXAMPLES = f"""\
 examples:
-  digiclay serve                                    the device of the paper, 200 control periods a second
+  digiclay serve                                    the device of the paper, 200 control periods per second
   digiclay serve --rate 1000 --out recorded
   digiclay serve my.toml --port 9000 --seconds 60 --report times.json
 
@@ -44,14 +44,14 @@ def add(commands: Any) -> None:
     description = "Run a session in real time for other programs: poses in, forces and heights out."
     force, most_speed, port = LIMITS.force, 1e3 * LIMITS.speed, whole_number(0, 65535)
     options: Options = {
-        "--rate HZ": (_within(1, 1000, "Hz"), "control periods a second, 1 to 1000; default: the scene's"),
+        "--rate HZ": (_within(1, 1000, "Hz"), "control periods per second, 1 to 1000; default: the scene's"),
         "--host": (str, f"address of this machine to serve at; default: {HOST}", HOST),
         "--port N": (port, f"of the WebSocket, 0: any; default: {PORT}", PORT),
         "--osc-port N": (port, f"of OSC, 0: any; default: {OSC_PORT}", OSC_PORT),
         "--token T": f"token of the clients; default: {VARIABLE}, or one at random",
         "--most-force N": (
             _within(1e-3, 1e3, "N"),
-            f"largest force of a finger handed out, N; default: {force:g}",
+            f"largest force that a finger reports, N; default: {force:g}",
             force,
         ),
         "--most-speed MM/S": (
@@ -64,18 +64,18 @@ def add(commands: Any) -> None:
             f"lift the fingertip after this time without a pose; default: {LIMITS.silence:g}",
             LIMITS.silence,
         ),
-        "--fingers N": (whole_number(1, MOST_FINGERS), "number of fingertips, all as the scene's first"),
-        "--lift MS": (_within(1.0, 1e4, "ms"), "lift fingers not named for this time; default: 100", 100.0),
+        "--fingers N": (whole_number(1, MOST_FINGERS), "number of fingertips, all like the scene's first"),
+        "--lift MS": (_within(1.0, 1e4, "ms"), "lift fingers unnamed for this time; default: 100", 100.0),
         "--clutch MM": (_within(0.0, 1e3, "mm"), "height over the pins where fingers begin, and slip", 0.0),
         "--filter HZ": (_within(0.0, 1e3, "Hz"), "least cutoff of the 1-euro filter of fingers", 0.0),
         "--coupling N/MM": (_within(0.0, 1e3, "N/mm"), "spring between tracked and simulated fingertip", 0.0),
         "--out DIR": (Path, "record a take into this folder"),
         "--part S": (
             _within(0.1, 600.0, "s"),
-            "seconds of a take that a killed process loses at most; default: 10",
+            "most seconds of a take that a killed process loses; default: 10",
             10.0,
         ),
-        "--report FILE": (Path, "write times and counts as JSON in the end"),
+        "--report FILE": (Path, "write times and counts as JSON at the end"),
         "--seconds S": (_within(0.0, 1e9, "s"), "stop after this time; default: Ctrl-C"),
         "--overwrite": "replace the takes in that folder",
         "--quiet": "print addresses, errors and a random token",
@@ -90,7 +90,7 @@ def carry_out(arguments: argparse.Namespace) -> int:
     """Serve until Ctrl-C."""
     refuse_without("digiclay serve", "serve", "websockets", "pythonosc")
     if sys.platform == "win32":
-        raise OutputError("digiclay serve runs on Linux and macOS: it needs pipes that do not wait.")
+        raise OutputError("digiclay serve runs on Linux and macOS: it needs non-blocking pipes.")
     if arguments.report is not None:
         refuse_unwritable(arguments.report.resolve().parent)
     token, is_new = choose_token(arguments.token)
@@ -111,7 +111,7 @@ def carry_out(arguments: argparse.Namespace) -> int:
         Doors(bed, size, host=host, port=arguments.port, osc_port=arguments.osc_port, token=token) as doors,
     ):
         rate, shown = 1.0 / session.system.period, f"[{host}]" if ":" in host else host
-        _tell(f"{scene.name or scene.method}: {scene.cells} pins, {rate:g} control periods a second")
+        _tell(f"{scene.name or scene.method}: {scene.cells} pins, {rate:g} control periods per second")
         _tell(f"WebSocket ws://{shown}:{doors.port}")
         _tell(f"OSC       {shown}:{doors.osc_port} (UDP)")
         if is_new:

@@ -199,7 +199,7 @@ class _WebSocketDoor:
             if count > FLOOD:
                 self.link.counts["floods"] += 1
                 self.link.leave(connection)
-                await connection.close(POLICY, f"more than {FLOOD} messages a second")
+                await connection.close(POLICY, f"more than {FLOOD} messages per second")
                 return
             try:
                 request = read_json(message) if isinstance(message, str) else read_binary(message)

@@ -178,7 +178,7 @@ class Subject:
         if record is not None and left and not quiet:
             time = format_duration(left * record["figures"]["run_time"])
             # Several fingers are in no batch.
-            less = " if each is run by itself, less in batches" if len(self.scene.fingers) == 1 else ""
+            less = " if each runs alone, less in batches" if len(self.scene.fingers) == 1 else ""
             print(f"{left} runs: about {time} of one core{less}", flush=True)
         return record
 

@@ -82,7 +82,7 @@ def carry_out(arguments: Namespace) -> int:
     count, second = len(subject.ranges), arguments.second
     if count < 2:
         raise OutputError(
-            "A study needs at least two --vary: of one parameter all indices are 1. Use digiclay sweep."
+            "A study needs at least two --vary: with one parameter all indices are 1. Use digiclay sweep."
         )
     total = count_points(arguments.samples, count, second=second)
     refuse_too_many("--samples", total)

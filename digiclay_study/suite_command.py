@@ -59,7 +59,7 @@ def run_suite(arguments: Namespace, methods: Sequence[str], words: Sequence[str]
     if arguments.overwrite:
         raise OutputError("--overwrite is not for --suite, which continues its folder: choose another --out.")
     if arguments.speed:
-        raise OutputError("--speed is not for --suite: its trajectories ridge-limit and lift-limit are that.")
+        raise OutputError("--speed is not for --suite: trajectories ridge-limit and lift-limit measure it.")
     refuse_without("digiclay compare --suite", "suite", "matplotlib", "scipy")
     plan = make_plan(arguments, methods)
     out: Path = arguments.out or Path(f"{plan.title}_suite")

@@ -186,7 +186,7 @@ def format_page(
             ["method", *titles.values(), WORSE], [_list_cells(row, list(MEASURES)) for row in league]
         ),
         f"<p>Means over the trajectories, the random drags together as one; ± {escape(KIND)}. Of several "
-        "fingers the worst. Largest force: of all trajectories. Losses: sum. Cost: processor time, median; "
+        "fingers the worst counts. Largest force: over all trajectories. Losses: sum. Cost: median time; "
         f"ratio to {first}. {JUDGED} Last column: trajectories with a greater mean RFD than {first}. "
         "JND: just noticeable differences of the set point.</p>",
         *(f'<p><img alt="{name}" src="{name}"></p>' for name in pictures),

@@ -32,7 +32,7 @@ examples:
 
 NSGA-II minimizes both metrics. The folder holds front.png, front.csv, points.csv with every run,
 chosen.toml, a scene file, and points/, a small file for each finished run. After Ctrl-C the same
-command continues; with more --generations it goes on further.
+command continues; with more --generations it goes further.
 """
 METRICS = "rfd,lag"
 KNEE = "knee"
@@ -44,11 +44,11 @@ def add(commands: Any) -> None:
     purpose = "find the best trade-off of two metrics"
     parser = add_command(commands, "tune", purpose, EXAMPLES, description, carry_out=carry_out)
     add_subject(parser, METRICS)
-    chosen = "what is chosen on the front: knee, or the metric that is to be least; default: knee"
+    chosen = "run chosen on the front: knee, or the metric to minimize; default: knee"
     add_options(
         parser,
         {
-            "--population N": (whole_number(4, 4096), "runs a generation; default: 64", 64),
+            "--population N": (whole_number(4, 4096), "runs per generation; default: 64", 64),
             "--generations N": (whole_number(1, 4096), "default: 10", 10),
             "--choose M": (None, chosen, KNEE),
         },
@@ -108,7 +108,7 @@ def _evolve(arguments: Namespace, subject: Subject, evaluation: Evaluation, done
         records = evaluation.collect()
         if lost := evaluation.failed.keys() - evaluation.records.keys():
             why = evaluation.failed[min(lost)]["error"]
-            raise OutputError(f"{why} What is done is kept, and the same command goes on from there.")
+            raise OutputError(f"{why} Finished work is kept, and the same command continues.")
         if any(point.index not in records for point in points):
             return
         done += points

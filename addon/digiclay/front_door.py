@@ -124,7 +124,7 @@ class Result(run_scene.Result):
         Raises
         ------
         DigiclayError
-            When the folder is not empty, holds other things than a run, or cannot be written.
+            When the folder is not empty, contains something other than a run, or cannot be written.
         """
         path, source = read_path(folder), find_code(self.scene)
         with write_folder(path, overwrite=overwrite) as staged:

@@ -232,7 +232,7 @@ def test_the_heights_are_measured_from_the_rest_height_and_a_bed_without_attribu
     with pytest.raises(RuntimeError, match=r"no longer that of its pins: .* press Rebuild"):
         bpy.ops.mesh.digital_clay_make()
     bpy.ops.mesh.digital_clay_add(rows=1, columns=9)
-    with pytest.raises(RuntimeError, match=r"must have 2 x 2 pins at least, in rows along x \(got 1 x 9\)"):
+    with pytest.raises(RuntimeError, match=r"must have at least 2 x 2 pins, in rows along x \(got 1 x 9\)"):
         bpy.ops.mesh.digital_clay_make()
 
 

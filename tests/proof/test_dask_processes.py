@@ -117,7 +117,7 @@ def test_a_killed_worker_and_a_killed_scheduler_change_no_bit_of_the_table(here,
     assert sweep.poll() is None
     scheduler.send_signal(signal.SIGKILL)
     _, said = sweep.communicate(timeout=TIMEOUT)
-    rule = "What is done is kept, and the same command goes on from there."
+    rule = "Finished work is kept, and the same command continues."
     lines = [line for line in said.splitlines() if "no workers yet" not in line]
     assert (sweep.returncode, lines) == (2, [f"The scheduler {address} is gone. {rule}"])
     kept = {path: read_figures(path) for path in points(here / "far")}

@@ -92,8 +92,8 @@ def test_a_command_takes_a_scene_of_two_fingers(command, made, tmp_path, monkeyp
     "command, said",
     [
         ([*SHAPED[:-2], "--finger", "press"], "formed by the first of 2 fingers alone"),
-        (["compare", "my.toml", "--speed", "--out", "out"], "Followed, the first of the fingers alone, "),
-        (["compare", "my.toml", "--out", "out"], "Of 2 fingers the worst; metrics.json has each."),
+        (["compare", "my.toml", "--speed", "--out", "out"], "Followed, for the first finger alone, "),
+        (["compare", "my.toml", "--out", "out"], "The worst of 2 fingers; metrics.json has each."),
     ],
 )
 def test_a_command_says_what_it_takes_of_several_fingers(command, said, tmp_path, monkeypatch, capsys):
@@ -141,7 +141,7 @@ def test_points_of_several_fingers_run_one_at_a_time_to_the_same_bits(tmp_path, 
     folder = folder_with(TWO, tmp_path, monkeypatch)
     for count in "12":
         assert main([*GAINS[:-1], "--out", count, "--workers", count]) == 0
-    assert "4 points one at a time: they do not have a single finger" in capsys.readouterr().out
+    assert "4 points one at a time: they have several fingers" in capsys.readouterr().out
     assert timeless(folder / "1" / "sweep.csv") == timeless(folder / "2" / "sweep.csv")
     assert main(["run", "my.toml", "--set", "control.force_gain=4", "--out", "run", "--quiet"]) == 0
     metrics = json.loads((folder / "run" / "metrics.json").read_text(encoding="utf-8"))

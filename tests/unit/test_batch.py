@@ -102,7 +102,7 @@ def test_a_scene_beside_the_jobs_file_is_found_from_any_folder(tmp_path, monkeyp
         ('scenes = ["tap"]\nmethod = ["cell_states"]', "method must be a known key .* Did you mean methods?"),
         ('scenes = ["tap"]\nmethods = []', "methods must be a list"),
         ('scenes = ["tap"]\nmethods = ["magic"]', "methods must be one of virtual_master"),
-        ('scenes = ["tap", "tap"]', r"scenes must not name one thing twice \(got tap twice\)"),
+        ('scenes = ["tap", "tap"]', r"scenes must not name the same thing twice \(got tap twice\)"),
         ('scenes = ["tap"]\nsettings = 3', "settings must be a section of labels"),
         ('scenes = ["tap"]\nsettings.a = 3', r"settings\.a must be a table"),
         ('scenes = ["tap"]\nsettings."../a" = {}', "settings must have labels of letters"),
@@ -263,7 +263,7 @@ def test_ctrl_c_ends_all_processes_and_leaves_nothing_half_done():
     os.killpg(process.pid, signal.SIGINT)  # as a terminal does
     code, out, err = finish(process)
     assert (code, err, runs()) == (130, "", [])
-    assert "Stopped: what is done is kept, and the same command goes on from there." in out
+    assert "Stopped: finished work is kept, and the same command continues." in out
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no signals to send")
@@ -285,7 +285,7 @@ def test_when_a_batch_is_killed_its_processes_end_and_a_process_that_dies_is_tol
         ("", 'scenes = ["tap"]\nexport = ["doc"]', "export: "),
         ("", 'scenes = ["tap"]\nexport = ["stl"]\nsettings.a.recorder = "absent"', "need a recorder"),
         ("--out two.toml", TWO, "two.toml is a file"),
-        ("--out .", TWO, ". holds other things than a batch"),
+        ("--out .", TWO, ". contains something other than a batch"),
         ("--jobs 0", TWO, "--jobs"),
         ("--out two secnod", TWO, "unrecognized arguments: secnod"),
     ],
@@ -382,13 +382,13 @@ def test_a_job_whose_files_changed_or_a_copy_broke_off_is_done_again_and_says_so
     before = written()
     prepare(ENDLESS.replace("0.05", "0.06"))
     assert call(f"job {JOB}") == 0
-    assert "is of another definition: it is done again.\n" in capsys.readouterr().out
+    assert "is of another definition: it is repeated.\n" in capsys.readouterr().out
     assert written() > before
     for harm, rest in (("history.npz", 100), ("scene.toml", 0), ("job.toml", 0)):
         whole = (RUN / harm).read_bytes()
         (RUN / harm).write_bytes(whole[:rest]) if rest else (RUN / harm).unlink()
         assert call(f"job {JOB}") == 0
-        assert "is incomplete: it is done again.\n" in capsys.readouterr().out
+        assert "is incomplete: it is repeated.\n" in capsys.readouterr().out
         assert (RUN / harm).stat().st_size == len(whole)
     prepare(f'export = ["stl"]\n{ENDLESS.replace("0.05", "0.06")}')
     assert call(f"job {JOB} --quiet") == 0
@@ -493,7 +493,7 @@ def test_what_is_no_series_has_no_page_and_one_of_an_older_version_the_jobs_in_i
     assert call("job alone/jobs/tap-quick --quiet") == 0
     assert sorted(path.name for path in Path("alone").iterdir()) == ["jobs", "runs"]
     assert call("page alone") == 2
-    rule = "alone is no folder of a job series: it has no batch.json of 'digiclay batch'.\n"
+    rule = "alone is not the folder of a job series: it has no batch.json of 'digiclay batch'.\n"
     assert capsys.readouterr().err == rule
     Path("two/batch.json").write_text('{"batch": "two", "digiclay": "0.1.0"}', encoding="utf-8")
     assert call("page two") == 0

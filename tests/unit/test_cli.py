@@ -68,8 +68,8 @@ MISTAKES = {
     "walk": "invalid choice: 'walk'",
     "run": "the following arguments are required: SCENE",
     "describe my.toml --set layout.rows=0": "layout.rows must be at least 1",
-    "export nowhere": "nowhere is no run's folder",
-    "plot nowhere": "nowhere is no run's folder",
+    "export nowhere": "nowhere is not the folder of a run",
+    "plot nowhere": "nowhere is not the folder of a run",
     "render my.toml --size 3": "must be WIDTHxHEIGHT",
     "render my --out my.jpg": "--out must end with .png (got my.jpg).",
     "render my --film --out my.avi": "--out must end with .mp4 (got my.avi).",
@@ -90,7 +90,7 @@ MISTAKES = {
     "compare my.toml --method cell_stats": "Did you mean cell_states",
     "compare my.toml --out my.toml": "my.toml is a file",
     "compare my.toml --set control.spring_trigger=1": "spring_trigger must be a parameter of virtual_master",
-    "job .": ". is no job's folder: it has no job.toml.",
+    "job .": ". is not the folder of a job: it has no job.toml.",
     "benchmark session --help": "run from a checkout: 'python -m benchmarks --help'",
 }
 

@@ -320,7 +320,7 @@ def test_a_length_is_in_millimeters_or_has_a_unit_behind_it(said, run):
         ("features run --smallest 0", "--smallest must be at least 1 (got 0)."),
         ("features run --former 99", "--former must be between 0 s and"),
         ("features run --former soon", "--former must be a time or 'rest'"),
-        ("features nowhere", "nowhere is no run's folder"),
+        ("features nowhere", "nowhere is not the folder of a run"),
     ],
 )
 def test_a_mistake_is_one_line_and_no_file(run, refused, line, said):

@@ -123,7 +123,7 @@ def test_a_stack_has_no_more_runs_than_pay_or_fit_into_memory(count, duration, s
     settings = [Setting("simulation.duration", duration)]
     parts = make_bundles(some(f"control.force_gain=1:6:{count}", settings=settings))
     assert [len(batch) for batch in parts.batches] == sizes
-    reason = f"{count} points one at a time: they have too many rows to keep for many at once"
+    reason = f"{count} points one at a time: their histories are too long to keep several at once"
     assert (parts.describe() == [reason]) == (not sizes)
 
 
@@ -178,7 +178,7 @@ TRIGGERS = ("control.blister_trigger=0.01,0.03", "control.spring_trigger=0.02,0.
             False,
             [],
             [[0], [1], [2], [3]],
-            "4 points one at a time: a batch of hybrid takes as long",
+            "4 points one at a time: a batch of hybrid would not be faster",
         ),
         "values that do not go together": (
             TRIGGERS,
@@ -218,7 +218,7 @@ def test_errors_of_points_whose_contact_a_step_may_hide_are_doubted(step, errors
     said = make_bundles(judge_all(points) if errors else points).describe()
     assert (said[1:] != [], len(said)) == (doubted, 1 + doubted)
     if doubted:
-        assert said[1].startswith("4 points with errors as told or more: within a step the fingertip leaves")
+        assert said[1].startswith("4 points with larger errors: within a step the path of the fingertip")
     (done,) = [run(point.scene).estimate_errors() for point in points[:1] if point.scene]
     doubt = done.metrics.get("errors_in_doubt", "")
     assert (doubt != "", "or more" in done.summary(), doubt in done.summary()) == (
@@ -399,7 +399,7 @@ def test_a_scheduler_that_is_gone_ends_a_series_in_one_line(monkeypatch):
         address = other.scheduler_address
         with open_cluster(address, lambda: False, silent) as cluster:
             other.close()
-            gone = f"^The scheduler {address} is gone. What is done is kept, and the same command goes on"
+            gone = f"^The scheduler {address} is gone. Finished work is kept, and the same command continues"
             with pytest.raises(OutputError, match=gone):
                 finish_series(submit(cluster, invert, [1], stopped=never), print, print)
 

@@ -148,7 +148,7 @@ BESIDE = (
         (box(10, 10, 5), {"fit": "placed"}, BESIDE),
         (PICTURE, {"fit": "actual"}, "its pixels have no length (got 'actual' for x.png)"),
         (ARRAY, {"fit": "placed"}, "its pixels have no length (got 'placed' for x.npy)"),
-        (PICTURE, {"relief": "true"}, "its values are no lengths (got 'true' for x.png)"),
+        (PICTURE, {"relief": "true"}, "its values are not lengths (got 'true' for x.png)"),
         (LINE, {}, "must be wider than a line or a point, seen from above (got l.stl: 9 x 0)"),
     ],
 )
@@ -293,8 +293,8 @@ def test_a_color_that_is_clear_by_itself_is_black_and_nothing_is_warned_of(tmp_p
 @pytest.mark.parametrize(
     "name, said",
     [
-        ("rgb16_planes.tif", "if they are of more than 8 bits (got {}: separate planes)"),
-        ("gray16_white_is_zero.tif", "if they are of more than 8 bits (got {}: 0 is white)"),
+        ("rgb16_planes.tif", "if these have more than 8 bits (got {}: separate planes)"),
+        ("gray16_white_is_zero.tif", "if these have more than 8 bits (got {}: 0 is white)"),
         ("gray_alpha16.tif", "(got {}: a TIFF of 2 channels of 16 bits, unknown to Pillow)"),
         ("rgb_float32.tif", "(got {}: a TIFF of 3 channels of 32 bits, unknown to Pillow)"),
         ("cmyk16.tif", "(got {}: CMYK of 16 bits)"),

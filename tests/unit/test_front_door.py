@@ -285,7 +285,7 @@ def test_without_matplotlib_there_is_the_table_and_a_line_with_the_extra(done, m
         (lambda run: run.surface(time=float("nan")), "time must be between 0 s and 0.3 s (got nan s)."),
         (lambda run: run.surface(former="rest"), "former must be between 0 s and 0.3 s (got 'rest')."),
         (lambda run: run.save(3), "A file or folder must be a path (got 3)."),
-        (lambda run: digiclay.load("none"), "none is no run's folder: it has no scene.toml."),
+        (lambda run: digiclay.load("none"), "none is not the folder of a run: it has no scene.toml."),
         (lambda run: digiclay.load(None), "A file or folder must be a path (got None)."),
         (lambda run: digiclay.run("tap"), "scene must be a Scene, as digiclay.scene returns it (got 'tap')."),
         (

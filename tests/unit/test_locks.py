@@ -80,8 +80,8 @@ def test_a_second_series_in_one_folder_is_refused_at_once(line, refused):
     finished = f"{line} --prepare" if line.startswith("batch") else line  # nothing is to be simulated
     assert call(f"{finished} --out o --quiet") == 0
     with hold_lock(Path("o/.lock"), "no"):
-        refused(f"{line} --out o --quiet", REFUSED.format("worked in"))
-        refused("run my.toml --out o --quiet", "o holds other things than a run")
+        refused(f"{line} --out o --quiet", REFUSED.format("used"))
+        refused("run my.toml --out o --quiet", "o contains something other than a run")
 
 
 @pytest.mark.skipif(not Path("/proc/self").exists(), reason="no folder here that takes no files")
@@ -124,7 +124,7 @@ def test_what_comes_in_between_is_not_replaced_at_the_end():
             Path("o").mkdir()
             Path("o/thesis.doc").touch()
 
-    with pytest.raises(OutputError, match="o holds other things"):
+    with pytest.raises(OutputError, match="o contains something other"):
         interfere()
     assert names(Path("o")) == ["thesis.doc"]
 

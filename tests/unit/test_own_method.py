@@ -425,7 +425,7 @@ def test_a_method_that_is_too_slow_is_refused(here, capsys):
     write_method(here, SLOW, "bad.py")
     assert run_quickly() == 2
     said = capsys.readouterr().err
-    assert "bad.py:Bad: command must take at most 20 control periods of processor time a call (got 2" in said
+    assert "command must take at most 20 control periods of processor time per call (got 2" in said
     assert [path.name for path in here.iterdir()] == ["bad.py"]
 
 
@@ -470,7 +470,7 @@ def test_two_methods_of_one_name_are_refused(here):
     write_method(here)
     write_method(here, PAD.replace("50e-6", "60e-6"), "other.py")
     assert load_method("pad.py:SoftPad") == load_method(str(here / "pad.py:SoftPad")) == "soft_pad"
-    with pytest.raises(MethodError, match=r"soft_pad must be its own \(also that of pad.py\)"):
+    with pytest.raises(MethodError, match=r"soft_pad must be unique \(also that of pad.py\)"):
         load_method("other.py:SoftPad")
     write_method(here, PAD.replace("SoftPad", "Elastic"), "elastic.py")
     with pytest.raises(MethodError, match=r"must not have the name of the built-in method elastic"):

@@ -191,7 +191,7 @@ def test_an_older_run_is_replaced_when_asked_and_stays_when_the_new_one_fails(tm
     "there, out, overwrite, message",
     [
         (f"run/{MARK}", "run", False, r"is not empty: .* --overwrite"),
-        ("thesis.doc", ".", True, "holds other things than a run"),
+        ("thesis.doc", ".", True, "contains something other than a run"),
         ("run", "run", True, "is a file"),
         ("file", "file/run", False, "cannot be made"),
     ],

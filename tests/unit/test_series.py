@@ -92,7 +92,7 @@ def test_scenes_by_odd_paths_are_done_and_nothing_is_written_outside(here, capsy
     absolute = str(here.parent / "scene.toml")
     jobs = jobs_file(f'scenes = ["../scene.toml", "scene.toml", "MY.toml", "my.toml", {absolute!r}]\n{QUICK}')
     assert main(["batch", str(jobs), "--out", "o", "--quiet"]) == 2
-    assert "scenes must not name one thing twice" in capsys.readouterr().err
+    assert "scenes must not name the same thing twice" in capsys.readouterr().err
     before = set(here.parent.rglob("*"))
     jobs = jobs_file(f'scenes = ["..", "scene.toml", "MY.toml", "my.toml"]\n{QUICK}')
     assert main(["batch", str(jobs), "--out", "o", "--jobs", "2"]) == 0
@@ -223,7 +223,7 @@ def test_a_sweep_of_which_points_are_done_is_not_begun_anew(here, refused):
     write_text(here / "o" / "sweep.json", "")
     refused(SWEEP, "its sweep.json cannot be read")
     (here / "o" / "sweep.json").unlink()
-    refused(SWEEP, "o holds other things than a sweep")
+    refused(SWEEP, "o contains something other than a sweep")
 
 
 @pytest.mark.parametrize("stranger", ["letter.txt", "points/letter.txt", "sub/", ".git/"])
@@ -233,7 +233,7 @@ def test_a_folder_with_other_things_is_left_alone(stranger, here, refused):
     if not stranger.endswith("/"):
         path.touch()
     before = sorted((here / "o").rglob("*"))
-    refused(SWEEP, "o holds other things than a sweep")
+    refused(SWEEP, "o contains something other than a sweep")
     assert sorted((here / "o").rglob("*")) == before
 
 

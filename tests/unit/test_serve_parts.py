@@ -395,7 +395,7 @@ FEW_PINS = ["--set", "layout.rows=3", "--set", "layout.columns=3", "--set", "con
         ("--part 0", "must be from 0.1 to 600 s"),
         ("--seconds inf", "must be from 0 to 1e+09 s"),
         ("--tokn x", "Did you mean --token (not --tokn)?"),
-        ("--report missing/report.json --out .", "holds other things"),
+        ("--report missing/report.json --out .", "contains something other"),
         ("missing.toml", "missing.toml"),
     ],
 )

@@ -67,7 +67,7 @@ def test_a_client_that_floods_or_answers_no_ping_is_closed_and_leaves_the_finger
     monkeypatch.setattr(door_link, "LEASE", 1e9)  # the fingertip is another's by the close alone
     link = make_link()
     sent = asyncio.run(connect(link, REQUEST.encode() + 3 * frame_message(pack_pose(POSE))))
-    assert b"more than 2 messages a second" in sent
+    assert b"more than 2 messages per second" in sent
     assert (link.counts["floods"], link.counts["poses"]) == (1, 3)
     monkeypatch.setattr(websocket_door, "PING", 0.1)
     monkeypatch.setattr(door_link, "LEASE", 1e9)  # nobody else may by silence alone

@@ -168,7 +168,7 @@ def _finish(arguments: Namespace, folder: Folder, failed: dict[str, str]) -> boo
     index = folder.write_index(failed, f"{summary}.")
     say(arguments, f"{summary}.", f"written to {index}")
     if stopped and done + len(failed) < len(series.jobs):
-        say(arguments, "Stopped: what is done is kept, and the same command goes on from there.")
+        say(arguments, "Stopped: finished work is kept, and the same command continues.")
         return False
     return True
 
@@ -202,7 +202,7 @@ def write_farm_files(folder: Folder, form: str, program: str | None, chunk: int 
         try:
             word.encode()
         except UnicodeEncodeError:
-            raise OutputError(f"{word!r} is no valid text: choose another folder with --out.") from None
+            raise OutputError(f"{word!r} is not valid text: choose another folder with --out.") from None
     if form == "cuecmd":  # an earlier submission may have had more lists
         for path in folder.path.glob("cuecmd/[0-9]-*.txt"):
             if f"cuecmd/{path.name}" not in files:

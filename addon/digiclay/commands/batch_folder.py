@@ -167,7 +167,7 @@ def read_batch(path: Path) -> Folder:
     """Return a batch's folder with the jobs it has, without their definitions."""
     description = run_folder.read_json(path / MARK)
     if description is None or not isinstance(description.get("batch"), str):
-        raise OutputError(f"{path} is no folder of a job series: it has no {MARK} of 'digiclay batch'.")
+        raise OutputError(f"{path} is not the folder of a job series: it has no {MARK} of 'digiclay batch'.")
     named = description.get("jobs")
     if not isinstance(named, dict):  # of an older version
         named = {job.name: "" for job in sorted((path / JOBS).glob("*/")) if (job / JOB).is_file()}

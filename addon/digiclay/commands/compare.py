@@ -154,7 +154,7 @@ def carry_out(arguments: Namespace) -> int:
         if not records:
             raise
         done = f"{len(records)} of {len(points)} methods are done and kept in {out}"
-        say(arguments, f"Stopped: {done}. The same command goes on from there.")
+        say(arguments, f"Stopped: {done}. The same command continues.")
         return STOPPED
     say(arguments, *table({name: record["figures"] for name, record in every.items()}), *notes)
     return 0
@@ -213,12 +213,12 @@ def _write(out: Path, scene: Scene, every: Mapping[str, Record], *, speed: bool)
     called = "force of the worst finger" if several else "total force"
     save(comparison(measured, forces, scene.name, called), out / "compare.png")
     notes = [f"{method}: {words}" for method, words in beyond.items() if words]
-    alone = ", the first of the fingers alone" if several else ""
+    alone = ", for the first finger alone" if several else ""
     if speed:
         ends = f"searched from {LOW * 1e3:g} to {HIGH * 1e3:g} mm/s"
         notes.append(f"Followed{alone}, {ends}: {Criterion()}.")
     notes += dict.fromkeys(why for each in every.values() for why in each.get("absent", ()))
-    notes += [f"Of {len(scene.fingers)} fingers the worst; metrics.json has each."] if several else []
+    notes += [f"The worst of {len(scene.fingers)} fingers; metrics.json has each."] if several else []
     return [*notes, f"written to {out}"]
 
 

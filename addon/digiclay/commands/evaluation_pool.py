@@ -195,7 +195,7 @@ def run_series(
             records = evaluation.collect()
         if stop() and (len(records) < total or evaluation.unjudged):
             done = f"{len(records)} of {total} {noun} are done and kept in {folder.path}"
-            say(arguments, f"Stopped: {done}. The same command goes on from there.")
+            say(arguments, f"Stopped: {done}. The same command continues.")
             return STOPPED
         say(arguments, *write(records))
     return 0

@@ -61,7 +61,7 @@ def submit(
                 raise broken
             yield piece, future.result
     except BrokenExecutor as error:
-        rule = "What is done is kept, and the same command goes on from there."
+        rule = "Finished work is kept, and the same command continues."
         raise OutputError(f"{one_line(error)} {rule}") from None
     finally:
         for future in waiting:

@@ -31,7 +31,7 @@ USUAL = Finding()
 SURFACE = {
     "--skin": (SKINS, f"{list_choices(SKINS)}; default bilinear", "bilinear"),
     # 0 stands for the default in files alone.
-    "--resolution N": (whole_number(1, 64), "points a pitch; default: 1, or 4 for curved skins", 0),
+    "--resolution N": (whole_number(1, 64), "points per pitch; default: 1, or 4 for curved skins", 0),
     "--threshold L": (
         millimeters,
         "least distance of a feature from the former surface, mm, or with a unit; "

@@ -32,7 +32,7 @@ examples:
   digiclay batch first                      collect finished jobs, run the rest, write first/index.html
 
 A job is a folder with scene.toml (every parameter of its session) and job.toml (its outputs). A finished
-job is left as it is, with exit code 0; after a change of its files it is done again.
+job is left as it is, with exit code 0; after a change of its files it is repeated.
 
 On several machines, a long film in parts:
   digiclay job JOB --only run                     all but the films
@@ -113,7 +113,7 @@ def _do_job(arguments: Namespace, stopped: Callable[[], bool], tell: Tell) -> st
     """Do the job or a part of it, and return its outcome; KeyboardInterrupt when it was stopped."""
     folder, only, frames = arguments.job, arguments.only, arguments.frames
     if not os.path.isfile(folder / JOB):
-        raise OutputError(f"{folder} is no job's folder: it has no {JOB}.")
+        raise OutputError(f"{folder} is not the folder of a job: it has no {JOB}.")
     if frames is not None and only not in MOVING:
         raise OutputError("--frames must be given with --only film or --only turntable.")
     if arguments.method is not None:
@@ -159,7 +159,7 @@ def _write_run(arguments: Namespace, work: Work, outputs: Outputs) -> bool:
         if state is RunState.WHOLE and not arguments.overwrite:
             return False
         if state in (RunState.CHANGED, RunState.INCOMPLETE):
-            say(arguments, f"The run in {out} is {state.value}: it is done again.")
+            say(arguments, f"The run in {out} is {state.value}: it is repeated.")
         with claim.write() as staged:
             work.make_outputs(scene, outputs, staged, timing)
             # As they were given: by them a batch recognizes what this is the run of.

@@ -56,9 +56,9 @@ OPTIONS: Options = {
         "action": BooleanOptionalAction,
         "help": "forces as arrows; default: in films only",
     },
-    "--rate N": (int, "frames a second of film; default 25"),
-    "--frames N": (int, "frames of a rotation; default: 75"),
-    "--speed X": (float, "simulated seconds a second of film; default 1"),
+    "--rate N": (int, "frames per second of film; default 25"),
+    "--frames N": (int, "frames per rotation; default: 75"),
+    "--speed X": (float, "simulated seconds per second of film; default 1"),
     "--start T": (seconds, "first instant of the film, s"),
     "--stop T": (seconds, "last instant of the film, s"),
     "--strip": {

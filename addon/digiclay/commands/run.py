@@ -63,7 +63,7 @@ def noted(fit: Fitted) -> dict[str, Any]:
 
 def report(fit: Fitted) -> Iterator[str]:
     """Give the lines of the report."""
-    yield f"What {fit.scene.name} can do without, within {fit.budget * 1e6:g} µm of height:"
+    yield f"Parts that {fit.scene.name} can omit, within {fit.budget * 1e6:g} µm of height:"
     rows = [
         [
             trial.text,
@@ -73,11 +73,11 @@ def report(fit: Fitted) -> Iterator[str]:
         ]
         for trial in fit.tried
     ]
-    yield from table(("it would have", "off by, µm", "time left", ""), rows)
-    omitted = "; ".join(fit.left_out) or "nothing: all of it is needed"
+    yield from table(("replaced by", "error, µm", "time", ""), rows)
+    omitted = "; ".join(fit.left_out) or "nothing: all parts are needed"
     yield f"Left out: {omitted}."
     yield (
-        f"Measured then: {fit.error * 1e6:.3g} µm "
+        f"Measured without them: {fit.error * 1e6:.3g} µm "
         f"({fit.departure * 1e6:.3g} µm from the full model, {fit.own_error * 1e6:.3g} of integration), "
         f"in {100 * fit.time:.0f} % of its time as measured."
     )

@@ -67,7 +67,7 @@ class SkinLattice(NamedTuple):
 
 
 def choose_parts(count: int) -> int:
-    """Return the number of points a pitch for a number of pins."""
+    """Return the number of points per pitch for a number of pins."""
     return next((parts for parts in PARTS if parts**2 * count <= MOST_POINTS), PARTS[-1])
 
 

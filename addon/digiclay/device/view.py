@@ -150,7 +150,7 @@ def write_setting(bed: Object, name: str, value: Any) -> None:
     modifier = require_modifier(bed)
     if not has_setting(bed, name):
         raise DigiclayError(
-            f"{bed.name} is of an older file and has no skin. Rebuild it in Laboratory > Device."
+            f"{bed.name} is from an older file and has no skin. Rebuild it in Laboratory > Device."
         )
     set_node_setting(modifier, name, value)
 

@@ -53,7 +53,7 @@ def plan_series(series: JobSeries, chunk: int) -> tuple[Task, ...]:
     """Return the tasks of all jobs that have a scene, each after those it needs; `chunk` frames per task."""
     tasks = [task for job in series.jobs for task in _plan_job(job, series.outputs, chunk)]
     if not tasks:
-        raise OutputError("No job can be submitted: the values of none go together.")
+        raise OutputError("No job can be submitted: the values of each are in conflict.")
     needed = {name for task in tasks for name in task.needs}
     last = tuple(task.name for task in tasks if task.name not in needed)
     return (*tasks, Task("page", "page", "page", "", needs=last))

@@ -74,9 +74,9 @@ def blocking_reason(context: Context, bed: Object, pins: int | None = None) -> s
     for tip in tips:
         matrix = np.array(tip.matrix_world)
         if not _is_shown(context, tip):
-            return localize("{} stands in no scene shown: link it to a collection to go on", tip.name)
+            return localize("{} is in no visible scene: link it to a collection to go on", tip.name)
         if not np.isfinite(matrix).all():
-            return localize("{} is at no finite place: clear its location, or undo that, to go on", tip.name)
+            return localize("{} has no finite location: clear its location, or undo that, to go on", tip.name)
         if abs(np.linalg.det(matrix[:3, :3])) < 1e-12:
             return localize("{} is scaled to nothing: clear its scale to go on", tip.name)
     return ""

@@ -168,7 +168,7 @@ def follow(uid: int, now: float) -> tuple[Floats | None, str]:
     heard = now if following.heard is None else following.heard
     if pose is not None:
         if following.silent:
-            words = localize("The server at {} is heard again", following.address)
+            words = localize("The server at {} responds again", following.address)
         following = replace(following, pose=pose, fingers=fingers, heard=now, silent=False)
     elif not following.silent and (closed or now - heard >= SILENT):
         # Nobody presses on when the server is gone.

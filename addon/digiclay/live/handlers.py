@@ -79,8 +79,8 @@ def save_copy() -> str:
     try:
         bpy.ops.wm.save_as_mainfile(filepath=str(file_path()), copy=True, check_existing=False)
     except RuntimeError as error:
-        return localize("It could not be left for recovery: {}", str(error).removeprefix("Error: ").strip())
-    return localize("It can be had back with File > Recover > Auto Save: {}", file_path().name)
+        return localize("It could not be saved for recovery: {}", str(error).removeprefix("Error: ").strip())
+    return localize("Restore it with File > Recover > Auto Save: {}", file_path().name)
 
 
 @bpy.app.handlers.persistent

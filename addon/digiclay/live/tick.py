@@ -253,9 +253,7 @@ def _read_changes(context: Context, bed: Object, session: Running) -> tuple[str,
         if session.stale:
             back = take_up(context, bed, session)
             if session.recording is not None and back.recording is None:
-                words = localize(
-                    "The recording ended: undo went back to before it, or redo to what it did not lead to"
-                )
+                words = localize("The recording ended: undo or redo left what was recorded")
             session = back
     except DigiclayError as error:
         return str(error), session, words

@@ -37,7 +37,7 @@ def end_in_order(step: Callable[..., Result]) -> Callable[..., Result]:
             words = str(error)
         except Exception as error:
             traceback.print_exc()  # a fault of the extension: the console has what a report of it needs
-            words = localize("Fault of the extension: {}: {}", type(error).__name__, one_line(error))
+            words = localize("Error in the extension: {}: {}", type(error).__name__, one_line(error))
         if step.__name__ == "modal":
             self.give_up(context, words)
         clear_status()

@@ -138,7 +138,7 @@ class AddBed(Placed, Action, Operator):
     preset: choice("Preset", "Fluid, valves and all other parameters of a custom preset", items=offered)
     scale: number(
         "Scale (cm/mm)",
-        "Scale of the device: centimeters in Blender for a millimeter of the device",
+        "Scale of the device: centimeters in Blender per millimeter of the device",
         default=1.0,
         min=0.001,
         soft_min=0.1,
@@ -173,7 +173,7 @@ class AddBed(Placed, Action, Operator):
     "Rebuild",
     cannot_change,
     session_runs.reworded("Stop the session first: its pins cannot be exchanged"),
-    baked.reworded("Free the bake in the Takes panel first: it moves the pins there are now"),
+    baked.reworded("Free the bake in the Takes panel first: it moves the present pins"),
     edited.reworded("Leave Edit Mode first"),
 )
 def rebuild_bed(operator: Operator, context: Context) -> None:

@@ -81,7 +81,7 @@ class SurfaceOptions(FindingOptions):
         default=Model().skin,
     )
     resolution: integer(
-        "Points a Pitch", sentence(MODEL["resolution"].doc), default=0, min=0, max=64, soft_max=16
+        "Points per Pitch", sentence(MODEL["resolution"].doc), default=0, min=0, max=64, soft_max=16
     )
     base_thickness: millimeters(
         "Base",
@@ -198,7 +198,7 @@ ENTRIES: tuple[tuple[str, str, dict[str, Any]], ...] = (
     ("Surface with its features as groups (.obj)", "SURFACE_DATA", {"kind": "surface", "file_format": "obj"}),
     ("Surface with force and mode (.ply)", "POINTCLOUD_DATA", {"kind": "surface", "file_format": "ply"}),
     (
-        "Bosses and creases, a file each (.stl)",
+        "Bosses and creases, one file each (.stl)",
         "MOD_BOOLEAN",
         {"kind": "features", "file_format": "stl", "separate": True},
     ),
@@ -238,7 +238,7 @@ class ExportMesh(SurfaceOptions, Operator):
     )
     forward_axis: choice("Forward Axis", "Forward axis of an OBJ", items=AXIS_ITEMS, default="NEGATIVE_Z")
     up_axis: choice("Up Axis", "Upward axis of an OBJ; slicers expect Z", items=AXIS_ITEMS, default="Y")
-    separate: flag("A File Each", "Write each feature into a file of its own", default=False)
+    separate: flag("One File per Feature", "Write each feature into a file of its own", default=False)
 
     def invoke(self, context: Context, event: Event) -> Result:
         """Open the file browser, with the name of the bed."""

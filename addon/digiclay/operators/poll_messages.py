@@ -79,12 +79,12 @@ from_rest = Need(
 )
 no_skin = Need(
     lambda context: not view.can_show_skin(bed_of(context)),
-    "The bed is of an older file and has no skin: rebuild it in Laboratory > Device",
+    "The bed is from an older file and has no skin: rebuild it in Laboratory > Device",
 )
 no_shape = Need(lambda context: not bed_of(context).digiclay.use_shape, "The bed has no shape")
 no_own_preset = Need(
     lambda context: bed_of(context).digiclay.own_preset not in own_presets.names(),
-    "Apply a preset of your own first: those that come along cannot be removed",
+    "Apply a preset of your own first: built-in presets cannot be removed",
 )
 no_own_methods = Need(
     lambda context: not preferences.get(context).run_own_methods, "Turn on Run Own Methods first"
@@ -98,7 +98,7 @@ no_session = Need(
 )
 no_undriven = Need(lambda context: not running.list_sessions() or context.window is None, "No session runs")
 # At any other time the key Esc has other uses.
-driven = Need(lambda context: not loop.is_aside(), "The session takes the key itself")
+driven = Need(lambda context: not loop.is_aside(), "The session uses this key itself")
 no_server = Need(
     lambda context: not (active := active_session(context)) or follow.find(active[1].uid) is None,
     "The session follows no server",
@@ -113,7 +113,7 @@ no_view = Need(lambda context: not _has_view(context), "Pins are picked in a 3D 
 no_pins = Need(lambda context: not view.picked_pins(bed_of(context)), "No pins are picked")
 no_gesture = Need(
     lambda context: not (active := active_session(context)) or not (active[1].gestures or active[1].strokes),
-    "There is no gesture to take back: the fingertip has not touched since",
+    "There is no gesture to take back: the fingertip has not touched the bed",
 )
 
 

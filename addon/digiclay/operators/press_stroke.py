@@ -46,9 +46,9 @@ WHEELS = {"WHEELUPMOUSE": WHEEL, "WHEELDOWNMOUSE": -WHEEL}
 KEYS = "{}  |  Ctrl and wheel: depth or height  |  Esc or right click: take the stroke back"
 KEYS_PLAIN = "{}  |  Esc or right click: take the stroke back"
 #: Reports where a brush cannot work.
-NO_BLISTER = "{} needs a blister, which the method {} has not: choose Virtual master or Cell states (Control)"
+NO_BLISTER = "{} needs a blister, which the method {} lacks: choose Virtual master or Cell states (Control)"
 HIDDEN = "{} hides the bed here: press beside it, look from elsewhere, or hide it (H)"
-RECOVERS = "These pins will not stay so: the method {} brings all pins back"
+RECOVERS = "These pins will not stay: the method {} moves all pins back"
 #: Result of a press on something else: Blender shows no reports of an operator that only passes.
 NOT_PRESSED = {"CANCELLED", "PASS_THROUGH"}
 
@@ -97,7 +97,7 @@ class PressSettings:
     )
     symmetry: choice(
         "Symmetry",
-        "Mirror images of a stroke, or turned ones: formed at the same time, as one undo step",
+        "Mirrored or rotated images of a stroke, formed at the same time as one undo step",
         items=brush.SYMMETRY_ITEMS,
         default="NONE",
     )
@@ -109,7 +109,7 @@ class PressSettings:
     stamp_file: text("File", "Mesh, picture or .npy file that is stamped", subtype="FILE_PATH")
     accumulate: flag(
         "Accumulate",
-        "Where a stroke comes back to what it has formed, it counts from there once more",
+        "Where a stroke returns to what it has formed, it starts from the new surface",
         default=False,
     )
     path: choice("Stroke", "Path of a stroke", items=brush.PATH_ITEMS, default="FREE")

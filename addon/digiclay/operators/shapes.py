@@ -21,15 +21,15 @@ from .poll_messages import baked, cannot_change, cannot_form, no_shape, session_
 DEFAULT = Shape()
 FITS = (
     ("contain", "Whole", "As large as the bed allows, all of it on the bed"),
-    ("cover", "Fill the Bed", "As small as fills the bed; what stands out is left away"),
+    ("cover", "Fill the Bed", "As small as still fills the bed; what extends beyond it is cut off"),
     ("stretch", "Stretch", "Exactly as large as the bed, whatever its proportions"),
-    ("actual", "Own Size", "As large as it is, in the middle of the bed"),
-    ("placed", "Where It Is", "As large and where it is; what is below the floor or above the stroke is cut"),
+    ("actual", "Own Size", "At its own size, in the middle of the bed"),
+    ("placed", "Where It Is", "At its own size and place; what is beyond floor or stroke is cut off"),
 )
 RELIEFS = (
-    ("rise", "Given Rise", "From its lowest to its highest point by the rise given"),
+    ("rise", "Given Rise", "The given rise from its lowest to its highest point"),
     ("stroke", "Whole Stroke", "Its highest point at the end of the stroke"),
-    ("true", "True", "As high as its plan is large: proportions are kept"),
+    ("true", "True", "Height in proportion to the plan"),
 )
 LENGTH = {"soft_min": -100.0, "soft_max": 100.0, "min": -1e5, "max": 1e5, "step": 20}
 
@@ -37,7 +37,7 @@ LENGTH = {"soft_min": -100.0, "soft_max": 100.0, "min": -1e5, "max": 1e5, "step"
 #: Needs of the operators that display a shape.
 NEEDS = (
     cannot_form,
-    session_runs.reworded("Stop the session first: the bed is going to be shaped anew"),
+    session_runs.reworded("Stop the session first: the bed will be reshaped"),
     baked,
 )
 
@@ -51,7 +51,7 @@ class Shaped(Action):
     y: millimeters("Back", DEFAULT.y, "Shift of its middle from the bed's along y", **LENGTH)
     relief: choice("Height", "Height of the shape", items=RELIEFS, default=DEFAULT.relief)
     rise: millimeters(
-        "Rise", DEFAULT.rise, "From its lowest to its highest point; negative turns it over", **LENGTH
+        "Rise", DEFAULT.rise, "From its lowest to its highest point; a negative value inverts it", **LENGTH
     )
     foot: millimeters("Foot", DEFAULT.foot, "Where its lowest point lies above the bed at rest", **LENGTH)
 

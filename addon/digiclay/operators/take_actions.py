@@ -266,7 +266,7 @@ class ReplayTake(TimedAction, Operator):
         recorded = snapshot.load(self._system, self._take.end)
         away = 1e6 * float(np.abs(self._state.row(0) - recorded.row(0)).max())
         if self.parts == 1:
-            words = localize("Replayed {}: it ends {:.3g} µm away, as another version may", seconds, away)
+            words = localize("Replayed {}: it ends {:.3g} µm away, as another version can", seconds, away)
             self.report({"WARNING"}, words)
         else:
             words = localize("steps {} times finer end {:.3g} µm away", self.parts, away)

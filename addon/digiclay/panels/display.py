@@ -30,7 +30,7 @@ COLORINGS = (
     ("force", "Force", "Color the pins by the force on them"),
 )
 FORMS = (
-    ("automatic", "Automatic", "Pins, and the skin instead where they are smaller than about 8 pixels"),
+    ("automatic", "Automatic", "Pins, or the skin where pins are smaller than about 8 pixels"),
     ("pins", "Pins", "Pins alone"),
     ("skin", "Skin", "The surface of the pins as a skin, without the pins"),
     ("both", "Both", "Pins under a clear skin"),
@@ -90,14 +90,14 @@ class Display(bpy.types.PropertyGroup):
 
     form: choice(
         "Show",
-        "What is seen of the bed, also in renders: pins, or the surface they form as a skin",
+        "What is shown of the bed, also in renders: pins, or the surface they form as a skin",
         items=FORMS,
         get=lambda display: view.FORMS.index(view.read_form(display.id_data)),
         set=_in_nodes(FORM, 0, lambda bed, code: view.set_form(bed, FORMS[code][0]))["set"],
     )
     skin: choice(
         "Skin",
-        "How the skin runs between the pins",
+        "Shape of the skin between the pins",
         items=SKINS,
         **_in_nodes(MEMBRANE, 0, lambda bed, code: view.write_setting(bed, MEMBRANE, bool(code))),
     )
@@ -146,7 +146,7 @@ class Display(bpy.types.PropertyGroup):
     )
     overlay_full: flag(
         "Overlay Details",
-        "Show curves, heights of picked pins and modes in the overlay, not force and state alone",
+        "Show curves, heights of picked pins and modes in the overlay, not only force and state",
         update=show_details,
     )
     seconds: number(

@@ -88,7 +88,7 @@ def session_figure(history: History, set_point: SetPoint | None) -> Figure:
         if set_point is not None:
             fingers = [set_point.total(sum_cells(finger).following) for finger in split_fingers(history)]
             wanted = np.fmax.reduce(fingers)  # the same of all fingers, where it does not depend on cells
-            label = f"set point {set_point.force:g} N{' a cell' if set_point.per_cell else ''}"
+            label = f"set point {set_point.force:g} N{' per cell' if set_point.per_cell else ''}"
         draw_force(force, history, wanted, label)
         force.set(xlabel="time (s)", ylabel="force (N)", ylim=(0.0, None), xlim=ends(time, 0.1))
         force.set_title("Forces" if several else "Total force on the fingertip")

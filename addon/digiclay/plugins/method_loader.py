@@ -245,7 +245,7 @@ def load_method(word: str | type) -> str:
             return name
         other = row.source.file
         if other != source.file:
-            rule = f"the method's name {name} must be its own (also that of {other or 'a class in memory'})"
+            rule = f"the method's name {name} must be unique (also that of {other or 'a class in memory'})"
             raise MethodError(f"{source.label}: {rule}.")
     add_source(name, source)
     return name
@@ -261,7 +261,7 @@ def load_class(kind: type) -> str:
     if row and row.import_parameters() is kind:
         return name
     if row and not (isinstance(row, OwnRow) and is_in_memory(row.source)):
-        raise MethodError(f"{kind.__name__}: the name {name} must be its own (another method has it).")
+        raise MethodError(f"{kind.__name__}: the name {name} must be unique (another method has it).")
     # What its functions refer to can change: no two classes are known to be the same.
     add_class(name, MethodSource(kind.__name__, "", kind.__name__, "", "", "", uuid4().hex), kind)
     return name
@@ -484,7 +484,7 @@ def _load_file(path: Path, refused: list[str]) -> list[str]:
         label = f"{path.name}:{kind.__name__}"
         try:
             if name in list_added():
-                raise MethodError(f"{label}: the method's name {name} must be its own in this folder.")
+                raise MethodError(f"{label}: the method's name {name} must be unique in this folder.")
             add_class(name, source._replace(label=label, attribute=kind.__name__), kind)
         except MethodError as error:
             refused.append(str(error))

@@ -31,7 +31,7 @@ class FingerKind:
 
 
 FINGERS: Mapping[str, FingerKind] = {
-    "fingertip": FingerKind("Fingertip", Fingertip(), "an index finger's tip, the device's own"),
+    "fingertip": FingerKind("Fingertip", Fingertip(), "the tip of an index finger, as the device has it"),
     "thumb": FingerKind(
         "Thumb",
         Fingertip(14e-3, 11.5e-3, 11e-3),
@@ -69,11 +69,11 @@ BRUSH_WORDS = {
 }
 BRUSH_ITEMS = tuple((brush.value, LABELS[brush], words) for brush, words in BRUSH_WORDS.items())
 SYMMETRY_ITEMS = (
-    ("NONE", "No Symmetry", "Form the stroke alone"),
-    ("X", "X", "Form the stroke, then its mirror image across the axis along the bed's y"),
-    ("Y", "Y", "Form the stroke, then its mirror image across the axis along the bed's x"),
-    ("XY", "X and Y", "Form the stroke, then its three mirror images"),
-    ("RADIAL", "Radial", "Form the stroke, then turned about the center"),
+    ("NONE", "No Symmetry", "Form only the stroke"),
+    ("X", "X", "Form the stroke and its mirror image across the axis along the bed's y"),
+    ("Y", "Y", "Form the stroke and its mirror image across the axis along the bed's x"),
+    ("XY", "X and Y", "Form the stroke and its three mirror images"),
+    ("RADIAL", "Radial", "Form the stroke and its images rotated about the center"),
 )
 #: Settings of a placed symmetry, and the shortest drag that turns its axis, m.
 PLACED, SHORT = ("symmetry", "center_x", "center_y", "axis"), 1e-3

@@ -14,7 +14,7 @@ FULL_TILT = math.radians(60.0)
 EXPONENTS = {"SOFT": 0.5, "LINEAR": 1.0, "FIRM": 2.0}
 #: The curves as items of a property in Blender.
 CURVE_ITEMS = (
-    ("SOFT", "Soft", "The square root of the pressure: a light hand goes deep"),
+    ("SOFT", "Soft", "The square root of the pressure: a light touch goes deep"),
     ("LINEAR", "Linear", "The pressure itself"),
     ("FIRM", "Firm", "The square of the pressure: fine control of light touches"),
 )

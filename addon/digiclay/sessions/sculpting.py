@@ -33,7 +33,7 @@ from .running import Gesture, Running, match_poses, name_fingers
 #: How many gestures can be taken back, and the most memory their states may take, bytes.
 GESTURES, GESTURE_BYTES = 20, 200_000_000
 #: Message when the state of other parts is taken up.
-CHANGED = "The heights were taken up, the rest begins anew: the bed's parts or its method have changed"
+CHANGED = "Only the heights were kept: the bed's parts or its method have changed"
 #: A fingertip that moves on after resting so long makes another gesture, s.
 REST = 0.5
 #: Control periods of a queue that are simulated at a time, and between two estimates of the error: so many

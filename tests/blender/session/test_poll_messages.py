@@ -31,7 +31,7 @@ IN_A_SESSION = {
     "digiclay.bake": "Stop the session on this bed first",
     "digiclay.rebuild": "Stop the session first: its pins cannot be exchanged",
     "digiclay.session": "A session runs on this bed already: Esc stops it",
-    "digiclay.shape_from_file": "Stop the session first: the bed is going to be shaped anew",
+    "digiclay.shape_from_file": "Stop the session first: the bed will be reshaped",
     "digiclay.shape_keep": "Stop the session first",
     "digiclay.take_replay": "Stop the session on this bed first",
 }

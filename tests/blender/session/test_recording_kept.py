@@ -129,7 +129,7 @@ def test_the_former_file_can_be_recovered_with_its_take(recording, clock, tmp_pa
     save(tmp_path / "saved.blend")
     recorded_on(recording, clock)
     bpy.ops.wm.read_homefile(use_empty=True)
-    told = "Take 1 (1.0 s). It can be had back with File > Recover > Auto Save: digiclay_recording.blend"
+    told = "Take 1 (1.0 s). Restore it with File > Recover > Auto Save: digiclay_recording.blend"
     assert running.last_message().endswith(told)
     assert handlers.file_path().parent == tmp_path / "temporary"
     bpy.ops.wm.recover_auto_save(filepath=str(handlers.file_path()))
@@ -146,7 +146,7 @@ def test_what_is_recorded_anew_after_undo_is_not_what_was_saved():
 def test_what_cannot_be_left_is_told(recording, tmp_path):
     shutil.rmtree(tmp_path / "temporary")
     bpy.ops.wm.read_homefile(use_empty=True)
-    assert "It could not be left for recovery: " in running.last_message()
+    assert "It could not be saved for recovery: " in running.last_message()
 
 
 def test_undoing_the_first_gesture_of_a_recording_leaves_it_recording(bed, clock):

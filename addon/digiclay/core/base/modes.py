@@ -28,8 +28,8 @@ REST, HOLD, EDGE, BLISTER, SPRING, FORCE_FOLLOW, CRITICAL, FROZEN, LOCKED = map(
 
 MEANINGS: dict[Mode, str] = {
     Mode.REST: "at rest, not formed yet",
-    Mode.HOLD: "keeps the height it was left at",
-    Mode.EDGE: "just outside the blister, gives the boundary height",
+    Mode.HOLD: "stays at the height at which it was left",
+    Mode.EDGE: "just outside the blister, sets its boundary height",
     Mode.BLISTER: "part of the blister, follows its profile",
     Mode.SPRING: "under the fingertip, virtual spring",
     Mode.FORCE_FOLLOW: "under the fingertip, follows the force",

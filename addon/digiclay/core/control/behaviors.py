@@ -30,7 +30,7 @@ class Elastic(TouchParameters):
     """Spring and damper under every pin."""
 
     stiffness: float = quantity(20.0, "stiffness of a cell's spring", unit="N/m", symbol="k", above=0.0)
-    damping: float = quantity(5.0, "force over speed of a pressed pin", unit="N s/m", symbol="c", above=0.0)
+    damping: float = quantity(5.0, "force per speed of a pressed pin", unit="N s/m", symbol="c", above=0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +60,7 @@ class Plastic(TouchParameters):
 
     yield_force: float = quantity(0.03, "force above which a cell yields", unit="N", symbol="F_y", above=0.0)
     damping: float = quantity(
-        5.0, "force above yield over speed of a sinking pin", unit="N s/m", symbol="c", above=0.0
+        5.0, "force above the yield force per speed of a sinking pin", unit="N s/m", symbol="c", above=0.0
     )
 
     def check(self) -> None:
@@ -103,7 +103,7 @@ class Viscous(TouchParameters):
     Materiable calls this viscosity: a spring and a damper per cell, and exchange between neighbors.
     """
 
-    damping: float = quantity(10.0, "force over speed of a sinking pin", unit="N s/m", symbol="c", above=0.0)
+    damping: float = quantity(10.0, "force per speed of a sinking pin", unit="N s/m", symbol="c", above=0.0)
     recovery_time: float = quantity(
         1.0, "time constant of the surface's recovery", unit="s", symbol="τ_r", above=0.0
     )

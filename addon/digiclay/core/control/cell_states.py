@@ -150,7 +150,7 @@ class CellStates(Tracking):
     )
     jump: float = quantity(
         8e-3,
-        "motion in a control period beyond which there is a loss",
+        "motion per control period above which contact counts as lost",
         unit="m",
         symbol="r_VM",
         source="P",

@@ -102,7 +102,7 @@ class ForceDisplay(TouchParameters):
         0.5, "variation of a named field, as a share of the mean", symbol="κ", at_least=0.0, at_most=1.0
     )
     damping: float = quantity(
-        5.0, "force deviation over speed of its correction", unit="N s/m", symbol="c", above=0.0
+        5.0, "force deviation per speed of its correction", unit="N s/m", symbol="c", above=0.0
     )
     rise: float = quantity(
         5e-3, "largest height above rest of a following pin", unit="m", symbol="h_rise", at_least=0.0

@@ -275,7 +275,7 @@ class Guarded:
         mean = self.pace.add(time.thread_time() - start)
         # Otherwise a live session would stop.
         if mean is not None and mean > MOST_PERIODS * self.period:
-            rule = f"must take at most {MOST_PERIODS:g} control periods of processor time a call"
+            rule = f"must take at most {MOST_PERIODS:g} control periods of processor time per call"
             got = f"{mean / self.period:.3g} of {self.period:.3g} s on average over {CALLS}"
             raise MethodError(f"{self.origin}: command {rule} (got {got}).")
         return after, commands

@@ -27,7 +27,7 @@ BROKEN = (
 def read_count(value: object) -> int:
     """Return a whole number from 0 on that floating-point numbers represent exactly, or raise ValueError."""
     if not isinstance(value, int) or isinstance(value, bool) or not 0 <= value <= 2**53:
-        raise ValueError(f"{str(value)[:20]} is no count")
+        raise ValueError(f"{str(value)[:20]} is not a count")
     return value
 
 
@@ -54,7 +54,7 @@ def read_heads(archive: zipfile.ZipFile, names: Sequence[str]) -> dict[str, Head
             head = _head(file, name)
             actual = entry.file_size - file.tell()
         if head.size != actual:
-            raise ValueError(f"{name} must have {head.size:,} bytes, as its head says (got {actual:,})")
+            raise ValueError(f"{name} must have {head.size:,} bytes, as its header says (got {actual:,})")
         heads[name] = head
     return heads
 
@@ -73,7 +73,7 @@ def _head(file: IO[bytes], name: str) -> Head:
             raise ValueError("no numbers")
         return Head(tuple(shape), kind)
     except BROKEN:
-        raise ValueError(f"{name} has no head of an array of numbers") from None
+        raise ValueError(f"{name} has no header of an array of numbers") from None
 
 
 def read_array(archive: zipfile.ZipFile, name: str) -> Array:

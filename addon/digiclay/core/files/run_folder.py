@@ -162,7 +162,7 @@ def check_folder(out: Path, *, overwrite: bool, content: Content = RUN) -> None:
     if filled and not out.is_dir():
         raise OutputError(f"{out} is a file: choose another folder with --out.")
     if filled and not content.find(out):
-        what = f"holds other things than a {content.name}"
+        what = f"contains something other than a {content.name}"
         raise OutputError(f"{out} {what}: choose another folder with --out.")
     if filled and not overwrite:
         other = f"replace the {content.name} in it with --overwrite (in Python overwrite=True)"

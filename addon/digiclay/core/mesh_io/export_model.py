@@ -33,7 +33,7 @@ class Model(Parameters):
     skin: str = quantity("bilinear", "skin between the pins; pins have none", choices=tuple(SKINS))
     resolution: int = quantity(
         0,
-        f"points a pitch; 0 is 1 for the bilinear skin and {CURVED} for the others",
+        f"points per pitch; 0 is 1 for the bilinear skin and {CURVED} for the others",
         at_least=0,
         at_most=64,
     )

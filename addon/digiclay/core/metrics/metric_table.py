@@ -76,7 +76,7 @@ METRICS: dict[str, Metric] = {
         "mN",
     ),
     "force_oscillation": Metric(
-        "N", "higher", "rms over time of the total force less its moving average over 0.25 s, while shaping"
+        "N", "higher", "rms over time of the total force minus its moving average over 0.25 s, while shaping"
     ),
     "force_overshoot": Metric(
         "1", "higher", "first touch: largest force beyond the set point, as a share of it"
@@ -99,28 +99,28 @@ METRICS: dict[str, Metric] = {
     "lowest": Metric("m", "neither", "height of the lowest pin at the end"),
     "highest": Metric("m", "neither", "height of the highest pin at the end"),
     "height_range": Metric(
-        "m", "neither", "highest less lowest: the relief that was formed", "relief formed", "mm"
+        "m", "neither", "highest minus lowest pin: the relief that was formed", "relief formed", "mm"
     ),
     "raised_volume": Metric("m3", "neither", "volume formed above the initial surface"),
     "sunk_volume": Metric("m3", "neither", "volume formed below the initial surface"),
     "rfd_jnd_least": Metric(
         "1",
         "higher",
-        "RFD over the largest just noticeable difference of the set point",
+        "RFD divided by the largest just noticeable difference of the set point",
         "RFD, at least",
         "JND",
     ),
     "rfd_jnd_most": Metric(
         "1",
         "higher",
-        "RFD over the smallest just noticeable difference of the set point",
+        "RFD divided by the smallest just noticeable difference of the set point",
         "RFD, at most",
         "JND",
     ),
     "ridge_unevenness_touch": Metric(
         "1",
         "higher",
-        "ridge_unevenness over the spatial resolution of a fingertip",
+        "ridge_unevenness divided by the spatial resolution of a fingertip",
         "unevenness",
         "spatial resolutions",
     ),
@@ -163,7 +163,7 @@ METHOD: dict[str, Metric] = {
     ),
     "speed_limit": Metric("m/s", "lower", "largest speed that is followed", "speed limit", "mm/s"),
     "period_cost": Metric(
-        "s", "higher", "processor time of a control period, device included", "cost of a period", "µs"
+        "s", "higher", "processor time per control period, including the device", "cost per period", "µs"
     ),
     "cost_ratio": Metric("1", "higher", "the same over that of the first method", "cost, ratio"),
 }
@@ -191,5 +191,5 @@ def describe_errors(metrics: Mapping[str, Any]) -> str:
     if metrics.get("height_error") is None:
         return f"errors not estimated ({metrics.get('errors_absent') or 'not asked for'})"
     height, force = (ERRORS[name].factor * metrics[name] for name in ("height_error", "force_error"))
-    doubt = f" ({metrics['errors_in_doubt']})" if metrics.get("errors_in_doubt") else ""
+    doubt = f" (or more: {metrics['errors_in_doubt']})" if metrics.get("errors_in_doubt") else ""
     return f"height error about {height:.2g} µm, force error about {force:.2g} mN{doubt}"

@@ -36,7 +36,7 @@ class ExponentialLaw:
 
     def __init_subclass__(cls, **given: Any) -> None:
         super().__init_subclass__(**given)
-        rule = "the closed form of the step knows the exponential alone"
+        rule = "the closed form of the step holds for the exponential law only"
         refuse_overrides(cls, ExponentialLaw, ("tension", "_numbers"), rule)
 
     def tension(self, depth: Floats) -> Floats:

@@ -41,7 +41,7 @@ def continue_ball(square: Floats) -> Floats:
 def require_one(fingers: Sequence[Item]) -> Item:
     """Return the item of the only finger, or raise ParameterError; see docs/architecture.md."""
     if len(fingers) != 1:
-        rule = "must be one here: this is of a single finger"
+        rule = "must be one: this function is for a single finger"
         raise ParameterError("scene", "fingers", rule, str(len(fingers)))
     (only,) = fingers
     return only

@@ -230,7 +230,7 @@ def read_places(position: ArrayLike) -> Floats:
     points = np.asarray(position, dtype=np.float64)
     if points.ndim != 2 or points.shape[1] != 2:
         raise ParameterError(
-            "Surface", "position", "must have two coordinates a pin", f"shape {points.shape}"
+            "Surface", "position", "must have two coordinates per pin", f"shape {points.shape}"
         )
     if not np.all(np.isfinite(points)):
         raise ParameterError("Surface", "position", "must be finite", name_first_bad(points.sum(axis=1)))

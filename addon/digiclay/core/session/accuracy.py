@@ -180,8 +180,8 @@ def describe_bends(scene: Scene) -> str:
     """
     paths, simulation = tuple(finger.trajectory for finger in scene.fingers), scene.simulation
     bend = _measure_bends(paths, simulation.physics_step, simulation.duration)
-    rule = f"or more: within a step the fingertip leaves the straight way by {bend * 1e3:.2g} mm"
-    return f"{rule}, which asks for a shorter simulation.physics_step" if bend > BENT else ""
+    reason = f"within a step the path of the fingertip bends by {bend * 1e3:.2g} mm"
+    return f"{reason}: use a shorter simulation.physics_step" if bend > BENT else ""
 
 
 @lru_cache(maxsize=1)  # points of a sweep have one path

@@ -73,9 +73,9 @@ def read_run(folder: Path, *names: str) -> Run:
     """Read a run and the named arrays of its history, keys of `HISTORY_ARRAYS`; OutputError if unsound."""
     path = folder / HISTORY
     if not (folder / "scene.toml").is_file():
-        raise OutputError(f"{folder} is no run's folder: it has no scene.toml.")
+        raise OutputError(f"{folder} is not the folder of a run: it has no scene.toml.")
     if not path.is_file():
-        raise OutputError(f"{folder} has no history.npz: its scene kept no record.")
+        raise OutputError(f"{folder} has no history.npz: its scene had no recorder.")
     scene = load_recorded(folder / "scene.toml")
     try:
         with zipfile.ZipFile(path) as archive:

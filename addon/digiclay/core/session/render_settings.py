@@ -27,8 +27,8 @@ class Picture(Parameters):
 
     width: int = quantity(960, "width in pixels", at_least=16, at_most=16384)
     height: int = quantity(600, "height in pixels", at_least=16, at_most=16384)
-    engine: str = quantity("workbench", "what draws: quick and plain, or with soft shadows", choices=ENGINES)
-    samples: int = quantity(6, "samples a pixel, of cycles", at_least=1, at_most=65536)
+    engine: str = quantity("workbench", "renderer: quick and plain, or with soft shadows", choices=ENGINES)
+    samples: int = quantity(6, "samples per pixel (cycles)", at_least=1, at_most=65536)
     color: str = quantity("mode", "whether pins show their control mode or the force on them", choices=COLORS)
     arrows: bool = quantity(False, "whether arrows show the force on each pin")
 
@@ -44,7 +44,7 @@ class Still(Picture):
 class Moving(Picture):
     """Common settings of turntables and films."""
 
-    rate: int = quantity(25, "frames shown in a second", at_least=1, at_most=240)
+    rate: int = quantity(25, "frames per second", at_least=1, at_most=240)
 
     def check(self) -> None:
         """Refuse odd sizes: H.264 stores colors for blocks of 2 x 2 pixels."""
@@ -59,7 +59,7 @@ class Turntable(Moving):
     """One rotation of the bed at one instant."""
 
     when: str = quantity("end", "the instant", choices=("last touch", "end"))
-    frames: int = quantity(75, "frames of the whole turn", at_least=2, at_most=MOST_FRAMES)
+    frames: int = quantity(75, "frames per rotation", at_least=2, at_most=MOST_FRAMES)
     fingertip: bool = quantity(False, "whether the fingertip is shown")
 
     def count(self, time: Sequence[float] | Floats) -> int:
@@ -77,7 +77,7 @@ class Film(Moving):
 
     arrows: bool = quantity(True, "whether arrows show the force on each pin")
     strip: bool = quantity(True, "whether a strip in the picture shows the force of each fingertip over time")
-    speed: float = quantity(1.0, "simulated seconds shown in a second of film", at_least=1e-3, at_most=1e3)
+    speed: float = quantity(1.0, "simulated seconds per second of film", at_least=1e-3, at_most=1e3)
     start: float = quantity(0.0, "simulated time of the first frame", unit="s", at_least=0.0, at_most=1e6)
     stop: float = quantity(
         0.0, "simulated time of the last frame; 0: the session's end", unit="s", at_least=0.0, at_most=1e6

@@ -49,7 +49,7 @@ def rebuild(template: Any, stored: Any, arrays: list[Array]) -> Any:
         return _rebuild_like(template, stored, arrays)
     except (ValueError, TypeError, KeyError, IndexError, OverflowError):
         raise StateError(
-            f"The kept state's memory of the controller must be a {type(template).__name__} "
+            f"The stored state's memory of the controller must be a {type(template).__name__} "
             f"(got {str(stored)[:60]}). Reset the session to begin with a bed at rest."
         ) from None
 
@@ -209,13 +209,13 @@ def _check_limits(system: System, stored: Snapshot) -> None:
         wide = any((np.abs(opening) > 1.0 + SLACK).any() for opening in valves)
         wide |= (np.abs(values[rows.controlled]) > LARGEST_KEPT).any()
         if wide or ((height < -SLACK) | (height > top)).any():
-            raise _make_error("holds numbers that no state has")
+            raise _make_error("contains numbers that no state can have")
 
 
 def _read(data: bytes) -> Snapshot:
     """Read bytes into new arrays, for any system."""
     if not isinstance(data, bytes) or not data.startswith((START, FIRST)):
-        raise _make_error("does not begin as one")
+        raise _make_error("does not begin like one")
     try:
         first = len(START) + 4
         length = int.from_bytes(data[len(START) : first], "little")
@@ -245,7 +245,7 @@ def _read(data: bytes) -> Snapshot:
     except (ValueError, KeyError, TypeError, IndexError, OverflowError, RecursionError) as error:
         raise _make_error(f"is damaged: {type(error).__name__}") from None
     if not sound or not _is_sound(stored, cells):
-        raise _make_error("holds numbers that no state has")
+        raise _make_error("contains numbers that no state can have")
     return stored
 
 
@@ -362,9 +362,9 @@ def _check_same(what: str, stored: object, here: object) -> None:
     """Refuse a state of another system."""
     if stored != here:
         rule = f"must have the same {what} as the bed now, {here} (got {stored})"
-        raise StateError(f"The kept state {rule}. {REMEDY}")
+        raise StateError(f"The stored state {rule}. {REMEDY}")
 
 
 def _make_error(reason: str) -> StateError:
     """Return the error of bytes that are not a state."""
-    return StateError(f"The kept state {reason}, and cannot be taken up. {REMEDY}")
+    return StateError(f"The stored state {reason}, and cannot be used. {REMEDY}")

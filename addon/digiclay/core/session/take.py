@@ -67,7 +67,7 @@ class Take:
         kind, shape = self.poses.dtype, self.poses.shape
         sized = len(shape) == 3 and shape[0] > 1 and shape[1] >= fingers and shape[2] == 7
         if not sized or kind != np.float64:
-            rule = f"must hold one control period at least, of {fingers} x 7 numbers, a pose a finger"
+            rule = f"must have at least one control period of {fingers} x 7 numbers, one pose per finger"
             raise ParameterError("Take", "poses", rule, f"an array of the shape {shape} of {kind}")
         sound = (np.abs(self.poses) <= FARTHEST) & (np.abs(self.poses[..., 3:]).max(2) > 0.1)[..., None]
         if not sound.all():

@@ -186,7 +186,7 @@ def _heights(shape: Shape, relief: Relief, at: Placement, tops: Tops, actuator: 
         low = relief.underside
     if shape.relief == "true":
         if relief.value_length is None:
-            rule = "must be rise or stroke for a picture: its values are no lengths"
+            rule = "must be rise or stroke for a picture: its values are not lengths"
             raise ParameterError("shape", "relief", rule, f"'true' for {relief.name}")
         # A shape with a length in plan keeps its proportions; other heights are lengths of their own.
         factor = relief.value_length

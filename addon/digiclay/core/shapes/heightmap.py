@@ -184,7 +184,7 @@ def read_pixels(path: Path) -> Pixels:
             largest = {1: 2.0**bits - 1, 2: 2.0 ** (bits - 1) - 1}  # unsigned and signed
             absent /= largest.get(head.tags.get(FORMAT, 1), 1.0)
             if pixels.shape[::-1] != head.size:
-                rule = "must be as small as Blender reads it unscaled where it has pixels without data"
+                rule = "must be small enough for Blender to read it unscaled, as it has pixels without data"
                 raise make_refusal(rule, str(path), "{} x {}".format(*head.size or ()))
         pixels = _mask(pixels, absent)
     if WIDTH in head.tags and not READERS:
@@ -224,7 +224,7 @@ def _read_by_pillow(path: Path, tags: Mapping[int, Any]) -> Pixels:
         tiff.OPEN_INFO[order, 1, (3,), 1, (64,), ()] = "F", raw
     several = tags.get(PLANES) == 2 and tags.get(CHANNELS, 1) > 1
     if tags.get(BITS, 8) > 8 and (several or tags.get(PHOTOMETRIC) == 0):
-        rule = "must have its channels beside each other, and 0 as black, if they are of more than 8 bits"
+        rule = "must have interleaved channels, and 0 as black, if these have more than 8 bits"
         raise make_refusal(rule, str(path), "separate planes" if several else "0 is white")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")

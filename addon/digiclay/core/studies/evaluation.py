@@ -154,18 +154,18 @@ def make_bundles(points: Sequence[Point]) -> Bundles:
         alone += group
         few = len(group) < LEAST
         reason = f"fewer than {LEAST} have the same bed, parts and steps"
-        why[reason if few else "they have too many rows to keep for many at once"] += len(group)
+        why[reason if few else "their histories are too long to keep several at once"] += len(group)
     alone.sort(key=lambda point: point.index)
     doubts = Counter(describe_bends(point.scene) for point in points if point.errors and point.scene)
-    notes = tuple(f"{_count(doubts[text], 'point')} with errors as told {text}" for text in doubts if text)
+    notes = tuple(f"{_count(doubts[text], 'point')} with larger errors: {text}" for text in doubts if text)
     return Bundles(tuple(batches), tuple((point,) for point in alone), (*_explain(why), *notes))
 
 
 def _find_reason(scene: Scene) -> str:
     """Return why a run cannot be in a batch, or ``""``."""
     if len(scene.fingers) != 1:
-        return "they do not have a single finger"
-    return "" if find_method(scene.method).batched else f"a batch of {scene.method} takes as long"
+        return "they have several fingers"
+    return "" if find_method(scene.method).batched else f"a batch of {scene.method} would not be faster"
 
 
 def _limit_runs(scene: Scene | None) -> int:

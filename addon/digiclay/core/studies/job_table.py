@@ -242,4 +242,4 @@ def _refuse_twice(key: str, words: Sequence[str], meant: Sequence[str]) -> None:
     """Refuse a list in which two words mean the same, which would make the same jobs twice."""
     for number, meaning in enumerate(meant):
         if meaning in meant[:number]:
-            raise ParameterError(key, "", "must not name one thing twice", f"{words[number]} twice")
+            raise ParameterError(key, "", "must not name the same thing twice", f"{words[number]} twice")

@@ -70,8 +70,9 @@ def _make_folder(path: Path, kind: Kind, during_creation: ExitStack, until_the_e
     until_the_end.enter_context(run_folder.remove_if_empty(path.resolve() / kind.mark))
     path.mkdir(parents=True, exist_ok=True)
     if not (path / kind.mark).is_file() and not _is_bare(path, kind):
-        raise OutputError(f"{path} holds other things than a {kind.name}: choose another folder with --out.")
-    until_the_end.enter_context(hold_lock(path / LOCK, run_folder.describe_claim(path, "being worked in")))
+        what = f"contains something other than a {kind.name}"
+        raise OutputError(f"{path} {what}: choose another folder with --out.")
+    until_the_end.enter_context(hold_lock(path / LOCK, run_folder.describe_claim(path, "being used")))
 
 
 def _is_bare(path: Path, kind: Kind) -> bool:

@@ -134,9 +134,9 @@ class Finding(Parameters):
     """Criteria of a feature."""
 
     threshold: float = quantity(
-        0.5e-3, "how far off its former place a point must be to belong to a feature", unit="m", at_least=1e-6
+        0.5e-3, "least distance of a feature from the former surface", unit="m", at_least=1e-6
     )
-    smallest: int = quantity(3, "pins a feature has at least", at_least=1)
+    smallest: int = quantity(3, "least number of pins of a feature", at_least=1)
 
 
 #: Names of a feature's form, by its kind: with one crest, without a crest, and without but flat.

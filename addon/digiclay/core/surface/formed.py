@@ -95,7 +95,7 @@ def check_heights(
 ) -> tuple[Floats, Floats]:
     """Return positions (n, 2), m, and one value a pin as arrays, or refuse what cannot carry a skin."""
     if rows < 2 or columns < 2:
-        rule = "must have 2 x 2 pins at least, in rows along x"
+        rule = "must have at least 2 x 2 pins, in rows along x"
         raise ParameterError("Surface", "", rule, f"{rows} x {columns}")
     position, top = read_places(position), np.asarray(height, dtype=np.float64)
     if top.shape != (rows * columns,) or len(position) != rows * columns:
