@@ -8,6 +8,7 @@ import json
 import shutil
 import tomllib
 
+import digiclay
 import numpy as np
 import pytest
 from digiclay.cli import main
@@ -81,6 +82,19 @@ def test_an_older_scene_gives_the_same_folder(name, tmp_path):
         )
     computed = compute_metrics(older, scene.set_point)
     check_metrics(computed, {key: stored[key] for key in computed if key in stored}, 1e-10)
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_python_reads_an_older_folder(name):
+    run = digiclay.load(RUNS / name)
+    assert run.scene == scene_of(name)
+    stored = json.loads((RUNS / name / "metrics.json").read_text(encoding="utf-8"))
+    assert run.metrics == stored
+    assert "s simulated in" in repr(run)
+    if name in RECORDED:
+        assert run.history.keys() == history_of(name).keys()
+        # An older version counted no losses: they are counted in the history.
+        assert [finger.losses for finger in run.fingers] == [0]
 
 
 @pytest.mark.parametrize("name", RECORDED)

@@ -130,10 +130,12 @@ def format_lines(title: str, rows: Mapping[str, str]) -> str:
 
 def format_html(title: str, rows: Mapping[str, str]) -> str:
     """Return named facts as a small table of HTML under a title."""
+    left = 'style="text-align:left"'
     lines = (
-        f"<tr><th>{html.escape(name)}</th><td>{html.escape(text)}</td></tr>" for name, text in rows.items()
+        f"<tr><th {left}>{html.escape(name)}</th><td {left}>{html.escape(text)}</td></tr>"
+        for name, text in rows.items()
     )
-    return f"<table><caption>{html.escape(title)}</caption>{''.join(lines)}</table>"
+    return f"<table><caption {left}>{html.escape(title)}</caption>{''.join(lines)}</table>"
 
 
 def show_value(value: object) -> str:
