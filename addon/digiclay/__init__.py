@@ -47,8 +47,7 @@ def __getattr__(name: str) -> Any:
     if name not in LATER:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     module, attribute = LATER[name]
-    value = globals()[name] = getattr(import_module(f".{module}", __name__), attribute)
-    return value
+    return getattr(import_module(f".{module}", __name__), attribute)
 
 
 def __dir__() -> list[str]:

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from .core.base.errors import OutputError, ParameterError, SceneError
 from .core.control.methods import list_added
 from .core.files.run_folder import write_folder
-from .core.files.tables import Record, Table, format_html
+from .core.files.tables import Record, Table
 from .core.mesh_io.export_model import Model, make_bodies
 from .core.mesh_io.mesh_writer import write
 from .core.scene.scene_source import Setting, Source, list_changes, make_scene, read_source, write_word
@@ -189,7 +189,7 @@ class Result(run_scene.Result):
 
     def _repr_html_(self) -> str:
         """Return a table for a notebook, with the plot where matplotlib is installed."""
-        table = format_html(f"Run of {self.scene.name or 'a scene'}", self.describe())
+        table = super()._repr_html_()
         try:
             self.require_history("plot")
             figure = session_figure(self.history, self.scene.set_point)

@@ -256,6 +256,9 @@ def test_scene_and_run_are_shown_in_a_few_lines_and_in_a_notebook_with_the_plot(
     assert f"force: RFD {done.metrics['rfd']:.2g} N" in repr(done)
     plastic = digiclay.run(digiclay.scene(tap, {"control.method": "plastic"}), errors=False)
     assert f"force: at most {plastic.metrics['max_total_force']:.2g} N" in repr(plastic)
+    assert "cell_states, set point 0.04 N per cell" in repr(
+        digiclay.scene({"control": {"method": "cell_states"}})
+    )
     named = replace(tap, name="a<b")
     assert ">Scene a&lt;b</caption>" in named._repr_html_()
     assert re.search(r"<tr><th [^>]+>bed</th><td [^>]+>11 x 11 pins", named._repr_html_())

@@ -5,7 +5,7 @@ import json
 import re
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -123,19 +123,30 @@ def _measured(section: str, key: str, value: Any, unit: str) -> Any:
         raise ParameterError(section, key, str(error), show_value(value)) from None
 
 
-def format_lines(title: str, rows: Mapping[str, str]) -> str:
-    """Return named facts as lines under a title."""
-    return "\n".join([title, *(f"  {name}: {text}" for name, text in rows.items())])
+class Described:
+    """Base of values that are shown by a title and a few facts, in a notebook as a table of HTML."""
 
+    if TYPE_CHECKING:  # a field or a property
 
-def format_html(title: str, rows: Mapping[str, str]) -> str:
-    """Return named facts as a small table of HTML under a title."""
-    left = 'style="text-align:left"'
-    lines = (
-        f"<tr><th {left}>{html.escape(name)}</th><td {left}>{html.escape(text)}</td></tr>"
-        for name, text in rows.items()
-    )
-    return f"<table><caption {left}>{html.escape(title)}</caption>{''.join(lines)}</table>"
+        @property
+        def name(self) -> str: ...
+
+    def describe(self) -> dict[str, str]:
+        """Return what matters most of it, by name."""
+        raise NotImplementedError
+
+    def __repr__(self) -> str:
+        facts = (f"  {name}: {text}" for name, text in self.describe().items())
+        return "\n".join([f"{type(self).__name__} {self.name}".rstrip(), *facts])
+
+    def _repr_html_(self) -> str:
+        left = 'style="text-align:left"'
+        title, *_ = html.escape(repr(self)).splitlines()
+        lines = (
+            f"<tr><th {left}>{html.escape(name)}</th><td {left}>{html.escape(text)}</td></tr>"
+            for name, text in self.describe().items()
+        )
+        return f"<table><caption {left}>{title}</caption>{''.join(lines)}</table>"
 
 
 def show_value(value: object) -> str:

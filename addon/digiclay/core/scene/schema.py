@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from ..base.errors import ParameterError
 from ..base.quantity import Parameters, quantity
 from ..control.methods import ControlParameters, find_method, list_methods
-from ..files.tables import format_html, format_lines, refuse_unknown
+from ..files.tables import Described, refuse_unknown
 from ..model.control_interface import SetPoint
 from ..model.fingertip import require_one
 from ..model.laws import LAWS, import_part, law_parameters
@@ -165,7 +165,7 @@ class Finger:
 
 
 @dataclass(frozen=True, repr=False)
-class Scene:
+class Scene(Described):
     """Complete definition of a session; equal scenes give equal sessions, bit for bit.
 
     A part that is None is omitted: it costs nothing, and its module is not imported. Raises ParameterError
@@ -235,22 +235,18 @@ class Scene:
     def describe(self) -> dict[str, str]:
         """Return what matters most of it, by name."""
         bed, time, control = self.layout, self.simulation, self.method if self.control else "absent"
+        if wanted := self.set_point:
+            control += f", set point {wanted.force:g} N{' per cell' if wanted.per_cell else ''}"
         if self.method not in list_methods():
             control = f"{self.method}, which is not loaded"
         absent = [name for name in OPTIONAL if name != "control" and None in self.list_parts(name)]
         return {
             "bed": f"{bed.rows} x {bed.columns} pins, {bed.pitch * 1e3:g} mm apart, {bed.arrangement}",
-            "method": control + (f", set point {self.set_point.force:g} N" if self.set_point else ""),
+            "method": control,
             "fingers": str(len(self.fingers)),
             "time": f"{time.duration:g} s, {self.periods} periods of {time.control_period * 1e3:g} ms",
             "absent": ", ".join(absent) or "nothing",
         }
-
-    def __repr__(self) -> str:
-        return format_lines(f"Scene {self.name}".rstrip(), self.describe())
-
-    def _repr_html_(self) -> str:
-        return format_html(f"Scene {self.name}".rstrip(), self.describe())
 
     @property
     def periods(self) -> int:

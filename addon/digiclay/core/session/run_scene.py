@@ -17,7 +17,7 @@ from ..base.arrays import Array, Floats
 from ..base.errors import OutputError, explain_os_error
 from ..engine.simulation import Progress, Stopped, begin, periods
 from ..engine.system import System
-from ..files.tables import Record, Table, format_lines
+from ..files.tables import Described, Record, Table
 from ..metrics.metric_table import ERRORS, METRICS, RUN, describe_errors, describe_losses, describe_time
 from ..metrics.summary import (
     compute_metrics,
@@ -57,7 +57,7 @@ class Contact(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Result:
+class Result(Described):
     """Results of a session."""
 
     scene: Scene
@@ -69,6 +69,11 @@ class Result:
     """Wall time of the simulation, s, without building and writing."""
     metrics: Record
     """Content of ``metrics.json``, in SI units."""
+
+    @property
+    def name(self) -> str:
+        """Name of the scene."""
+        return self.scene.name
 
     @property
     def figures(self) -> dict[str, float | None]:
@@ -117,9 +122,6 @@ class Result:
             "history": f"{rows} rows of {pins} pins: {', '.join(self.history)}" if rows else "none",
             "metrics": f"{len(self.metrics)}, in SI units",
         }
-
-    def __repr__(self) -> str:
-        return format_lines(f"Run of {self.scene.name or 'a scene'}", self.describe())
 
     def summary(self) -> str:
         """Return the session in one line."""
