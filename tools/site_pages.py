@@ -308,7 +308,7 @@ def make_python_page() -> str:
     ]
     modes = [(str(int(mode)), mode.name.lower(), meaning) for mode, meaning in MEANINGS.items()]
     metrics = [(f"`{name}`", metric.unit, metric.worse, metric.doc) for name, metric in FIGURES.items()]
-    return AHEAD + PYTHON.format(
+    return PYTHON.format(
         arrays=write_table(("Name", "Shape", "Type", "Unit", "Meaning"), *arrays),
         modes=write_table(("Code", "Mode", "Meaning"), *modes),
         metrics=write_table(("Name", "Unit", "Worse if", "Meaning"), *metrics),
