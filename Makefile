@@ -81,7 +81,7 @@ test-window: ## run tests/window in the Blender named by DIGICLAY_BLENDER_WINDOW
 	@[ -z "$$DIGICLAY_BLENDER_DISPLAY" ] || tools/programs .reports/pen.log "$(PEN_FILES)" "$(PEN_PACKAGES)" || true
 	@rm -f .reports/window.txt; $(PART) .reports/window.txt "tests in Blender's window" 2700 $(if $(WHOLE),--whole) -- tests/window
 
-guide-pictures: ## follow the guide in a window, and retake its pictures
+guide-pictures: ## follow the tutorial and the guide in a window, and retake their pictures and film
 	@[ -n "$$DIGICLAY_BLENDER_WINDOW" ] || { echo "DIGICLAY_BLENDER_WINDOW must name the command of a Blender with a window." >&2; exit 1; }
 	@$(ENVIRONMENT) requirements/test.txt $(IN_311)
 	@rm -rf .reports/guide; DIGICLAY_SCREENSHOTS=$(CURDIR)/.reports/guide .venv/bin/python -m pytest tests/window/test_first_minute.py tests/window/test_press_tool.py

@@ -1,7 +1,7 @@
 """Pictures of the docs: `python tools/doc_pictures.py NAME ...` draws those that need no window.
 
-`python tools/doc_pictures.py --guide FOLDER` takes those of the guide from the screenshots of window
-tests in a folder.
+`python tools/doc_pictures.py --guide FOLDER` takes those of the guide and of its tutorial, and the film, from
+the screenshots of window tests in a folder.
 
 CONTRIBUTING.md has the command of every picture.
 """
@@ -25,6 +25,10 @@ PICTURES = Path(__file__).resolve().parents[1] / "docs" / "pictures"
 Area = tuple[int, int, int, int]
 #: The area of the 3D view in a window of 1100 x 720.
 VIEW = (0, 28, 910, 646)
+#: Other areas of screenshots: the dialog of the preferences, menus. The area of a film of the view, its size,
+#: pixels, and its duration, ms.
+AREAS = {"relief_install": (207, 89, 894, 431), "relief_export": (0, 0, 910, 646)}
+FILM_AREA, FILM_SIZE, LASTS = (50, 84, 770, 564), (640, 427), 20_000
 #: Size of the picture of a series' page, pixels.
 SERIES = (1300, 1080)
 #: Series of which a frame of a film is shown, and the frame: the ridge under way.
@@ -87,13 +91,24 @@ def save_jpeg(picture: Path, name: str, quality: int = 88, area: Area | None = N
         opened.convert("RGB").crop(area).save(PICTURES / name, quality=quality, optimize=True)
 
 
+def save_film(frames: list[Image.Image], name: str, shown_for: int) -> None:
+    """Write frames, each shown for a time, ms, as an animated WebP, which pages show everywhere."""
+    timing = {"duration": shown_for, "loop": 0}
+    frames[0].save(PICTURES / name, save_all=True, append_images=frames[1:], quality=60, method=6, **timing)
+
+
 def cut_guide(folder: Path) -> None:
-    """Write the 3D view in each screenshot of the guide that a folder has as a JPEG."""
-    shots = sorted(folder.glob("guide_*.png"))
-    if not shots:
-        sys.exit(f"{folder} must have screenshots named guide_*.png (got none): run tests/window first")
+    """Write what each screenshot of the guide and its tutorial shows as a JPEG; and the film of the hand."""
+    frames = sorted(folder.glob("film_*.png"))
+    shots = [shot for name in ("guide", "relief") for shot in sorted(folder.glob(f"{name}_*.png"))]
+    if not shots or not frames:
+        rule = "must have screenshots guide_*.png, relief_*.png and film_*.png"
+        sys.exit(f"{folder} {rule} (got {len(shots)} and {len(frames)}): run tests/window first")
     for shot in shots:
-        save_jpeg(shot, f"{shot.stem}.jpg", 85, VIEW)
+        save_jpeg(shot, f"{shot.stem}.jpg", 85, AREAS.get(shot.stem, VIEW))
+    size = Image.Resampling.LANCZOS
+    film = [Image.open(frame).convert("RGB").crop(FILM_AREA).resize(FILM_SIZE, size) for frame in frames]
+    save_film(film, "relief.webp", round(LASTS / len(film)))
 
 
 def draw_pins(folder: Path) -> None:
@@ -146,13 +161,30 @@ def draw_sample(folder: Path, name: str) -> None:
 
 
 def draw_hand_film(folder: Path) -> None:
-    """Draw a film of two hands as an animated WebP, which pages show everywhere."""
+    """Draw a film of two hands."""
     runs = make_film(folder, HAND_FILM, "0+53")
     frames = [Image.open(path).convert("RGB") for path in sorted(runs.rglob("0*.png"))]
-    timing = {"duration": SHOWN_FOR, "loop": 0}
-    frames[0].save(
-        PICTURES / "two_hands.webp", save_all=True, append_images=frames[1:], quality=60, method=6, **timing
-    )
+    save_film(frames, "two_hands.webp", SHOWN_FOR)
+
+
+def carry_out_program(folder: Path, page: str, program: str) -> None:
+    """Carry out in a folder the program that a tutorial shows: pictures are what it writes."""
+    text = (PICTURES.parent / "tutorials" / page).read_text(encoding="utf-8")
+    shown = text.partition(f'title="{program}"\n')[2].partition("```")[0]
+    (folder / program).write_text(shown, encoding="utf-8")
+    subprocess.run([sys.executable, program], cwd=folder, check=True, timeout=1200)
+
+
+def draw_noise(folder: Path) -> None:
+    """Draw the figure of four control methods over the noise of the sensors."""
+    carry_out_program(folder, "figure.md", "question.py")
+    shutil.copyfile(folder / "noise.svg", PICTURES / "noise.svg")
+
+
+def draw_animation(folder: Path) -> None:
+    """Draw a frame of the animation with keyframes."""
+    carry_out_program(folder, "animation.md", "animate.py")
+    save_jpeg(folder / "frame.png", "animation.jpg")
 
 
 def draw_hand_forces(folder: Path) -> None:
@@ -264,6 +296,8 @@ DRAWN: dict[str, Callable[[Path], None]] = {
     **{f"samples/{name}.jpg": partial(draw_sample, name=name) for name in list_samples()},
     "two_hands.webp": draw_hand_film,
     "hand_forces.png": draw_hand_forces,
+    "noise.svg": draw_noise,
+    "animation.jpg": draw_animation,
     "laws.svg": lambda folder: draw_laws(PICTURES / "laws.svg"),
 }
 

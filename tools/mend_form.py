@@ -49,7 +49,7 @@ def main() -> int:
     """Mend, then judge."""
     before = list_changes()
     status = max(subprocess.run(command, cwd=ROOT).returncode for command in MENDERS)
-    for page in (ROOT / "docs").glob("*.md"):
+    for page in (ROOT / "docs").rglob("*.md"):
         text = page.read_text(encoding="utf-8")
         if show_functions(text) != text:
             page.write_text(show_functions(text), encoding="utf-8")

@@ -27,7 +27,7 @@ ROOT = Path(__file__).parents[2]
 PAGES = sorted(
     [
         *(ROOT / name for name in ("README.md", "CONTRIBUTING.md", "benchmarks/README.md")),
-        *ROOT.glob("docs/*.md"),
+        *ROOT.glob("docs/**/*.md"),
         *ROOT.glob("addon/digiclay/sample_shapes/*/README.md"),
     ]
 )
@@ -125,7 +125,7 @@ def find_undated(page: Path, text: str) -> list[str]:
 def find_dead_links(page: Path, text: str) -> list[str]:
     """Return the links to a file or heading that does not exist; `make docs` checks those to reference/."""
     dead = []
-    for target in re.findall(r"\]\((?!\w+://|reference/)([^)\s]+)\)", text):
+    for target in re.findall(r"\]\((?!\w+://|(?:\.\./)?reference/)([^)\s]+)\)", text):
         name, _, anchor = target.partition("#")
         file = page.parent / name if name else page
         if not file.exists() or (anchor and anchor not in _anchors(file.read_text(encoding="utf-8"))):

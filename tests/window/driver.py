@@ -307,12 +307,17 @@ def look(name):
     SEEN[name] = found
 
 
-def shot(name):
+def take_frame(name):
+    """Draw the window anew, and write what the screen shows as a picture."""
     bpy.ops.wm.redraw_timer(type="DRAW_WIN_SWAP", iterations=1)
     # Blender's own screenshot reads a buffer that software GL leaves black.
-    file = OUT / f"{name}.png"
-    subprocess.run(["import", "-window", "root", str(file)], check=True, timeout=120, capture_output=True)
-    pixels = read_shot(name)
+    command = ["import", "-window", "root", "-quality", "10", str(OUT / f"{name}.png")]
+    subprocess.run(command, check=True, timeout=120, capture_output=True)
+
+
+def shot(name):
+    take_frame(name)
+    pixels = read_shot(name)[::4, ::4]
     SEEN.setdefault("colors", {})[name] = len(np.unique(pixels.reshape(-1, pixels.shape[2]), axis=0))
 
 
