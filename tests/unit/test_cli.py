@@ -150,7 +150,8 @@ def test_describe_counts_cells_periods_and_bytes_and_lists_every_parameter_with_
     parts = {"layout": Layout, "actuator": Actuator, "control": VirtualMaster}
     names = [f"{section}.{name} = " for section, part in parts.items() for name in list_quantities(part)]
     assert [name for name in names if name not in text] == []
-    assert "layout.pitch = 0.0035 m\n    distance of neighboring cells in a row; above 0, at most 0.5; P\n" in text
+    meaning = "distance of neighboring cells in a row; above 0, at most 0.5; P"
+    assert f"layout.pitch = 0.0035 m\n    {meaning}\n" in text
 
 
 @pytest.mark.parametrize("command", [[], ["run"], ["describe"], ["export"], ["render"], ["paper"]])
