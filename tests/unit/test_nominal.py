@@ -1,6 +1,7 @@
 """Nominal surface of press strokes: sections by the distance to the path, passes, images, limits."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -44,8 +45,10 @@ def form(stroke, bed=FLAT):
     return find_nominal(stroke, DEVICE, bed).height
 
 
-def measure_distance(path):
+@cache
+def measure_distance(name):
     """Return the distances of all pins from a path, (n,), m, by its points some 20 µm apart."""
+    path = PATHS[name]
     steps = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path, axis=0).T))])
     fine = np.linspace(0.0, steps[-1], 1 + int(steps[-1] / 20e-6))
     points = np.column_stack([np.interp(fine, steps, path[:, axis]) for axis in (0, 1)])
@@ -59,7 +62,7 @@ def measure_distance(path):
 @pytest.mark.parametrize("name", PATHS)
 def test_the_height_follows_from_the_distance_to_the_path_alone(name, brush):
     found = form(stroke(PATHS[name], brush)) - REST
-    distance = measure_distance(PATHS[name])
+    distance = measure_distance(name)
     section = np.where(distance <= 7.5e-3, np.clip((7.5e-3 - distance) / 4.5e-3, 0.0, 1.0), 0.0)
     sign = 1.0 if brush is Brush.RAISE else -1.0
     # The flank goes 0.9 mm up a mm, and the points cut the path's corners by up to 0.5 µm.
@@ -72,7 +75,7 @@ def test_where_no_blister_is_the_fingertip_leaves_its_underside(name):
     found = find_nominal(
         stroke(path, Brush.LOWER, 2e-3), replace(PRESSED, finger=Fingertip(4e-3, 4e-3, 4e-3)), FLAT
     )
-    gap = 4e-3 - np.sqrt(np.maximum(16e-6 - measure_distance(path) ** 2, 0.0))
+    gap = 4e-3 - np.sqrt(np.maximum(16e-6 - measure_distance(name) ** 2, 0.0))
     # Of a ball 1.5 mm from one place of the path to the next: 0.07 mm between two.
     assert_near(found.height - REST, np.minimum(gap - 2e-3, 0.0), 0.15e-3)
 

@@ -279,12 +279,18 @@ def test_what_the_valves_do_alone_takes_no_further_fingertips(brush):
         assert session.system.fingers == 1
 
 
-def middle():
+@cache
+def go_to_middle():
     """Return a session in the middle of a radial stroke, with four fingertips in the pins."""
     session = go_on(queue(begin(), APART, make_images("RADIAL", 4)), 70)
     assert session.system.fingers == 4
     assert session.state.finger_forces().min() > 0.01
     return session
+
+
+def middle():
+    """Return that session, to go on with."""
+    return replace(go_to_middle(), state=go_to_middle().state.copy())
 
 
 def test_a_stroke_that_is_taken_back_in_its_middle_leaves_nothing_and_another_symmetry_goes_on():
