@@ -249,7 +249,7 @@ def test_blender_leaves_out_what_a_geotiff_has_no_data_of(tmp_path, kind, absent
     # Blender keeps 24 bits of each number, as a share of the largest.
     assert np.abs(seen * (known.max() / seen.max()) - known).max() < 1e-3
     monkeypatch.setattr(image_reader, "MOST", 60)
-    with pytest.raises(ParameterError, match="unscaled where it has pixels without data"):
+    with pytest.raises(ParameterError, match="unscaled, as it has pixels without data"):
         read_pixels(path)
 
 
