@@ -3,7 +3,6 @@
 import sys
 from argparse import ArgumentTypeError, Namespace
 from collections.abc import Iterator, Mapping, Sequence
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -132,7 +131,7 @@ def _write(
     }
     unchanged = records[UNCHANGED]["figures"]
     findings = Findings(arguments, subject, describe_effort(records), unchanged, responses, indices)
-    out: Path = arguments.out
+    out = arguments.out
     subject.write_table(out / "points.csv", [subject.unchanged, *points], records, LOSS)
     write_whole(out / "indices.csv", format_index_table(findings).encode())
     save(draw_indices(subject.keys, indices, f"Sobol indices, {subject.scene.name}"), out / PICTURE)

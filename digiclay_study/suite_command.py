@@ -62,7 +62,7 @@ def run_suite(arguments: Namespace, methods: Sequence[str], words: Sequence[str]
         raise OutputError("--speed is not for --suite: trajectories ridge-limit and lift-limit measure it.")
     refuse_without("digiclay compare --suite", "suite", "matplotlib", "scipy")
     plan = make_plan(arguments, methods)
-    out: Path = arguments.out or Path(f"{plan.title}_suite")
+    out = arguments.out or Path(f"{plan.title}_suite")
     description = {
         "digiclay": __version__,
         "methods": list(plan.methods),

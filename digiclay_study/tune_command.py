@@ -142,7 +142,7 @@ def _write(
     from .study_plots import draw_front
 
     every, trials, front, chosen = find_outcome(subject, points, records, choice)
-    out: Path = arguments.out
+    out = arguments.out
     subject.write_table(out / "points.csv", every, records)
     subject.write_table(out / "front.csv", [every[index] for index in front], records)
     outputs = _describe(subject.names, trials.values[chosen])

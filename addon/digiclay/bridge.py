@@ -164,7 +164,7 @@ def finger_of(tip: Object) -> Fingertip:
 def pose(tip: Object) -> Floats:
     """Return the pose (7,) of a fingertip in its bed's space: lowest point, m, and quaternion."""
     (pose,) = _read_poses(owner_of(tip), [tip])
-    return np.asarray(pose)
+    return pose
 
 
 def poses(bed: Object) -> Floats:
@@ -228,7 +228,7 @@ def project(context: Context, bed: Object, points: Floats) -> Floats:
     clip = np.column_stack([points * SCALE, np.ones(len(points))]) @ to_clip.T
     depth = np.where(clip[:, 3] > 0.0, clip[:, 3], np.nan)[:, None]
     size = np.array([context.region.width, context.region.height])
-    return np.asarray((clip[:, :2] / depth + 1.0) / 2.0 * size)
+    return (clip[:, :2] / depth + 1.0) / 2.0 * size
 
 
 def linear(color: tuple[float, float, float], alpha: float = 1.0) -> tuple[float, float, float, float]:

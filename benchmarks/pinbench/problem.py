@@ -130,10 +130,10 @@ class Law:
     def opening(self, time: float, segment: int) -> Floats:
         """Return the openings at a time, s, within a segment, (n,) or (1,): exact."""
         if not self.lag:
-            return np.asarray(self.held[segment])
+            return self.held[segment]
         held = self.held[segment]
         fade = math.exp(-(time - self.starts[segment]) / self.lag)
-        return np.asarray(held + (self.openings[segment] - held) * fade)
+        return held + (self.openings[segment] - held) * fade
 
     def pose(self, time: float) -> list[float]:
         """Return x, y, z of the fingertip's lowest point, m."""
@@ -153,7 +153,7 @@ class Law:
     def tension(self, depth: Floats) -> Floats:
         """Return the elastic force of depths, (n,), N."""
         exponent = np.minimum(np.maximum(self.exponent * depth, 0.0), 300.0)
-        return np.asarray(self.unit * np.expm1(exponent))
+        return self.unit * np.expm1(exponent)
 
     def load(self, time: float, state: Floats) -> tuple[Floats, Floats]:
         """Return the elastic force and the contact force, (n,) each, N."""

@@ -107,7 +107,7 @@ def carry_out(arguments: Namespace) -> int:
     sound = next((job.scene for job in series.jobs if job.scene is not None), None)
     if sound is not None:  # outputs that cannot be had here at all are refused before any work
         check_outputs(sound, series.outputs)
-    out: Path = arguments.out or Path(series.name)
+    out = arguments.out or Path(series.name)
     with open_batch(out, series) as folder:
         for job in series.jobs:
             folder.describe(job)

@@ -131,7 +131,7 @@ def carry_out(arguments: Namespace) -> int:
     if arguments.scene is None:
         raise OutputError("The following arguments are required: SCENE, or --suite.")
     path, methods = find(arguments.scene), _list_methods(_list_words(arguments, DEFAULT))
-    out: Path = arguments.out or Path(f"{find_name(path)}_compare")
+    out = arguments.out or Path(f"{find_name(path)}_compare")
     refuse_without("digiclay compare", "plots", "matplotlib")
     settings = settings_of(arguments)
     scenes = [load(path, [*settings, Setting(METHOD, name, "--methods")]) for name in methods]

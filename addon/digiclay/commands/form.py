@@ -63,7 +63,7 @@ OPTIONS = {
 def carry_out(arguments: argparse.Namespace) -> int:
     """Fit, display, form, export, and print a summary."""
     file = find_shape(arguments.shape)
-    out: Path = arguments.out or Path(find_name(file))
+    out = arguments.out or Path(find_name(file))
     check_folder(out, overwrite=arguments.overwrite)
     word = json.dumps(arguments.shape, ensure_ascii=False)
     arguments.settings = [Setting("shape.file", word, "SHAPE"), *arguments.settings]

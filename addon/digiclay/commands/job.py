@@ -118,7 +118,7 @@ def _do_job(arguments: Namespace, stopped: Callable[[], bool], tell: Tell) -> st
         raise OutputError("--frames must be given with --only film or --only turntable.")
     if arguments.method is not None:
         load_by_option(resolve_word(arguments.method, folder), "--method")
-    out: Path = arguments.out or _find_place(folder)
+    out = arguments.out or _find_place(folder)
     work = Work(folder, out, read_outputs(folder / JOB), stopped, tell)
     if only not in MOVING:
         return _do_run(arguments, work)

@@ -92,7 +92,7 @@ def carry_out(arguments: Namespace) -> int:
 def _draw(arguments: Namespace, looks: Still | Turntable | Film) -> int:
     """Draw, and print the path."""
     default = Path(PICTURE if isinstance(looks, Still) else f"{type(looks).__name__.lower()}.mp4")
-    out: Path = arguments.out or arguments.run / default
+    out = arguments.out or arguments.run / default
     refuse_file(out, default.suffix)
     refuse_without_blender()
     run = read_run(arguments.run, *ARRAYS)
@@ -212,7 +212,7 @@ def plotted(scene: Scene, history: History, folder: Path) -> list[Path]:
 )
 def plot(arguments: Namespace) -> int:
     """Plot."""
-    folder: Path = arguments.out or arguments.run
+    folder = arguments.out or arguments.run
     refuse_without("digiclay plot", "plots", "matplotlib")
     run = read_run(arguments.run, *(name for name in HISTORY_ARRAYS if name != "time"))
     require_surface(run.scene, "plot")

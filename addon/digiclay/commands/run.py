@@ -122,7 +122,7 @@ OPTIONS: dict[str, Any] = {
 def carry_out(arguments: Namespace) -> int:
     """Run, write, and print a summary line."""
     scene, path = scene_of(arguments)
-    out: Path = arguments.out or Path(find_name(path))
+    out = arguments.out or Path(find_name(path))
     _refuse_early(arguments, scene)
     with claim_folder(out, overwrite=arguments.overwrite) as claim:
         fit = None

@@ -141,7 +141,7 @@ def _find_skin(body: Body) -> Flags:
     """Return which faces belong to the skin: it is a height everywhere, so that all of it faces up."""
     first, second, third = (body.vertices[body.faces[:, corner]] for corner in range(3))
     normal = np.cross(second - first, third - first)
-    return np.asarray(normal[:, 2] > UPWARDS * np.linalg.norm(normal, axis=1))
+    return normal[:, 2] > UPWARDS * np.linalg.norm(normal, axis=1)
 
 
 def _mark_rim(mesh: Mesh, skin: Flags) -> None:

@@ -80,7 +80,7 @@ def _find_place(bed: Object, places: Floats) -> Floats:
     # A hand has no fingertip between those of another one.
     size = np.ptp(places, axis=0) + APART
     beside = (np.abs(moves[:, None] - middles) >= size).any(axis=2).all(axis=1) | (len(places) == 1)
-    return np.asarray(moves[((away >= APART) & beside).argmax()])
+    return moves[((away >= APART) & beside).argmax()]
 
 
 def _find_top(bed: Object) -> float:

@@ -62,7 +62,7 @@ def _dashes(line: Line) -> Floats:
     start, end = line.points[0], line.points[-1]
     count = max(1, int(np.linalg.norm(end - start) / (2.0 * DASH * line.width)))
     share = (np.arange(count)[:, None] + [0.0, 0.5]).ravel() / count
-    return np.asarray(start + (end - start) * share[:, None])
+    return start + (end - start) * share[:, None]
 
 
 def _dot(dot: Dot) -> None:

@@ -159,4 +159,4 @@ def _list_points(thing: Object) -> Floats:
 def _place(points: Floats, placed: Matrix) -> Floats:
     """Return points (k, 3) of an object, world."""
     matrix = np.array(placed.matrix_world)
-    return np.asarray(points @ matrix[:3, :3].T + matrix[:3, 3])
+    return points @ matrix[:3, :3].T + matrix[:3, 3]

@@ -188,7 +188,7 @@ def _visible_points(bed: Object, history: Mapping[str, Array], rows: Cells, size
 def _turn(points: Floats, angle: float) -> Floats:
     """Turn points about the vertical axis."""
     c, s = np.cos(angle), np.sin(angle)
-    return np.asarray(points @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]))
+    return points @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
 def render_film(

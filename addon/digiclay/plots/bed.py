@@ -124,7 +124,7 @@ def _light(vertices: Floats, over: NDArray[np.integer[Any]]) -> Floats:
     normal = np.zeros_like(vertices)
     np.add.at(normal, over, np.cross(b - a, c - a)[:, None])
     facing = normal @ SUN / np.maximum(np.linalg.norm(normal, axis=1), 1e-12)
-    return np.asarray(0.45 + 0.55 * np.clip(facing, 0.0, 1.0))
+    return 0.45 + 0.55 * np.clip(facing, 0.0, 1.0)
 
 
 def _quartered(corners: Floats) -> Floats:

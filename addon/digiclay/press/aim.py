@@ -87,13 +87,13 @@ def hit_point(context: Context, bed: Object, cells: Grid, height: Floats, xy: Pl
 def find_view(context: Context, bed: Object) -> Floats:
     """Return right, up and towards the eye of the context's view in a bed's space, (3, 3), a column each."""
     seen = np.array(context.region_data.view_matrix @ bed.matrix_world, np.float64)[:3, :3].T
-    return np.asarray(seen / np.linalg.norm(seen, axis=0))
+    return seen / np.linalg.norm(seen, axis=0)
 
 
 def _place(bed: Object, point: Floats) -> Floats:
     """Return where a point of a bed's space (3,), m, is in the world."""
     placed = np.array(bed.matrix_world, np.float64)
-    return np.asarray(placed[:3, :3] @ (point * SCALE) + placed[:3, 3])
+    return placed[:3, :3] @ (point * SCALE) + placed[:3, 3]
 
 
 def _ray(context: Context, bed: Object, xy: Place) -> tuple[Floats, Floats]:
@@ -269,7 +269,7 @@ def _box(bed: Object) -> Floats:
     housing: Object = view.housing_of(bed)
     points = np.array([thing.co for mesh in (housing.data, bed.data) for thing in mesh.vertices])
     corners = np.array([points.min(axis=0), points.max(axis=0)]) * np.array(bed.scale)
-    return np.asarray(corners - [0.0, 0.0, corners[0, 2]])
+    return corners - [0.0, 0.0, corners[0, 2]]
 
 
 def _bounds(thing: Object, matrix: Matrix) -> Floats:

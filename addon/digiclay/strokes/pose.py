@@ -24,7 +24,7 @@ def turn_image(turn: Floats, image: Image) -> Floats:
         return turn
     if image.mirrors:
         # M R M for M = diag(1, -1, 1): the axis of a rotation is mirrored the other way round.
-        turn = np.asarray(turn * [1.0, -1.0, 1.0, -1.0])
+        turn = turn * [1.0, -1.0, 1.0, -1.0]
     half = 0.5 * math.atan2(image.yx, image.xx)
     turned = _multiply(np.array([math.cos(half), 0.0, 0.0, math.sin(half)]), turn)
     # A half turn about its own axis leaves an ellipsoid as it is.

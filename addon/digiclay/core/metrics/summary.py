@@ -96,7 +96,7 @@ def measure_lag(sums: CellSums, fingertip: ArrayLike) -> Floats:
 def measure_surface_under(sums: CellSums, fingertip: ArrayLike) -> Floats:
     """Return ``sum F_j H_j / sum F_j - z``, the surface under the fingertip, in the rows in contact, m."""
     rows, tip = sums.touching, np.asarray(fingertip, dtype=np.float64)
-    return np.asarray(sums.height[rows] / sums.total[rows] - tip[rows, 2])
+    return sums.height[rows] / sums.total[rows] - tip[rows, 2]
 
 
 def measure_ridge_errors(
@@ -140,7 +140,7 @@ def compute_weights(time: ArrayLike) -> Floats:
     if len(moment) < 2:  # nothing to average over
         return np.ones(len(moment))
     half = 0.5 * np.diff(moment)
-    return np.asarray(np.concatenate([half, [0.0]]) + np.concatenate([[0.0], half]))
+    return np.concatenate([half, [0.0]]) + np.concatenate([[0.0], half])
 
 
 def compute_mean(values: Floats, weight: Floats) -> float | None:

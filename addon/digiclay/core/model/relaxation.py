@@ -51,7 +51,7 @@ class Relaxation(Parameters):
     def shares(self) -> Floats:
         """Shares ĉ_i of the filters, shape (k,), or (k, b) of differing runs."""
         weights = np.stack(np.broadcast_arrays(*self.weights))
-        return np.asarray(weights[1:] / weights.sum(axis=0))
+        return weights[1:] / weights.sum(axis=0)
 
     def reduced(self, time: Floats) -> Floats:
         """Return G(t) (equation 12); G(0) = 1."""

@@ -156,7 +156,7 @@ def _interpolate_turns(start: Floats, end: Floats, part: Floats) -> Floats:
     """Return unit quaternions (.., 4) at shares `part` (.., 1) of the shortest arc."""
     cosine = np.einsum("...j,...j->...", start, end)[..., None]
     if (np.abs(cosine) >= 1.0).all():  # no turn, the usual case
-        return np.asarray(start / np.linalg.norm(start, axis=-1, keepdims=True))
+        return start / np.linalg.norm(start, axis=-1, keepdims=True)
     end = np.where(cosine < 0.0, -end, end)
     angle = np.arccos(np.clip(np.abs(cosine), 0.0, 1.0))
     sine = np.sin(angle)
@@ -164,4 +164,4 @@ def _interpolate_turns(start: Floats, end: Floats, part: Floats) -> Floats:
     divisor = np.where(small, 1.0, sine)
     turned = (np.sin((1.0 - part) * angle) * start + np.sin(part * angle) * end) / divisor
     turned = np.where(small, start, turned)
-    return np.asarray(turned / np.linalg.norm(turned, axis=-1, keepdims=True))
+    return turned / np.linalg.norm(turned, axis=-1, keepdims=True)

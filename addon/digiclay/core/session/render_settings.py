@@ -99,7 +99,7 @@ class Film(Moving):
         if count > MOST_FRAMES:
             rule = f"must be so high that there are at most {MOST_FRAMES} frames"
             raise ParameterError("Film", "speed", rule, f"{self.speed:g}: {count} frames")
-        return np.asarray(np.minimum(self.start + np.arange(count) * (self.speed / self.rate), stop))
+        return np.minimum(self.start + np.arange(count) * (self.speed / self.rate), stop)
 
     def rows(self, time: Sequence[float] | Floats) -> NDArray[np.intp]:
         """Return the recorded row nearest to each frame; the parameters are those of `moments`."""

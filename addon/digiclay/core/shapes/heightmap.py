@@ -442,7 +442,7 @@ def average_blocks(values: NDArray[np.generic], block: int) -> Floats:
 def _within(position: Floats, pixels: int) -> NDArray[np.bool_]:
     """Return which positions lie on the pixels, the edge included."""
     slack = RELATIVE_TOLERANCE * pixels
-    return np.asarray((position >= -slack) & (position <= pixels + slack))
+    return (position >= -slack) & (position <= pixels + slack)
 
 
 def _scale(position: Floats, pixels: int, block: int, count: int) -> Floats:
@@ -460,4 +460,4 @@ def _bilinear(values: Floats, rows: Floats, columns: Floats) -> Floats:
     up, over = rows - row, columns - column
     first = values[row, column] * (1.0 - over) + values[row, right] * over
     second = values[below, column] * (1.0 - over) + values[below, right] * over
-    return np.asarray(first * (1.0 - up) + second * up)
+    return first * (1.0 - up) + second * up

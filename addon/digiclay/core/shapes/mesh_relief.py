@@ -87,7 +87,7 @@ class ShapeMesh:
     @cached_property
     def used(self) -> Floats:
         """The corners of the triangles, shape (3 f, 3)."""
-        return np.asarray(self.vertices[self.faces.ravel()])
+        return self.vertices[self.faces.ravel()]
 
     @property
     def box(self) -> tuple[float, float, float, float]:

@@ -80,7 +80,7 @@ def measure_reach(scene: Scene, position: Floats, following: Array) -> Floats:
     if scene.method != "cell_states":
         return np.zeros(len(following))
     side = np.sqrt(compute_cell_area(position) or 0.0)
-    return np.asarray(np.maximum(side * (np.sqrt(following / np.pi) - 0.5), 0.0))
+    return np.maximum(side * (np.sqrt(following / np.pi) - 0.5), 0.0)
 
 
 def evaluate_share(blister: Blister, distance: Floats) -> Floats:

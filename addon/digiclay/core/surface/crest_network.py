@@ -135,7 +135,7 @@ def _add_node(network: Network, points: Floats, half: list[float]) -> int:
 
 def normalize(vector: Floats) -> Floats:
     """Return the unit vector along a vector (2,)."""
-    return np.asarray(vector / max(float(np.hypot(*vector)), 1e-12))
+    return vector / max(float(np.hypot(*vector)), 1e-12)
 
 
 def measure_length(points: Floats) -> float:
@@ -338,7 +338,7 @@ def _round(network: Network, first: End, second: End) -> Floats:
 
 def _begin(network: Network, end: End) -> Floats:
     """Return where a branch comes out of its junction, (2,)."""
-    return np.asarray(_without_nodes(network, end, {end: (end, np.empty((0, 2)))})[0])
+    return _without_nodes(network, end, {end: (end, np.empty((0, 2)))})[0]
 
 
 def _meeting(network: Network, end: End, other: End) -> Floats | None:
@@ -415,4 +415,4 @@ def _without_nodes(network: Network, end: End, joints: Joints) -> Floats:
             outside &= np.hypot(*(points - network.position[node]).T) > THROUGH * network.half[node]
     middle = len(points) // 2
     outside[middle] |= not outside.any()
-    return np.asarray(points[outside])
+    return points[outside]

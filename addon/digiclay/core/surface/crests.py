@@ -92,7 +92,7 @@ class Field:
         directions = np.tile(np.column_stack([np.cos(angles), np.sin(angles)]), (len(position), 1))
         level = np.repeat(0.5 * self.at(position), AROUND)
         distance = self.falls(np.repeat(position, AROUND, axis=0), directions, level).reshape(-1, AROUND)
-        return np.asarray(np.minimum(distance.min(axis=1), self.most))
+        return np.minimum(distance.min(axis=1), self.most)
 
     def line(self, chain: Chain) -> Floats | None:
         """Return the line along the top that follows a chain of pins, or none if it has no length."""
@@ -296,7 +296,7 @@ def _straight(leg: Floats) -> tuple[Floats, Floats]:
 
 def _sample(start: Floats, stop: Floats) -> Floats:
     """Return nine points (9, 2) of the straight line between two points."""
-    return np.asarray(start + np.linspace(0.0, 1.0, 9)[:, None] * (stop - start))
+    return start + np.linspace(0.0, 1.0, 9)[:, None] * (stop - start)
 
 
 def _turns(line: Floats, width: int, closed: bool) -> Floats:

@@ -126,7 +126,7 @@ def _line(run: Floats, off: Floats, closed: bool) -> Floats | None:
     if not allowed.any():
         return None
     best = int(np.argmin(np.where(allowed, keeps, np.inf)))
-    return np.asarray(height[i[best]] + slope[best] * (run - at[i[best]]))
+    return height[i[best]] + slope[best] * (run - at[i[best]])
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -284,7 +284,7 @@ def _divide(
 def _nearer(region: Region, every: list[Ridge]) -> Floats:
     """Return by how much the points of a region are nearer to the last part than to the others, (k,), m."""
     away = measure_distances(region.position, every)
-    return np.asarray(away[:-1].min(axis=0) - away[-1])
+    return away[:-1].min(axis=0) - away[-1]
 
 
 def _by_label(label: Faces) -> dict[int, Indices]:

@@ -119,7 +119,7 @@ def _cut_along_ac(position: Floats, top: Floats, *corners: Faces) -> Flags:
 def measure_areas(position: Floats, faces: Faces) -> Floats:
     """Return the area of each triangle seen from above, m²; negative when it runs clockwise."""
     a, b, c = (position[faces[:, corner]] for corner in range(3))
-    return np.asarray(0.5 * ((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]))
+    return 0.5 * ((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0])
 
 
 def take_corners(table: Array) -> tuple[Array, Array, Array, Array]:

@@ -60,7 +60,7 @@ def intersect_surface(grid: Grid, height: Floats, origin: Floats, direction: Flo
     if at == 0:
         return start
     onto = (tops[at] - origin[2]) / direction[2] if direction[2] else -math.inf
-    return np.asarray(origin + onto * direction if times[at - 1] <= onto <= times[at] else start)
+    return origin + onto * direction if times[at - 1] <= onto <= times[at] else start
 
 
 def _inside(origin: Floats, direction: Floats, low: Floats, high: Floats) -> tuple[float, float]:
@@ -95,4 +95,4 @@ def find_contact_outline(finger: Fingertip, turn: Floats, depth: float) -> Float
     angle = np.linspace(0.0, 2.0 * math.pi, 48, endpoint=False)
     circle = np.sqrt(max(0.0, square)) * np.array([np.cos(angle), np.sin(angle)])
     outline = np.linalg.solve(np.linalg.cholesky(flat).T, circle).T
-    return np.asarray(outline + middle + spread[:2, 2] / half)
+    return outline + middle + spread[:2, 2] / half

@@ -171,7 +171,7 @@ class SurfaceGrid:
             (np.arange((count - 1) * self.parts + 1) + self.parts // 2) // self.parts
             for count in (self.formed.rows, self.formed.columns)
         )
-        return np.asarray(of_pins[(row[:, None] * self.formed.columns + column).ravel()])
+        return of_pins[(row[:, None] * self.formed.columns + column).ravel()]
 
     def values(self) -> dict[str, Floats]:
         """Return height, force and mode at each point: force straight between pins, mode of the nearest."""
