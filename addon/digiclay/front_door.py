@@ -45,6 +45,7 @@ from .plugins.method_loader import (
     find_code,
     is_in_memory,
     load_method,
+    refuse_former,
     write_code,
 )
 
@@ -213,7 +214,7 @@ def change_scene(source: Source, changes: Table | None) -> Scene:
     path, table = read_source(source)
     control, given = table.get("control"), list(list_changes(changes or {}))
     if isinstance(source, Scene):
-        find_code(source)  # refuses one of former code
+        refuse_former(source)
     elif isinstance(source, Mapping) and isinstance(control, Mapping) and "method" in control:
         given.insert(0, (METHOD, control["method"]))
     return make_scene(path, table, [Setting(key, write_value(key, value), "changes") for key, value in given])
@@ -250,7 +251,7 @@ def sweep(
     if not isinstance(words, Iterable):
         raise ParameterError("metrics", "", "must be a list of metrics", repr(metrics))
     names = list(dict.fromkeys(find_figure(str(word).strip(), "metrics") for word in words))
-    find_code(require_scene(scene))  # refuses one of former code
+    refuse_former(require_scene(scene))
     axes = [make_axis(key, values, partial(write_value, key)) for key, values in varied.items()]
     points = judge_all(make_points(scene, (), axes, option="sweep"))
     require_recorder(points)

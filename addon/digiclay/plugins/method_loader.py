@@ -226,6 +226,10 @@ class OwnRow(Method):
         return guard(lambda: parameters.build(info), source.label, source.file, info.period)
 
 
+#: Code of the classes of methods, of those too that others of their names have replaced.
+_SOURCES: dict[type, MethodSource] = {}
+
+
 def load_method(word: str | type) -> str:
     """Load the method that a word of the command line names, or a class; return its name.
 
@@ -318,6 +322,7 @@ def add_class(name: str, source: MethodSource, kind: Any) -> OwnRow:
         return restore_parameters, (name, source, values)
 
     copyreg.pickle(kind, reduce)
+    _SOURCES[kind] = source
     add_method(name, row)
     return row
 
@@ -409,15 +414,16 @@ CODE = "method.py"
 
 
 def find_code(scene: Scene) -> MethodSource | None:
-    """Return the code of a scene's method; None for a built-in one, or without control.
+    """Return the code of a scene's method; None for a built-in one, or without control."""
+    return _SOURCES.get(type(scene.control))
 
-    Raises MethodError if another class has that name by now.
-    """
-    row = list_added().get(scene.method) if scene.control is not None else None
-    if isinstance(row, OwnRow) and type(scene.control) is not row.kind:
+
+def refuse_former(scene: Scene) -> None:
+    """Refuse to change a scene whose method is of another class than the one loaded last under its name."""
+    row = list_added().get(scene.method)
+    if isinstance(row, OwnRow) and scene.control is not None and type(scene.control) is not row.kind:
         rule = "must be of the code that was loaded last under its name"
         raise MethodError(f"The scene's method {scene.method} {rule}: make the scene again.")
-    return row.source if isinstance(row, OwnRow) else None
 
 
 def describe_origin(scene: Scene) -> dict[str, str]:
