@@ -2,7 +2,6 @@
 
 import json
 from dataclasses import replace
-from functools import cache
 
 import numpy as np
 import pytest
@@ -40,16 +39,11 @@ SHAPED = ["form", "dome", "--scene", "my.toml", "--out", "out", "--quiet", "--fi
 GAINS = ["sweep", "my.toml", "--vary", "control.force_gain=3,4,5,6", "--metric", "rfd,lag", "--quiet"]
 
 
-@cache
-def sample(name):
-    return run(load(find(name)))
-
-
 @pytest.mark.parametrize(
     "name, fingers", [("two_hands_bowl", 4), ("pinch_crease", 2), ("five_fingers_mound", 5)]
 )
 def test_a_sample_of_hands_loses_no_finger_and_forms_what_it_is_called(name, fingers):
-    done = sample(name)
+    done = run(load(find(name)))
     formed = done.history["height"][-1] - done.scene.actuator.rest_height
     x, y = done.history["position"].T
     out = np.hypot(x, y)
@@ -72,8 +66,6 @@ def test_a_sample_of_hands_loses_no_finger_and_forms_what_it_is_called(name, fin
 @pytest.mark.parametrize(
     "command, made",
     [
-        (["describe", "my.toml"], ()),
-        (["describe", "my.toml", "--parameters"], ()),
         (["run", "my.toml", "--plots", "--out", "out", "--quiet"], ("session.png", "history.npz")),
         (["compare", "my.toml", "--methods", "hybrid,cell_states", "--out", "out"], ("compare.png",)),
         ([*SHAPED, "scene"], ("history.npz",)),

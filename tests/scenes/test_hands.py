@@ -39,6 +39,11 @@ def scene(method, *fingers, **parts):
     return replace(made, fingers=fingers, recorder=None, **parts)
 
 
+def beds(method, *counts, **parts):
+    """Return beds under so many fingers each."""
+    return [assemble(scene(method, *[FINGER] * count, **parts)) for count in counts]
+
+
 def press(system, places, way, periods):
     """Return poses (t, p, f, 7) of fingertips that press 2.5 mm, and are dragged after half a second, m/s."""
     time = np.arange(periods)[:, None] * PERIOD + system.instants
@@ -85,7 +90,7 @@ LONG = replace(
 
 @pytest.mark.parametrize("method", [None, "virtual_master", "elastic"])
 def test_a_third_finger_that_hovers_over_two_that_meet_changes_nothing(method):
-    two, three = (assemble(scene(method, *[FINGER] * count)) for count in (2, 3))
+    two, three = beds(method, 2, 3)
     poses = press(three, [(-3e-3, 1e-3), (3e-3, -1e-3), (9e-3, 1e-3)], (6e-3, 2e-3), 150)
     poses[:, :, 2, 2] += 6e-3  # within reach, without a touch
     (alone, forces), (state, all_forces) = follow(two, poses[:, :, :2]), follow(three, poses)
@@ -132,12 +137,7 @@ def drag(system, apart, angle, turn):
 )
 def test_a_finger_beside_a_higher_one_is_followed_as_alone(apart, angle, turn):
     # While pins far above a fingertip told of its place, both were lost at 12 mm, and at 13.7.
-    one, two = (
-        assemble(
-            scene("virtual_master", *[FINGER] * count, layout=replace(PAPER.layout, rows=27, columns=27))
-        )
-        for count in (1, 2)
-    )
+    one, two = beds("virtual_master", 1, 2, layout=replace(PAPER.layout, rows=27, columns=27))
     poses = drag(two, apart * 1e-3, np.deg2rad(angle), np.deg2rad(turn))
     _, both = follow(two, poses)
     alone = np.hstack([follow(one, poses[:, :, [finger]])[1] for finger in (0, 1)])
@@ -191,7 +191,7 @@ def test_a_session_of_three_fingers_goes_on_from_a_kept_state_to_the_same_bits(m
 
 @pytest.mark.parametrize("method", METHODS)
 def test_fingers_that_come_and_go_leave_the_others_what_they_have(method):
-    one, three = (assemble(scene(method, *[FINGER] * count)) for count in (1, 3))
+    one, three = beds(method, 1, 3)
     places = [(-40e-3, 1e-3), (2e-3, -4e-3), (40e-3, 2e-3)]
     poses = press(three, places, (6e-3, -9e-3), 120)
     state, _ = follow(three, poses)
@@ -316,7 +316,7 @@ def test_a_run_of_two_fingers_has_the_metrics_of_each_and_its_errors():
 
 
 def test_the_pulp_of_a_finger_that_went_forgets_while_another_one_hovers_where_it_pressed():
-    one, two = (assemble(scene(None, *[FINGER] * count)) for count in (1, 2))
+    one, two = beds(None, 1, 2)
     poses = press(two, [(0.0, 1e-3), (2e-3, 0.0)], (0.0, 0.0), 120)
     poses[:, :, 1, 2] += 5e-3  # it hovers
     poses[40:80, :, 0, 0] += 60e-3
