@@ -259,6 +259,9 @@ def test_scene_and_run_are_shown_in_a_few_lines_and_in_a_notebook_with_the_plot(
     assert "cell_states, set point 0.04 N per cell" in repr(
         digiclay.scene({"control": {"method": "cell_states"}})
     )
+    deep = digiclay.scene(tap, {"control": "absent", "contact.stiffness": 5000})
+    pressed = digiclay.run(deep, errors=False)
+    assert f"\n  caution: {pressed.metrics['beyond_a_finger']}\n" in repr(pressed)
     named = replace(tap, name="a<b")
     assert ">Scene a&lt;b</caption>" in named._repr_html_()
     assert re.search(r"<tr><th [^>]+>bed</th><td [^>]+>11 x 11 pins", named._repr_html_())

@@ -114,11 +114,13 @@ class Result(Described):
         """Return what matters most of it, by name."""
         largest = self.metrics.get("max_total_force")
         reached = "not recorded" if largest is None else f"at most {largest:.2g} N"
+        beyond = self.metrics.get("beyond_a_finger")
         rows, pins = len(self.history.get("time", ())), self.scene.cells
         return {
             "time": describe_time(self.metrics) + (", stopped before its end" if self.incomplete else ""),
             "force": self._describe_force() or reached,
             "errors": describe_errors(self.metrics),
+            **({"caution": beyond} if beyond else {}),
             "history": f"{rows} rows of {pins} pins: {', '.join(self.history)}" if rows else "none",
             "metrics": f"{len(self.metrics)}, in SI units",
         }
