@@ -100,7 +100,7 @@ def save_film(frames: list[Image.Image], name: str, shown_for: int) -> None:
 def cut_guide(folder: Path) -> None:
     """Write what each screenshot of the guide and its tutorial shows as a JPEG; and the film of the hand."""
     frames = sorted(folder.glob("film_*.png"))
-    shots = [shot for name in ("guide", "relief") for shot in sorted(folder.glob(f"{name}_*.png"))]
+    shots = sorted([*folder.glob("guide_*.png"), *folder.glob("relief_*.png")])
     if not shots or not frames:
         rule = "must have screenshots guide_*.png, relief_*.png and film_*.png"
         sys.exit(f"{folder} {rule} (got {len(shots)} and {len(frames)}): run tests/window first")
@@ -167,24 +167,13 @@ def draw_hand_film(folder: Path) -> None:
     save_film(frames, "two_hands.webp", SHOWN_FOR)
 
 
-def carry_out_program(folder: Path, page: str, program: str) -> None:
-    """Carry out in a folder the program that a tutorial shows: pictures are what it writes."""
+def draw_by_program(folder: Path, page: str, program: str, name: str) -> None:
+    """Carry out in a folder the program that a tutorial shows; take the picture that it writes."""
     text = (PICTURES.parent / "tutorials" / page).read_text(encoding="utf-8")
     shown = text.partition(f'title="{program}"\n')[2].partition("```")[0]
     (folder / program).write_text(shown, encoding="utf-8")
     subprocess.run([sys.executable, program], cwd=folder, check=True, timeout=1200)
-
-
-def draw_noise(folder: Path) -> None:
-    """Draw the figure of four control methods over the noise of the sensors."""
-    carry_out_program(folder, "figure.md", "question.py")
-    shutil.copyfile(folder / "noise.svg", PICTURES / "noise.svg")
-
-
-def draw_animation(folder: Path) -> None:
-    """Draw a frame of the animation with keyframes."""
-    carry_out_program(folder, "animation.md", "animate.py")
-    save_jpeg(folder / "frame.png", "animation.jpg")
+    shutil.copyfile(folder / name, PICTURES / name)
 
 
 def draw_hand_forces(folder: Path) -> None:
@@ -296,8 +285,10 @@ DRAWN: dict[str, Callable[[Path], None]] = {
     **{f"samples/{name}.jpg": partial(draw_sample, name=name) for name in list_samples()},
     "two_hands.webp": draw_hand_film,
     "hand_forces.png": draw_hand_forces,
-    "noise.svg": draw_noise,
-    "animation.jpg": draw_animation,
+    "noise.svg": partial(draw_by_program, page="figure.md", program="question.py", name="noise.svg"),
+    "animation.png": partial(
+        draw_by_program, page="animation.md", program="animate.py", name="animation.png"
+    ),
     "laws.svg": lambda folder: draw_laws(PICTURES / "laws.svg"),
 }
 
