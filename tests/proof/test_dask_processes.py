@@ -196,7 +196,7 @@ def test_a_worker_of_another_version_is_named_at_once_and_when_it_joins(here, st
     [
         ("scheduler", "The scheduler {} lacks digiclay; here it is digiclay 0"),
         ("worker", "Worker tcp://127.0.0.1:"),
-        ("late worker", "A worker of {} lacks digiclay. What is done is kept"),
+        ("late worker", "A worker of {} lacks digiclay. Finished work is kept"),
     ],
 )
 def test_a_place_without_digiclay_is_named_in_one_line(place, line, here, start):

@@ -121,7 +121,7 @@ def test_a_set_point_is_drawn_of_each_cell_and_without_one_neither_it_nor_a_devi
     force = axes(plots.session_figure(case, SetPoint(0.04, per_cell=True)), "force")
     expected = np.repeat([np.nan, 0.2, 0.12], [50, 50, 101])
     assert_allclose(force.get_lines()[1].get_ydata(), expected, rtol=1e-12)  # rounding
-    assert "set point 0.04 N a cell" in words(force)
+    assert "set point 0.04 N per cell" in words(force)
     figure = plots.session_figure(drag(), None)
     force, told = axes(figure, "force"), axes(figure, "figures")
     assert [line.get_label() for line in force.get_lines()] == ["total force"]
@@ -169,7 +169,7 @@ def test_both_pictures_are_written_at_their_size(tmp_path, session):
 @pytest.mark.parametrize("shape", [(1, 1), (1, 9), (9, 1)])
 def test_a_single_row_or_column_has_a_session_and_no_surface(tmp_path, shape):
     case = drag(*shape)
-    with pytest.raises(ParameterError, match="2 x 2 pins at least"):
+    with pytest.raises(ParameterError, match="at least 2 x 2 pins"):
         save(plots.surface_figure(case), tmp_path / "surface.png")
     assert not list(tmp_path.iterdir())
     if shape == (1, 1):  # a session of one row as well

@@ -307,7 +307,7 @@ def test_a_piece_whose_task_fails_is_told_of_and_the_others_go_on_unless_the_wor
             2: {"error": "KeyError: 'own fault'"},
             3: {"figures": {}},
         }
-        with pytest.raises(OutputError, match=r"gone What is done is kept"):
+        with pytest.raises(OutputError, match=r"gone Finished work is kept"):
             finished(threads, task, some(5)[4:])
 
 

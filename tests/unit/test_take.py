@@ -122,9 +122,9 @@ def test_a_take_as_a_scene_file_runs_to_the_same_heights(tmp_path):
 @pytest.mark.parametrize(
     "poses, rule",
     [
-        (np.zeros((1, 1, 7)), "must hold one control period at least"),
-        (np.zeros((3, 1, 6)), "must hold one control period at least"),
-        (np.zeros((3, 0, 7)), "of 1 x 7 numbers, a pose a finger"),
+        (np.zeros((1, 1, 7)), "must have at least one control period"),
+        (np.zeros((3, 1, 6)), "must have at least one control period"),
+        (np.zeros((3, 0, 7)), "of 1 x 7 numbers, one pose per finger"),
         (np.full((3, 1, 7), np.nan), "must be finite numbers"),
     ],
 )

@@ -170,7 +170,7 @@ def test_under_a_silent_server_the_fingertip_lifts_and_it_is_told_once_and_when_
     assert ["No pose from" in note.message for note in notes] == [True]
     assert pose_of(bed)[:3] == [*PRESS[:2], follow.LIFTED]
     arrived(server, address, state(*PRESS))
-    assert ["heard again" in note.message for note in clock.tick(2)] == [True]
+    assert ["responds again" in note.message for note in clock.tick(2)] == [True]
     assert pose_of(bed) == list(PRESS)
 
 

@@ -119,7 +119,7 @@ def test_a_fault_in_the_modal_part_ends_the_sessions_in_order(bed, monkeypatch):
     monkeypatch.setattr(tick, "tick", lambda context, now: {}["now"])
     assert Drive().modal(bpy.context, SimpleNamespace(type="TIMER", value="NOTHING")) == {"CANCELLED"}
     assert running.list_sessions() == ()
-    assert said == ["Fault of the extension: KeyError: 'now'"]
+    assert said == ["Error in the extension: KeyError: 'now'"]
     assert running.last_message() == f"The session of Digital Clay ended: {said[0]}"
 
 
