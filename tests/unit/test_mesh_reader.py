@@ -320,7 +320,7 @@ ALTERING = "must not need an extension that changes its vertices (got one.gltf: 
     [
         ("accessors.0.count", 10**12, "must have at most 20 million triangles"),
         ("accessors.0.count", 5, "accessor 0 reaches beyond its view"),
-        ("accessors.0.count", -1, "-1 is no count"),
+        ("accessors.0.count", -1, "-1 is not a count"),
         ("accessors.0.bufferView", None, "compressed or sparse"),
         ("accessors.0.sparse", {}, "compressed or sparse"),
         ("bufferViews.0.byteStride", 0, "reaches beyond its view"),
@@ -329,7 +329,7 @@ ALTERING = "must not need an extension that changes its vertices (got one.gltf: 
         ("buffers.0.uri", "data:text/plain,abc", "not base64"),
         ("buffers.0.uri", "data:;base64,!!!", "bytes as text"),
         ("buffers.0.uri", "nowhere.bin", "must have its files beside it"),
-        (f"{PRIMITIVE}.indices", -1, "-1 is no count"),
+        (f"{PRIMITIVE}.indices", -1, "-1 is not a count"),
         (f"{PRIMITIVE}.indices", 7, "no entry 7 in accessors"),
         ("asset.version", "1.0", "its version is 1.0"),
         ("asset", None, "'asset' is missing"),
