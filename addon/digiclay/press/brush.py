@@ -53,7 +53,12 @@ def find_kind(finger: Fingertip) -> FingerKind | None:
 #: Names by which Blender knows the tool, and the operator whose properties are its settings.
 TOOL, OPERATOR = "digiclay.press_tool", "digiclay.press"
 #: Modal operators that change the settings, and draw them themselves.
-ADJUSTING = {f"DIGICLAY_OT_press_{name}" for name in ("size", "depth", "strength", "center")}
+ADJUSTING = {
+    "DIGICLAY_OT_press_size",
+    "DIGICLAY_OT_press_depth",
+    "DIGICLAY_OT_press_strength",
+    "DIGICLAY_OT_press_center",
+}
 LABELS = {brush: brush.value.replace("_", " ").title() for brush in Brush}
 BRUSH_WORDS = {
     Brush.LOWER: "Press a valley of the given depth. With Ctrl: Raise",
