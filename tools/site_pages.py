@@ -160,6 +160,12 @@ The codes of `mode` are those of the class `Mode`:
       toc_label: Orders
       heading_level: 3
 
+::: digiclay.core.model.control_interface.SetPoint
+    options:
+      heading: digiclay.SetPoint
+      toc_label: SetPoint
+      heading_level: 3
+
 ## Control periods and the device
 
 ::: digiclay.core.session.probes.steps

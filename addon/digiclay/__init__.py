@@ -33,6 +33,7 @@ LATER = {
     "Orders": ("core.control.own_method", "Orders"),
     "Result": ("front_door", "Result"),
     "Scene": ("core.scene.schema", "Scene"),
+    "SetPoint": ("core.model.control_interface", "SetPoint"),
     "force": ("core.session.probes", "force"),
     "free_speed": ("core.session.probes", "free_speed"),
     "quantity": ("core.base.quantity", "quantity"),
