@@ -15,7 +15,6 @@ from digiclay.cli import main
 from digiclay.commands.evaluator import Evaluator, evaluate_elsewhere, submit
 from digiclay.commands.worker import Processes
 from digiclay.core.base.errors import DigiclayError, OutputError, ParameterError
-from digiclay.core.scene.assembly import assemble, count_rows, make_motion
 from digiclay.core.scene.scene_source import Setting, find, load
 from digiclay.core.session.accuracy import estimate_errors
 from digiclay.core.session.run_scene import run
@@ -250,7 +249,7 @@ AXES = [
 SHORT = [Setting("simulation.duration", "0.1")]
 
 
-def test_a_point_is_the_scene_with_its_values_and_has_as_many_rows():
+def test_a_point_is_the_scene_with_its_values():
     keys = [axis.partition("=")[0] for axis in AXES]
     rows = itertools.product(*(axis.partition("=")[2].split(",") for axis in AXES))
     points = make_points(find("slow_press"), SHORT, [read_axis(axis) for axis in AXES])
@@ -258,8 +257,6 @@ def test_a_point_is_the_scene_with_its_values_and_has_as_many_rows():
         varied = [Setting(key, word) for key, word in zip(keys, words, strict=True)]
         scene = load(find("slow_press"), [*SHORT, *varied])
         assert point.scene == scene
-        system = assemble(scene)
-        assert count_rows(scene, system.grid, make_motion(scene)) == system.rows
 
 
 #: Beds of different sizes, which run one at a time.

@@ -171,9 +171,9 @@ def _follow(monitor: Monitor, leader: Play) -> Monitor:
     return Monitor(play, np.maximum(largest, differences))
 
 
-def _refuse_unlike(scenes: Mapping[int, Scene]) -> None:
+def _refuse_unlike(scenes: Mapping[int, Scene], systems: Mapping[int, System]) -> None:
     """Refuse scenes that are not of one structure."""
-    structures = {run: describe_structure(scene) for run, scene in scenes.items()}
+    structures = {run: describe_structure(scene, systems[run]) for run, scene in scenes.items()}
     first, wanted = next(iter(structures.items()))
     for run, structure in structures.items():
         if structure != wanted:
@@ -200,7 +200,7 @@ def _run(
     if not systems:
         return
     running = {run: scenes[run] for run in systems}
-    _refuse_unlike(running)
+    _refuse_unlike(running, systems)
     play = begin_play(running, systems)
     watching = observer(running, scenes[0].recorder, play)
     absent = explain_absence(scenes[0])

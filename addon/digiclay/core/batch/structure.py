@@ -3,8 +3,8 @@
 from dataclasses import fields, is_dataclass, replace
 from typing import Any
 
-from ..model.layout import make_grid
-from ..scene.assembly import count_rows, make_motion
+from ..engine.system import System
+from ..scene.assembly import assemble
 from ..scene.schema import Scene
 from ..steppers.bernoulli import BernoulliPlan
 
@@ -26,7 +26,7 @@ CLOSED_FORM = ("bernoulli", "richardson")
 PHYSICS = ("actuator", "supply", "fluid", "valve", "conduit", "valve_lag", "delay", "contact", "relaxation")
 
 
-def describe_structure(scene: Scene) -> Any:
+def describe_structure(scene: Scene, system: System | None = None) -> Any:
     """Return a key that scenes of one batch have in common.
 
     For the closed-form and the Richardson stepper it has the kinds of the parts, not their numbers. Other
@@ -52,9 +52,8 @@ def describe_structure(scene: Scene) -> Any:
     )
     if scene.simulation.stepper not in CLOSED_FORM:
         return (*common, physics, replace(scene.simulation, duration=0.0))
-    motion = make_motion(scene)
-    plan = motion.plan
+    system = system or assemble(scene)
+    plan: Any = system.plan
     plans = (plan,) if isinstance(plan, BernoulliPlan) else (plan.coarse, plan.fine)
     nodes = tuple((plan.laminar, *((part.start, part.stop) for part in plan.nodes)) for plan in plans)
-    rows = count_rows(scene, make_grid(scene.layout), motion)
-    return (*common, classify(physics), rows, nodes, motion.instants.size)
+    return (*common, classify(physics), system.rows, nodes, system.instants.size)

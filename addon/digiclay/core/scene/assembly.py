@@ -63,11 +63,6 @@ def make_motion(scene: Scene) -> Motion:
     return Motion(cell, line, stepper, stepper.plan(cell, line, steps), steps, instants)
 
 
-def count_rows(scene: Scene, bed: Grid, motion: Motion) -> Rows:
-    """Return the rows of the state of a scene's system; `bed` and `motion`: those of the scene."""
-    return _make_control(scene, bed, motion)[2]
-
-
 def _make_control(scene: Scene, bed: Grid, motion: Motion) -> tuple[Controller, Sensors, Rows]:
     """Return the control method and the sensors, and the rows of all parts."""
     controller = _make_controller(scene, bed, (motion.cell,))
