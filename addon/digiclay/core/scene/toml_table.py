@@ -76,11 +76,9 @@ def _find_defaults(preset: str, method: str) -> dict[str, Table]:
 def _add_share(defaults: dict[str, Table], layout: Layout) -> dict[str, Table]:
     """Return the defaults with the contact's share that an arrangement of pins has."""
     share = ARRANGEMENTS[layout.arrangement].share
-    return (
-        defaults
-        if share is None
-        else {**defaults, "contact": {**defaults.get("contact", {}), "share": share}}
-    )
+    if share is None:
+        return defaults
+    return {**defaults, "contact": {**defaults.get("contact", {}), "share": share}}
 
 
 def tabulate(scene: Scene) -> Record:
