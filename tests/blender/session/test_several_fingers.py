@@ -340,8 +340,8 @@ def test_strokes_end_with_the_fingertip_that_goes_along_them_and_say_so(pair, cl
 
 
 ODD = {
-    "scaled to nothing": lambda tip: tip.scale.zero(),
-    "at no finite place": lambda tip: setattr(tip, "location", (np.nan, 0.0, 0.0)),
+    "is scaled to nothing": lambda tip: tip.scale.zero(),
+    "has no finite location": lambda tip: setattr(tip, "location", (np.nan, 0.0, 0.0)),
 }
 
 
@@ -351,7 +351,7 @@ def test_an_odd_fingertip_has_the_session_wait_and_nothing_is_lost(pair, clock, 
     press(pair, clock, 1, 2)
     before = exact(pair)
     ODD[what](fingertips_of(pair)[2])
-    waits(pair, clock, words=f"Digital Clay Fingertip 2 is {what}")
+    waits(pair, clock, words=f"Digital Clay Fingertip 2 {what}")
     np.testing.assert_array_equal(exact(pair), before)
     assert_near(shown(pair), before, 1e-8)
 
