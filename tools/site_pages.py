@@ -16,6 +16,7 @@ from typing import Any
 ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT), str(ROOT / "addon"), str(ROOT / "tools")]
 
+import digiclay  # noqa: E402
 from digiclay.commands.describe import describe_meaning, write_range, write_value  # noqa: E402
 from digiclay.commands.parser import parser  # noqa: E402
 from digiclay.core.base.modes import MEANINGS  # noqa: E402
@@ -68,38 +69,20 @@ PYTHON = """\
 ## Scenes
 
 ::: digiclay.scene
-    options:
-      heading_level: 3
 
 ::: digiclay.samples
-    options:
-      heading_level: 3
 
-::: digiclay.core.scene.schema.Scene
-    options:
-      heading: digiclay.Scene
-      toc_label: Scene
-      heading_level: 3
-      show_if_no_docstring: false
+::: digiclay.Scene
 
 [Sample scenes](samples.md) and [parameters](parameters.md) have tables of their own.
 
 ## Runs
 
 ::: digiclay.run
-    options:
-      heading_level: 3
 
 ::: digiclay.load
-    options:
-      heading_level: 3
 
-::: digiclay.front_door.Result
-    options:
-      heading: digiclay.Result
-      toc_label: Result
-      heading_level: 3
-      inherited_members: true
+::: digiclay.Result
 
 ### History
 
@@ -110,24 +93,13 @@ commands are 0, its modes those of the period before.
 {arrays}
 The codes of `mode` are those of the class `Mode`:
 {modes}
-::: digiclay.core.base.modes.Mode
-    options:
-      heading: digiclay.Mode
-      toc_label: Mode
-      heading_level: 3
-      show_if_no_docstring: false
+::: digiclay.Mode
 
 ## Sweeps and metrics
 
 ::: digiclay.sweep
-    options:
-      heading_level: 3
 
-::: digiclay.core.studies.evaluation.FIGURES
-    options:
-      heading: digiclay.METRICS
-      toc_label: METRICS
-      heading_level: 3
+::: digiclay.METRICS
 
 ### Table of metrics
 
@@ -138,83 +110,48 @@ The codes of `mode` are those of the class `Mode`:
 [Write your own control method](../own-methods.md) shows how.
 
 ::: digiclay.methods
-    options:
-      heading_level: 3
 
-::: digiclay.core.control.own_method.OwnMethod
-    options:
-      heading: digiclay.Method
-      toc_label: Method
-      heading_level: 3
-      inherited_members: true
+::: digiclay.Method
 
-::: digiclay.core.base.quantity.quantity
-    options:
-      heading: digiclay.quantity
-      toc_label: quantity
-      heading_level: 3
+::: digiclay.quantity
 
-::: digiclay.core.control.own_method.Orders
-    options:
-      heading: digiclay.Orders
-      toc_label: Orders
-      heading_level: 3
+::: digiclay.Orders
 
-::: digiclay.core.model.control_interface.SetPoint
-    options:
-      heading: digiclay.SetPoint
-      toc_label: SetPoint
-      heading_level: 3
+::: digiclay.SetPoint
 
 ## Control periods and the device
 
-::: digiclay.core.session.probes.steps
-    options:
-      heading: digiclay.steps
-      toc_label: steps
-      heading_level: 3
+::: digiclay.steps
 
-::: digiclay.core.session.probes.force
-    options:
-      heading: digiclay.force
-      toc_label: force
-      heading_level: 3
+::: digiclay.force
 
-::: digiclay.core.session.probes.free_speed
-    options:
-      heading: digiclay.free_speed
-      toc_label: free_speed
-      heading_level: 3
+::: digiclay.free_speed
 
-::: digiclay.core.session.probes.step_response
-    options:
-      heading: digiclay.step_response
-      toc_label: step_response
-      heading_level: 3
+::: digiclay.step_response
 
 ## Errors
 
-::: digiclay.core.base.errors.DigiclayError
-    options:
-      heading: digiclay.DigiclayError
-      toc_label: DigiclayError
-      heading_level: 3
+::: digiclay.DigiclayError
 
 ## Extension of Blender
 
 ::: digiclay.register
-    options:
-      heading_level: 3
 
 ::: digiclay.unregister
-    options:
-      heading_level: 3
 
 ## Packages
 
 [Architecture](../architecture.md) says what each is for. Their pages follow: those of the core first, then
 those beside the extension, last the extension's own.
 """
+#: Entry of that page: a line ``::: digiclay.NAME``; more options of some.
+ENTRY = re.compile(r"^::: digiclay\.(\w+)$", re.MULTILINE)
+MORE_OPTIONS = {
+    "Scene": ["show_if_no_docstring: false"],
+    "Mode": ["show_if_no_docstring: false"],
+    "Result": ["inherited_members: true"],
+    "Method": ["inherited_members: true"],
+}
 SAMPLES = """\
 ---
 hide: [toc]
@@ -306,6 +243,16 @@ def list_packages() -> dict[str, list[str]]:
     )
 
 
+def write_entry(entry: re.Match[str]) -> str:
+    """Return an entry of the page of Python for mkdocstrings, with the place where its name is defined."""
+    name = entry[1]
+    module, attribute = digiclay.LATER.get(name, ("", name))
+    path = ".".join(filter(None, ("digiclay", module, attribute)))
+    options = [f"heading: digiclay.{name}", f"toc_label: {name}", "heading_level: 3"]
+    lines = (f"      {option}" for option in options + MORE_OPTIONS.get(name, []))
+    return "\n".join((f"::: {path}", "    options:", *lines))
+
+
 def make_python_page() -> str:
     """Return the page of what `digiclay` offers in Python."""
     arrays = [
@@ -314,7 +261,7 @@ def make_python_page() -> str:
     ]
     modes = [(str(int(mode)), mode.name.lower(), meaning) for mode, meaning in MEANINGS.items()]
     metrics = [(f"`{name}`", metric.unit, metric.worse, metric.doc) for name, metric in FIGURES.items()]
-    return PYTHON.format(
+    return ENTRY.sub(write_entry, PYTHON).format(
         arrays=write_table(("Name", "Shape", "Type", "Unit", "Meaning"), *arrays),
         modes=write_table(("Code", "Mode", "Meaning"), *modes),
         metrics=write_table(("Name", "Unit", "Worse if", "Meaning"), *metrics),
