@@ -24,10 +24,16 @@ from .report import Curves, Report, Steps, tabulate
 
 #: Pins along a side of the beds.
 SIDES, EXPORTED = (25, 101, 317, 1001), (25, 100, 316, 1000)
-#: The fingertip presses in the middle, rises and is dragged, over the same pins of every bed: s; x, z in mm.
+#: The fingertip presses in the middle, rises and is dragged, over the same pins of every bed: s; x,
+#: z in mm.
 PATH = ((0.0, 0.0, 42.0), (0.3, 0.0, 36.5), (0.8, 6.0, 40.0), (1.3, 12.0, 44.0), (1.6, 12.0, 60.0))
 #: Kind and format of exports: every format of the solid, and the other kinds in one.
-EXPORTS = (*(("solid", name) for name in FORMATS), ("surface", "stl"), ("pins", "stl"), ("features", "stl"))
+EXPORTS = (
+    *(("solid", name) for name in FORMATS),
+    ("surface", "stl"),
+    ("pins", "stl"),
+    ("features", "stl"),
+)
 SCALE = {
     "pins": "pins d",
     "taking part": "gathered .1f",
@@ -101,7 +107,10 @@ def _time_bed(side: int, repeats: int) -> dict[str, float]:
 def measure(arguments: Namespace, steps: Steps) -> Report:
     """Measure a control period on every size of bed."""
     sides, repeats = (SIDES[:3], 1) if arguments.quick else (SIDES, 5)
-    sizes = [_time_bed(side, repeats) for side in steps.through(sides, lambda side: f"{side * side} pins")]
+    sizes = [
+        _time_bed(side, repeats)
+        for side in steps.through(sides, lambda side: f"{side * side} pins")
+    ]
 
     lines = {
         label: [(size["pins"], size[key] * 1e6) for size in sizes]
@@ -156,7 +165,9 @@ def measure_export(arguments: Namespace, steps: Steps) -> Report:
     """Export every size: the smallest and the largest bed in all kinds and formats."""
     sides = EXPORTED[:2] if arguments.quick else EXPORTED
     jobs = [
-        (side, *what) for side in sides for what in EXPORTS[: None if side in (sides[0], sides[-1]) else 1]
+        (side, *what)
+        for side in sides
+        for what in EXPORTS[: None if side in (sides[0], sides[-1]) else 1]
     ]
     exports = [export(*job) for job in steps.through(jobs)]
     title = "\nA bed of waves, written to a temporary folder; memory besides the bed itself\n"

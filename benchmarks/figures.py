@@ -54,7 +54,9 @@ def read_plan() -> Record:
 def read_figures(page: str | None = None) -> list[Row]:
     """Return the figures of a page, or of all, as the text has them; OutputError where one is missing."""
     figures: list[Row] = []
-    for row in ({**USUAL, **given} for given in read_plan()["figure"] if page in (None, given["page"])):
+    for row in (
+        {**USUAL, **given} for given in read_plan()["figure"] if page in (None, given["page"])
+    ):
         text = (ROOT / row["page"]).read_text(encoding="utf-8")
         rest = text[text.find(row["head"]) :]
         for label, where in row["rows"] or [[row["after"], {}]]:
@@ -70,7 +72,9 @@ def read_figures(page: str | None = None) -> list[Row]:
                     "text": numbers[place - 1],
                 }
                 figures += (
-                    [{**row, **figure, "where": row["where"] | where | dict(*conditions)}] if metric else []
+                    [{**row, **figure, "where": row["where"] | where | dict(*conditions)}]
+                    if metric
+                    else []
                 )
     return figures
 
@@ -79,7 +83,11 @@ def list_measured_rows(text: str) -> list[str]:
     """Return the rows of a page's tables that have a measured number in a cell other than the first."""
     lines = (line for line in text.splitlines() if line.startswith("|") and not DATE.search(line))
     rows = (" ".join(line.split()) for line in lines)
-    return [row for row in rows if any(MEASURED.match(cell.strip()) for cell in row[1:-1].split("|")[1:])]
+    return [
+        row
+        for row in rows
+        if any(MEASURED.match(cell.strip()) for cell in row[1:-1].split("|")[1:])
+    ]
 
 
 def describe_uncompared(page: str) -> str:
@@ -106,7 +114,9 @@ def read_stored(name: str) -> tuple[list[Row], str]:
     lines = (RESULTS / name).read_text(encoding="utf-8").splitlines()
     words = ["git", "log", "-1", "--format=%h, %as", "--", name]
     stored = subprocess.run(words, cwd=RESULTS, capture_output=True, text=True, check=False).stdout
-    return list(csv.DictReader(line for line in lines if line[0] != "#")), f"{name}, {stored.strip()}"
+    return list(
+        csv.DictReader(line for line in lines if line[0] != "#")
+    ), f"{name}, {stored.strip()}"
 
 
 def find_stored(figure: Row) -> float:
@@ -114,7 +124,9 @@ def find_stored(figure: Row) -> float:
     wanted = figure["where"].items()
     rows = [row for row in read_stored(figure["stored"])[0] if wanted <= row.items()]
     if len(rows) != 1:
-        raise OutputError(f"{figure['stored']} must have one row of {figure['where']} (got {len(rows)}).")
+        raise OutputError(
+            f"{figure['stored']} must have one row of {figure['where']} (got {len(rows)})."
+        )
     return float(rows[0][figure["of"]])
 
 
@@ -122,7 +134,9 @@ def find_run(figure: Row) -> float:
     """Return a figure of a run of now, NaN where it has none."""
     metric, settings = figure["of"], tuple(figure["set"])
     limit = metric if metric in LIMITS else ""
-    return measure_scene(figure["scene"], settings, limit, errors=metric in ERRORS)[metric] or math.nan
+    return (
+        measure_scene(figure["scene"], settings, limit, errors=metric in ERRORS)[metric] or math.nan
+    )
 
 
 def judge(figure: Row) -> Row:
@@ -132,7 +146,13 @@ def judge(figure: Row) -> Row:
     now = UNITS.get(figure["unit"], 1.0) * (find_stored(figure) if stored else find_run(figure))
     near = abs(now - there) <= figure["off"] * there or round(now, digits) == there
     source = read_stored(stored)[1] if stored else "run"
-    return {**figure, "there": there, "now": now, "source": source, "stale": "" if near else "STALE"}
+    return {
+        **figure,
+        "there": there,
+        "now": now,
+        "source": source,
+        "stale": "" if near else "STALE",
+    }
 
 
 COLUMNS = {
@@ -156,6 +176,8 @@ def measure(arguments: argparse.Namespace, steps: Steps) -> Report:
     chosen = [figure for figure in figures if not (arguments.quick and figure["slow"])]
     rows = [judge(figure) for figure in steps.through(chosen, lambda figure: figure["page"])]
     stale = sum(row["stale"] != "" for row in rows)
-    left = filter(None, map(describe_uncompared, dict.fromkeys(figure["page"] for figure in figures)))
+    left = filter(
+        None, map(describe_uncompared, dict.fromkeys(figure["page"] for figure in figures))
+    )
     lines = [*tabulate(rows, COLUMNS, 4), "", *left, f"{stale} of {len(rows)} figures are stale."]
     return Report(lines, rows, failed=stale > 0)

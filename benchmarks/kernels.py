@@ -49,9 +49,13 @@ def list_scenes() -> dict[str, Scene]:
                 given.pop("blister", None)
             scenes[f"{name} {method}"] = make_scene(find(name), given)
     for method in CARRIED:
-        session = make_scene(find(SESSION), read_table(find(SESSION)) | {"control": {"method": method}})
+        session = make_scene(
+            find(SESSION), read_table(find(SESSION)) | {"control": {"method": method}}
+        )
         for name in list_trajectories(groups, DRAGS):
-            scenes[f"{RANDOM if name == SESSION else name} {method}"] = place_trial(session, name)[0]
+            scenes[f"{RANDOM if name == SESSION else name} {method}"] = place_trial(session, name)[
+                0
+            ]
     return scenes
 
 
@@ -63,7 +67,9 @@ def record(scene: Scene) -> Record:
         for state in periods(system, scene.trajectories(), begin(system), scene.periods)
         if state.period % EVERY == 0
     ]
-    return dict(zip(("height", "force", "mode"), map(np.array, zip(*rows, strict=True)), strict=True))
+    return dict(
+        zip(("height", "force", "mode"), map(np.array, zip(*rows, strict=True)), strict=True)
+    )
 
 
 def main() -> None:
@@ -89,7 +95,9 @@ def measure(arguments: argparse.Namespace, steps: Steps) -> Report:
                 differences = _compare(file, folders[REFERENCE] / file.name)
                 rows.append({"kernel": name, "run": names[int(file.stem)], **differences})
                 file.unlink()
-    kinds = [[row for row in rows if row["kernel"] == name] for name in kernels if name != REFERENCE]
+    kinds = [
+        [row for row in rows if row["kernel"] == name] for name in kernels if name != REFERENCE
+    ]
     shown = [
         {
             "kernel": kernel[0]["kernel"],

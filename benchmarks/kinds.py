@@ -9,7 +9,14 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from digiclay.commands.arguments import Help, Options, add_command, add_options, add_scene, whole_number
+from digiclay.commands.arguments import (
+    Help,
+    Options,
+    add_command,
+    add_options,
+    add_scene,
+    whole_number,
+)
 from digiclay.commands.parser import Parser
 from digiclay.commands.refusals import refuse_unwritable, refuse_without, refuse_without_blender
 from digiclay.commands.stop import FAILED
@@ -86,7 +93,10 @@ BENCHMARKS = {
         "engines on eight problems, by their adapters: error against run time",
         ("", "mine.py --out results"),
         {
-            "files FILE": {"nargs": "*", "help": "more adapters: Python files, see benchmarks/README.md"},
+            "files FILE": {
+                "nargs": "*",
+                "help": "more adapters: Python files, see benchmarks/README.md",
+            },
             "--make-references": "make the references of the problems again, instead (10 minutes)",
         },
         needs="scipy",
@@ -98,7 +108,9 @@ BENCHMARKS = {
         scene="",
     ),
     "scale": Benchmark("bed_size.measure", "a control period from 625 pins to a million"),
-    "export": Benchmark("bed_size.measure_export", "writing a bed as a mesh, from 625 pins to a million"),
+    "export": Benchmark(
+        "bed_size.measure_export", "writing a bed as a mesh, from 625 pins to a million"
+    ),
     "viewport": Benchmark(
         "tick_times.measure_viewport",
         "a tick of a live session in Blender, part by part (needs bpy)",
@@ -120,7 +132,11 @@ BENCHMARKS = {
         ("", "--fingers 10 --rate 200"),
         {
             "--rate HZ": (whole_number(1, 1000), "control periods a second; default: 1000", 1000),
-            "--fingers N": (whole_number(1, 10), "fingertips, those of a hand side by side; default: 1", 1),
+            "--fingers N": (
+                whole_number(1, 10),
+                "fingertips, those of a hand side by side; default: 1",
+                1,
+            ),
         },
         needs="websockets",
     ),
@@ -131,7 +147,13 @@ BENCHMARKS = {
         "kernels.measure",
         "sessions on other kernels of numpy's library: what the last bit changes",
         ("--quick", "--python other/bin/python --out results"),
-        {"--python FILE": {"action": "append", "default": [], "help": "also this Python, with its numpy"}},
+        {
+            "--python FILE": {
+                "action": "append",
+                "default": [],
+                "help": "also this Python, with its numpy",
+            }
+        },
     ),
     "figures": Benchmark(
         "figures.measure",
@@ -161,7 +183,9 @@ def parser() -> argparse.ArgumentParser:
         formatter_class=Help,
         allow_abbrev=False,
     )
-    kinds = top.add_subparsers(title="benchmarks", metavar="WHAT", required=True, parser_class=Parser)
+    kinds = top.add_subparsers(
+        title="benchmarks", metavar="WHAT", required=True, parser_class=Parser
+    )
     for name, benchmark in BENCHMARKS.items():
         examples = "\n".join(
             f"  python -m benchmarks {name} {words}".rstrip() for words in benchmark.examples

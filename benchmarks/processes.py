@@ -74,7 +74,9 @@ def measure_commits(arguments: Namespace, steps: Steps) -> Report:
     figures += [reduce(after / before, axis=0) for reduce in (np.median, np.min, np.max)]
     figures.append([*np.median(after[:, :-1] / after[:, :1], 0), None])
     keys = ("case", "old_us", "new_us", "ratio", "least", "largest", "to_first")
-    rows = [dict(zip(keys, row, strict=True)) for row in zip([*CASES, START], *figures, strict=True)]
+    rows = [
+        dict(zip(keys, row, strict=True)) for row in zip([*CASES, START], *figures, strict=True)
+    ]
     columns = {
         "case": "case",
         f"old, {names[0]} (µs)": "old_us .0f",
@@ -96,7 +98,9 @@ def extract(commit: str, folder: Path) -> Path:
     return folder
 
 
-def run_python(tree: Path, who: str, *words: str, python: str = sys.executable, **change: str) -> str:
+def run_python(
+    tree: Path, who: str, *words: str, python: str = sys.executable, **change: str
+) -> str:
     """Run Python on one core with the code in a folder, and a changed environment; return its output.
 
     `who`: of the message where it fails.
@@ -122,7 +126,9 @@ def run_commit(tree: Path, commit: str, count: int) -> list[float]:
     from resource import RUSAGE_CHILDREN, getrusage  # Windows has none
 
     cases = json.dumps(list(CASES.values()))
-    times: list[float] = json.loads(run_python(tree, f"commits: {commit}", "-c", PROGRAM, cases, str(count)))
+    times: list[float] = json.loads(
+        run_python(tree, f"commits: {commit}", "-c", PROGRAM, cases, str(count))
+    )
     starts = []
     for _ in range(5):
         before = sum(getrusage(RUSAGE_CHILDREN)[:2])
@@ -174,8 +180,26 @@ def _serve(seconds: float, rate: int, fingers: int) -> tuple[Record, int]:
     token = secrets.token_urlsafe(18)
     with tempfile.TemporaryDirectory() as folder:
         report = Path(folder) / "report.json"
-        command = [sys.executable, "-m", "digiclay", "serve", SCENE, "--rate", str(rate), "--port", "0"]
-        command += ["--osc-port", "0", f"--token={token}", "--report", str(report), "--seconds", str(seconds)]
+        command = [
+            sys.executable,
+            "-m",
+            "digiclay",
+            "serve",
+            SCENE,
+            "--rate",
+            str(rate),
+            "--port",
+            "0",
+        ]
+        command += [
+            "--osc-port",
+            "0",
+            f"--token={token}",
+            "--report",
+            str(report),
+            "--seconds",
+            str(seconds),
+        ]
         command += ["--out", str(Path(folder) / "recorded"), "--fingers", str(fingers)]
         with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
             assert process.stdout is not None

@@ -66,12 +66,16 @@ class Curves:
             panel.set_axis_off()
         labels = dict.fromkeys(label for lines in self.panels.values() for label in lines)
         for panel, (title, lines) in zip(axes, self.panels.items(), strict=False):
-            for label in labels:  # also those without points here: a label has one look in all panels
+            for (
+                label
+            ) in labels:  # also those without points here: a label has one look in all panels
                 panel.plot(*np.reshape(lines.get(label, ()), (-1, 2)).T, label=label)
             panel.set(title=title, xlabel=self.x, ylabel=self.y, xscale="log", yscale=self.scale)
             if self.scale == "linear":
                 panel.set_ylim(bottom=0.0)
-        figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=columns)
+        figure.legend(
+            *axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=columns
+        )
 
 
 class Steps(Line):
@@ -122,7 +126,9 @@ class Report:
     def write(self, out: Path, name: str, text: str) -> None:
         """Write ``name.md``, ``name.csv`` and ``name.png``; OutputError if they cannot be."""
         figures = io.StringIO(newline="")
-        writer = csv.DictWriter(figures, list(self.rows[0]) if self.rows else [], lineterminator="\n")
+        writer = csv.DictWriter(
+            figures, list(self.rows[0]) if self.rows else [], lineterminator="\n"
+        )
         writer.writeheader()
         writer.writerows(self.rows)
         with explain_os_error(f"Cannot write into {out}"):

@@ -18,8 +18,8 @@ COUNTS = (1, 4, 16, 32, 64, 128)
 DURATION = 4.0
 #: Goal of the runs a second, over those of one run at a time.
 GOAL = 8.0
-#: What varies from run to run: section, key, and from which to which share of its value. The first leaves the
-#: cells alike, the second does not.
+#: What varies from run to run: section, key, and from which to which share of its value. The first
+#: leaves the cells alike, the second does not.
 STUDIES: dict[str, tuple[str, str, float, float]] = {
     "control": ("control", "force_gain", 0.5, 1.2),
     "device": ("valve", "stroke", 0.9, 1.2),
@@ -39,7 +39,10 @@ def study(scene: Scene, name: str, count: int) -> list[Scene]:
     section, key, low, high = STUDIES[name]
     part: Any = scene.section(section)
     shares = [low + (high - low) * (i + 0.5) / count for i in range(count)]
-    return [scene.with_sections(**{section: replace(part, **{key: getattr(part, key) * s})}) for s in shares]
+    return [
+        scene.with_sections(**{section: replace(part, **{key: getattr(part, key) * s})})
+        for s in shares
+    ]
 
 
 def _compare(scene: Scene, name: str, count: int, repeats: int) -> list[Row]:
@@ -58,7 +61,11 @@ def _compare(scene: Scene, name: str, count: int, repeats: int) -> list[Row]:
     rows: list[Row] = []
     for what, pair in works.items():
         single, all_runs = time_by_turns(pair, repeats)
-        speeds = {"alone": 1.0 / single, "together": count / all_runs, "times": count * single / all_runs}
+        speeds = {
+            "alone": 1.0 / single,
+            "together": count / all_runs,
+            "times": count * single / all_runs,
+        }
         rows.append({"study": name, "runs": count, "what": what, **speeds})
     return rows
 
@@ -88,4 +95,6 @@ def measure(arguments: argparse.Namespace, steps: Steps) -> Report:
             what: [(row["runs"], row["times"]) for row in of_study if row["what"] == what]
             for what in dict.fromkeys(row["what"] for row in rows)
         }
-    return Report(lines, rows, Curves(panels, "runs in one call", "runs a second, to one at a time"))
+    return Report(
+        lines, rows, Curves(panels, "runs in one call", "runs a second, to one at a time")
+    )

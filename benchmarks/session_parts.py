@@ -36,7 +36,9 @@ from .report import Report, Steps, tabulate, time_by_turns
 def replaying(scene: Scene, commands: Floats) -> System:
     """Return a scene's system that plays commands, (t, n), one row a control period."""
     system = assemble(scene)
-    return replace(system, controller=Replay(system.grid, commands), rows=replace(system.rows, control=0))
+    return replace(
+        system, controller=Replay(system.grid, commands), rows=replace(system.rows, control=0)
+    )
 
 
 def run(scene: Scene, commands: Floats | None = None) -> tuple[System, Iterator[State]]:
@@ -49,7 +51,8 @@ def solve(scene: Scene, commands: Floats | None = None) -> list[Floats]:
     """Return heights, (t, n), m, total force, (t,), N, and commands, (t, n), at the ends of the periods."""
     system, states = run(scene, commands)
     rows = [
-        (state.row(0), state.row(system.rows.force).sum(), state.row(system.rows.command)) for state in states
+        (state.row(0), state.row(system.rows.force).sum(), state.row(system.rows.command))
+        for state in states
     ]
     return [np.array(column) for column in zip(*rows, strict=True)]
 
@@ -60,8 +63,18 @@ def simulate(system: System, scene: Scene, count: int) -> None:
         pass
 
 
-#: Methods that make an array or bytes: Python's profiler does not see those that a `functools.partial` calls.
-ARRAY_METHODS = ("take", "copy", "astype", "dot", "reshape", "tobytes", "__getitem__", "__setitem__")
+#: Methods that make an array or bytes: Python's profiler does not see those that a
+#: `functools.partial` calls.
+ARRAY_METHODS = (
+    "take",
+    "copy",
+    "astype",
+    "dot",
+    "reshape",
+    "tobytes",
+    "__getitem__",
+    "__setitem__",
+)
 #: Methods that reach `__array_ufunc__` by themselves, or make no array.
 REDUCTIONS = ("any", "all", "sum", "min", "max", "item", "tolist", "view")
 #: Files whose calls are numpy's own, or this counter's.
@@ -78,8 +91,13 @@ class Counted(np.ndarray[Any, Any]):
     __array_priority__ = 1.0
     ledger: ClassVar[Ledger] = Counter()
 
-    def __array_ufunc__(self, ufunc: Any, method: str, *inputs: Any, out: Any = None, **named: Any) -> Any:
-        name, named = ufunc.__name__ if method == "__call__" else f"{ufunc.__name__}.{method}", _plain(named)
+    def __array_ufunc__(
+        self, ufunc: Any, method: str, *inputs: Any, out: Any = None, **named: Any
+    ) -> Any:
+        name, named = (
+            ufunc.__name__ if method == "__call__" else f"{ufunc.__name__}.{method}",
+            _plain(named),
+        )
         if out is not None:
             named["out"] = _plain(out)
         result = _call(name, getattr(ufunc, method), inputs, named)
@@ -139,7 +157,9 @@ def note_methods() -> Iterator[None]:
         if type(owner) is np.ndarray:
             if called.__name__ not in REDUCTIONS:
                 Counted.ledger[called.__name__] += 1
-        elif not isinstance(owner, (np.ndarray, np.ufunc)) and str(called.__module__).startswith("numpy"):
+        elif not isinstance(owner, (np.ndarray, np.ufunc)) and str(called.__module__).startswith(
+            "numpy"
+        ):
             Counted.ledger[called.__name__] += 1
 
     former = sys.getprofile()
@@ -150,7 +170,9 @@ def note_methods() -> Iterator[None]:
         sys.setprofile(former)
 
 
-def period_calls(system: System, trajectories: Sequence[Trajectory], count: int) -> tuple[list[int], Ledger]:
+def period_calls(
+    system: System, trajectories: Sequence[Trajectory], count: int
+) -> tuple[list[int], Ledger]:
     """Return how many numpy calls each of the first `count` control periods makes, and which.
 
     The fingertips' poses are not counted: they are computed for many periods at once.
@@ -189,8 +211,8 @@ PARTS = {
     "observe": "a row of the history",
     "the rest": "gathering the cells that move, and putting them back",
 }
-#: Part of the core's files, by the beginning of their path. A function's time counts for its file's part;
-#: that of functions of other files (numpy's, small helpers) for their callers'.
+#: Part of the core's files, by the beginning of their path. A function's time counts for its file's
+#: part; that of functions of other files (numpy's, small helpers) for their callers'.
 FILES = {
     "model/trajectory": "contact",
     "model/touch": "contact",
@@ -276,7 +298,9 @@ def divide_time(profile: cProfile.Profile, whole: float) -> dict[str, float]:
     for entry in profile.getstats():
         part = _find_part(entry.code)
         if part:
-            called = sum(below.totaltime for below in entry.calls or () if not _find_part(below.code))
+            called = sum(
+                below.totaltime for below in entry.calls or () if not _find_part(below.code)
+            )
             spent[part] += entry.inlinetime + called
     spent["the rest"] = whole - sum(time for part, time in spent.items() if part != "the rest")
     return spent
@@ -316,7 +340,10 @@ def measure_terms(arguments: Namespace, steps: Steps) -> Report:
     if rest is not scene:
         scenes["all of these"] = rest
     repeats = 1 if arguments.quick else 3
-    rows = [{"scene": name, **_compare(scenes[name], full, repeats)} for name in steps.through(list(scenes))]
+    rows = [
+        {"scene": name, **_compare(scenes[name], full, repeats)}
+        for name in steps.through(list(scenes))
+    ]
     title = (
         f"\n{scene.name}: {scene.cells} cells, {scene.periods} control periods of "
         f"{scene.simulation.control_period * 1e3:g} ms.\n"

@@ -24,8 +24,8 @@ from .session_parts import simulate
 COUNTS = (1, 2, 5, 10)
 PLACES = [(x, y) for y in (-18.0, 18.0) for x in (0.0, 15.0, -15.0, 30.0, -30.0)]
 METHODS = ("", "virtual_master", "cell_states", "hybrid")
-#: Speed of all drags and rises, mm/s; height of a lifted, a sunk and a pressing fingertip, mm: one that is
-#: 2 mm higher Method II does not follow.
+#: Speed of all drags and rises, mm/s; height of a lifted, a sunk and a pressing fingertip, mm: one
+#: that is 2 mm higher Method II does not follow.
 DRAG, RISE, UP, DOWN, PRESSED = 10.0, 6.0, 46.0, 32.0, 36.5
 #: All cases are turned and shifted, rad and m: along the rows of pins symmetry would hide faults.
 TURN, SHIFT = 0.3, (0.7e-3, -0.4e-3)
@@ -117,7 +117,8 @@ def make_scene(method: str, ways: list[Way], size: int = 40, turn: float = TURN)
 
     # Of points at one time the last.
     paths = [
-        Path("linear", tuple(lay(*p) for p in {round(p[0], 9): p for p in way}.values())) for way in ways
+        Path("linear", tuple(lay(*p) for p in {round(p[0], 9): p for p in way}.values()))
+        for way in ways
     ]
     return replace(
         paper,
@@ -184,7 +185,8 @@ def measure(arguments: argparse.Namespace, steps: Steps) -> list[Report]:
     for method in METHODS:
         single, *others = measure_cost(method, count, repeats)
         ratios = {
-            f"times_{count}": several / single for count, several in zip(COUNTS[1:], others, strict=True)
+            f"times_{count}": several / single
+            for count, several in zip(COUNTS[1:], others, strict=True)
         }
         costs.append({"method": method or "no control", "one_s": single, **ratios})
         steps(method or "no control")
@@ -200,7 +202,9 @@ def measure(arguments: argparse.Namespace, steps: Steps) -> list[Report]:
                 (metrics["contact_share"] or 0.0) / (reference["contact_share"] or 1.0)
                 for metrics, reference in both
             )
-            near.append({"case": name, "method": method, **rfd, "force_N": largest, "contact": contact})
+            near.append(
+                {"case": name, "method": method, **rfd, "force_N": largest, "contact": contact}
+            )
         steps(name)
     return [
         Report(tabulate(costs, COST), costs, name="fingers_cost"),

@@ -67,11 +67,29 @@ EASY = "easy"
 #: Everything at once.
 ALL = "all together"
 SHALLOW = ((0.0, 0.0, 0.5e-3), (0.15, 0.0, -0.4e-3), (0.25, 1e-3, -0.4e-3), (0.4, 3e-3, 1.5e-3))
-DEEP = ((0.0, 0.0, 1e-3), (0.12, 0.0, 1e-3), (0.16, 0.0, -15e-3), (0.3, 1e-3, -15e-3), (0.5, 3e-3, 3e-3))
-JUMP = ((0.0, 0.0, 48e-3), (0.1995, 0.0, 48e-3), (0.2, 0.0, -2e-3), (0.35, 0.0, -2e-3), (0.5, 3e-3, 3e-3))
-THROUGH = ((0.0, 0.0, 2e-3), (0.1995, 0.0, 2e-3), (0.2, 0.0, -60e-3), (0.35, 0.0, -60e-3), (0.5, 3e-3, 3e-3))
-#: Jumps of 100 mm to and fro within 1, 5, 20 and 50 ms, at a depth of 4 mm: when they begin and end, s, and
-#: whether the finger is away then; from the third on if it is there first.
+DEEP = (
+    (0.0, 0.0, 1e-3),
+    (0.12, 0.0, 1e-3),
+    (0.16, 0.0, -15e-3),
+    (0.3, 1e-3, -15e-3),
+    (0.5, 3e-3, 3e-3),
+)
+JUMP = (
+    (0.0, 0.0, 48e-3),
+    (0.1995, 0.0, 48e-3),
+    (0.2, 0.0, -2e-3),
+    (0.35, 0.0, -2e-3),
+    (0.5, 3e-3, 3e-3),
+)
+THROUGH = (
+    (0.0, 0.0, 2e-3),
+    (0.1995, 0.0, 2e-3),
+    (0.2, 0.0, -60e-3),
+    (0.35, 0.0, -60e-3),
+    (0.5, 3e-3, 3e-3),
+)
+#: Jumps of 100 mm to and fro within 1, 5, 20 and 50 ms, at a depth of 4 mm: when they begin and
+#: end, s, and whether the finger is away then; from the third on if it is there first.
 JUMPS = (0.0, 0.05, 0.051, 0.15, 0.155, 0.25, 0.27, 0.35, 0.4, 0.5)
 AWAY = (1.0, 1.0, 0.0, 0.0) * 3
 #: Fingers beside the first.
@@ -93,7 +111,8 @@ ONE_PIN = {
 def _jumping(across: float, up: float, first: int = 0) -> Case:
     """Return a case whose finger jumps by so much, m, out of a press or into one."""
     path = tuple(
-        (time, across * far, up * far - 4e-3) for time, far in zip(JUMPS, AWAY[first:], strict=False)
+        (time, across * far, up * far - 4e-3)
+        for time, far in zip(JUMPS, AWAY[first:], strict=False)
     )
     return Case(path=path, why="jumps within a step, and e^(m x) = 3000", straight=True)
 
@@ -102,7 +121,9 @@ CASES: dict[str, Case] = {
     EASY: Case(),
     "m x 10": Case({"contact": {"exponent": 2e4}}, path=SHALLOW),
     "m x 10, pressed as deep": Case({"contact": {"exponent": 2e4}}, why="e^(m x) = 1e21"),
-    "press to e^(m x) = 1e12": Case(path=DEEP, why="forces are differences of 1e9 N", straight=True),
+    "press to e^(m x) = 1e12": Case(
+        path=DEEP, why="forces are differences of 1e9 N", straight=True
+    ),
     "tau_v 0.1 ms": Case({"valve_lag": {"time_constant": 1e-4}}),
     "tau_v 0 (absent)": Case({"valve_lag": "absent"}),
     "viscosity x 1000": Case({"fluid": {"viscosity": 1.6e-3}}, borrowed=True),
@@ -238,7 +259,9 @@ def allowed_range(height: Floats, force: Floats, stroke: float) -> str:
     return "negative force" if force.min() < 0.0 else ""
 
 
-def _run(system: System, trajectories: Sequence[Trajectory], count: int) -> tuple[Floats, Floats, float]:
+def _run(
+    system: System, trajectories: Sequence[Trajectory], count: int
+) -> tuple[Floats, Floats, float]:
     """Return heights and commands, (t, n), and the largest force, N; AssertionError at a broken invariant."""
     rows, heights, commands, most = system.rows, [], [], 0.0
     start = begin(system)
@@ -247,7 +270,9 @@ def _run(system: System, trajectories: Sequence[Trajectory], count: int) -> tupl
         height, force = state.row(0), state.row(rows.force)
         wrong = allowed_range(height, force, system.cell.actuator.stroke)
         assert not wrong, wrong
-        within = not bounded or _within_reach(system, trajectories, state.period - 1, before, height)
+        within = not bounded or _within_reach(
+            system, trajectories, state.period - 1, before, height
+        )
         assert within, "a pin where none can be"
         before = height
         heights.append(height)
@@ -264,7 +289,9 @@ def _within_reach(
     fingertip, times = system.cell.touch.fingertip, period * system.period + system.instants
     places = system.grid.compute_basis(np.arange(system.grid.count))
     outlines = [fingertip.outline(trajectory.poses(times)) for trajectory in trajectories]
-    under = np.min([compute_underside(*compute_forms(outline), places) for outline in outlines], axis=0)
+    under = np.min(
+        [compute_underside(*compute_forms(outline), places) for outline in outlines], axis=0
+    )
     lowest, highest = find_speeds(system.cell).reach(before, under, system.period)
     # Rounding: these undersides are computed from other products.
     return bool((after >= lowest - 1e-12).all() and (after <= highest + 1e-12).all())
@@ -279,7 +306,9 @@ def period_of(step: float) -> float:
 def commands_of(name: str) -> Floats:
     """Record the commands of a case, (t, n), each of which lasts for `HOLD`."""
     case = CASES[name]
-    return case.factor * _run(*_prepare(EASY if case.borrowed else name, "bernoulli", 1e-3, HOLD))[1]
+    return (
+        case.factor * _run(*_prepare(EASY if case.borrowed else name, "bernoulli", 1e-3, HOLD))[1]
+    )
 
 
 def live(name: str, stepper: str, step: float) -> Floats:
@@ -332,7 +361,9 @@ def outcome(name: str, exact: Floats, stepper: str, step: float) -> Outcome:
         with strict():
             heights = replayed(name, stepper, step, period)
     except DivergenceError as wrong:
-        return Outcome(float("nan"), stopped=f"{wrong.quantity} {wrong.value:.2g} at {wrong.time:.3g} s")
+        return Outcome(
+            float("nan"), stopped=f"{wrong.quantity} {wrong.value:.2g} at {wrong.time:.3g} s"
+        )
     except (FloatingPointError, RuntimeWarning) as wrong:
         return Outcome(float("nan"), stopped=str(wrong).partition(" encountered")[0])
     except AssertionError as wrong:
@@ -362,7 +393,9 @@ def measure(arguments: argparse.Namespace, steps: Steps) -> Report:
             most = largest_force(name)
         for stepper in steppers:
             outcomes = [outcome(name, exact, stepper, step) for step in STEPS]
-            lines.append([name if stepper == steppers[0] else "", stepper, *(run.cell for run in outcomes)])
+            lines.append(
+                [name if stepper == steppers[0] else "", stepper, *(run.cell for run in outcomes)]
+            )
             rows += [
                 {
                     "case": name,
@@ -381,7 +414,9 @@ def measure(arguments: argparse.Namespace, steps: Steps) -> Report:
         calls = float("nan") if CASES[name].others else calls_of(name)
         ratio = calls / (costs[0]["calls"] if costs else calls)
         why = CASES[name].why
-        costs.append({"case": name, "force": most, "off": off, "calls": calls, "ratio": ratio, "why": why})
+        costs.append(
+            {"case": name, "force": most, "off": off, "calls": calls, "ratio": ratio, "why": why}
+        )
     took = time.process_time() - started
     return Report(list(_list_lines(lines, costs, broken, took)), rows)
 
@@ -402,7 +437,9 @@ def _list_broken(name: str, outcomes: list[Outcome], off: float) -> Iterator[str
             yield f"{name}, live, {step * 1e3:g} ms: {wrong}"
 
 
-def _list_lines(lines: list[list[str]], costs: list[Row], broken: list[str], took: float) -> Iterator[str]:
+def _list_lines(
+    lines: list[list[str]], costs: list[Row], broken: list[str], took: float
+) -> Iterator[str]:
     """Give the lines of the report."""
     yield "\nLargest height error, µm, under recorded commands of 100 ms each, by step; or why it stopped."
     yield f"The control period is {PERIOD * 1e3:g} ms, or the step where that is longer. A mark ! means"

@@ -146,8 +146,9 @@ def _time_parts() -> Iterator[defaultdict[str, float]]:
         ):
             timed = partial(add_time, part, getattr(module, name))
             left.enter_context(patch.object(module, name, timed))
-        # Every control period that is due is simulated, however little of the machine others leave, and all
-        # that the hand has drawn: a tick that leaves some out takes less time than it is to be measured with.
+        # Every control period that is due is simulated, however little of the machine others leave,
+        # and all that the hand has drawn: a tick that leaves some out takes less time than it is to
+        # be measured with.
         left.enter_context(patch.object(live_session, "SHARE", EVERY_PERIOD))
         left.enter_context(patch.object(live_session, "find_spare", lambda *_: EVERY_PERIOD))
         gc.callbacks.append(watch)
@@ -209,7 +210,10 @@ def measure(arguments: argparse.Namespace, steps: Steps) -> Report:
     keep_to_one_core()
     count = QUICK if arguments.quick else FULL
     keys = [f"share_{share:g}_s" for share in SHARES]
-    columns = {"": "part", **{name: f"{key} .2f 1e3" for name, key in zip(NAMES, keys, strict=True)}}
+    columns = {
+        "": "part",
+        **{name: f"{key} .2f 1e3" for name, key in zip(NAMES, keys, strict=True)},
+    }
     rows: list[Row] = []
     histograms: dict[str, tuple[Floats, float]] = {}
     lines = [
@@ -233,7 +237,10 @@ def measure(arguments: argparse.Namespace, steps: Steps) -> Report:
         spent = parts["whole tick"]
         name = f"{bed.rows} x {bed.columns} at {1e3 * bed.pitch:g} mm, {count} ticks"
         kept_to = 100.0 * np.mean(spent < bed.goal)
-        lines += [f"\n{name}; {kept_to:.2f} % under {1e3 * bed.goal:g} ms\n", *tabulate(of_bed, columns)]
+        lines += [
+            f"\n{name}; {kept_to:.2f} % under {1e3 * bed.goal:g} ms\n",
+            *tabulate(of_bed, columns),
+        ]
         histograms[name] = spent, bed.goal
         rows += of_bed
     return Report(lines, rows, partial(_draw, beds=histograms), (7.2, 2.1 * len(BEDS)))
@@ -334,22 +341,27 @@ def measure_bed(rows: int, columns: int, ticks: int) -> dict[str, float]:
         bridge.place_fingertips(bed, pose[None], [find_ellipsoid(scene)])
         bpy.context.view_layer.update()
 
-    with open_session(make_scene("paper", Layout(rows=rows, columns=columns), "virtual_master")) as bed:
+    with open_session(
+        make_scene("paper", Layout(rows=rows, columns=columns), "virtual_master")
+    ) as bed:
         timed = time_ticks(move, SPAN, ticks)
         growth = _measure_growth(move, WARM_UP + ticks, ticks)
     parts = {
         f"{stage}_s": float(np.median(sum(timed.parts[name] for name in names)))
         for stage, names in STAGES.items()
     }
-    whole = {"tick_s": float(np.median(timed.elapsed)), "tick_95_s": float(np.quantile(timed.elapsed, 0.95))}
+    whole = {
+        "tick_s": float(np.median(timed.elapsed)),
+        "tick_95_s": float(np.quantile(timed.elapsed, 0.95)),
+    }
     return {"pins": rows * columns, **parts, **whole, "growth_bytes": growth}
 
 
 def _measure_growth(move: Callable[[int], None], first: int, ticks: int) -> int:
     """Return by how much Python's least memory has risen from some ticks to as many later, bytes.
 
-    The least, because a session's arrays and its monitor of the error come and go; a leak never goes.
-    The first of three rounds replaces what was allocated before the counting began.
+    The least, because a session's arrays and its monitor of the error come and go; a leak never
+    goes. The first of three rounds replaces what was allocated before the counting began.
     """
     tracemalloc.start()
     try:
@@ -381,9 +393,13 @@ def measure_skin(rows: int, columns: int, updates: int) -> dict[str, float]:
                 view.set_form(bed, shown)
                 view.write_setting(bed, MEMBRANE, kind == "membrane")
                 for count in range(IN_A_ROW):
-                    bridge.write_cells(bed.data, instant.position, instant.height + noise[count % 2])
+                    bridge.write_cells(
+                        bed.data, instant.position, instant.height + noise[count % 2]
+                    )
                     started = time.process_time()
                     bpy.context.evaluated_depsgraph_get()
                     if count:
                         times.append(time.process_time() - started)
-    return {f"{s}_{kind}_s": statistics.median(t) for (s, kind), t in zip(SHOWN, spent, strict=True)}
+    return {
+        f"{s}_{kind}_s": statistics.median(t) for (s, kind), t in zip(SHOWN, spent, strict=True)
+    }

@@ -190,7 +190,9 @@ def reference_force(results: Results) -> Evidence:
     for name in ("rfd", "rfd_shaping"):
         smaller, greater = one[name], two[name]
         evidence.holds.append(bool(smaller and greater and greater > smaller))
-    evidence.holds += [results.simple[ONE, name].rfd < results.simple[TWO, name].rfd for name in WAYS]
+    evidence.holds += [
+        results.simple[ONE, name].rfd < results.simple[TWO, name].rfd for name in WAYS
+    ]
     return evidence
 
 
@@ -247,7 +249,9 @@ def trade(results: Results) -> Evidence:
         (low, slow), (high, end) = calm[0], calm[-1]
         best, quick = min(calm, key=lambda one: one[1])
         ends = "and oscillates beyond" if len(calm) < len(row) else "the highest tried"
-        times = f"{slow:.2f} s at K_f = {low:g}, {quick:.2f} s at {best:g}, {end:.2f} s at {high:g} 1/N"
+        times = (
+            f"{slow:.2f} s at K_f = {low:g}, {quick:.2f} s at {best:g}, {end:.2f} s at {high:g} 1/N"
+        )
         evidence.add(name, f"{times}, {ends}", len(calm) < len(row), quick < QUICKER * slow)
     onsets = [onset_among(row)[1] or math.inf for row in results.sweeps.values()]
     evidence.holds.append(sorted(onsets, reverse=True) == onsets)
@@ -265,7 +269,11 @@ def blister(results: Results) -> Evidence:
         if method in METHODS:
             one = blister_section(done)
             high = "high" if shape == "convex" else "deep"
-            rim = f", rim {one.pins * MM:.1f} mm beyond it" if one.pins > LIMITS.rim * one.relief else ""
+            rim = (
+                f", rim {one.pins * MM:.1f} mm beyond it"
+                if one.pins > LIMITS.rim * one.relief
+                else ""
+            )
             text = (
                 f"{one.relief * MM:.1f} mm {high} in the middle{rim}, section rms {one.rms * MM:.1f}, "
                 f"at most {one.largest * MM:.1f} mm from its profile"
@@ -273,7 +281,9 @@ def blister(results: Results) -> Evidence:
             )
             evidence.add(f"{SHORT[method]}, {shape}, {profile}", text, one.meets(LIMITS))
     forms = {method: results.blisters[method, "convex", "cone"].scene.blister for method in METHODS}
-    size = ", ".join(f"{SHORT[method]} {form.radius * MM:g} mm" for method, form in forms.items() if form)
+    size = ", ".join(
+        f"{SHORT[method]} {form.radius * MM:g} mm" for method, form in forms.items() if form
+    )
     evidence.why = (
         f"The fingertip is held {scenes.TALL * MM:g} mm over the bed, or {-scenes.SINK * MM:g} mm in it, and "
         f"the pins press into it. A section holds as those of Fig. 10 do. Radius: {size}; {SHORT[TWO]} "
@@ -293,7 +303,9 @@ def freezing(results: Results) -> Evidence:
         if offset is None or uneven is None:
             evidence.add(SHORT[method], "left nothing behind", False)
         else:
-            text = f"left {offset * MM:.2f} mm over the fingertip's path, even to {uneven * MM:.2f} mm"
+            text = (
+                f"left {offset * MM:.2f} mm over the fingertip's path, even to {uneven * MM:.2f} mm"
+            )
             evidence.add(SHORT[method], text, uneven < 1e-3)
     return evidence
 
@@ -348,7 +360,9 @@ def rise(results: Results) -> Evidence:
             f"{more.followers:.1f} and {less.followers:.1f} cells follow, "
             f"RFD {more.follows.rfd:.3f} and {less.follows.rfd:.3f} N{_write_losses(less)}"
         )
-        evidence.add(name, text, more.force > MUCH * less.force, more.follows.rfd > MUCH * less.follows.rfd)
+        evidence.add(
+            name, text, more.force > MUCH * less.force, more.follows.rfd > MUCH * less.follows.rfd
+        )
     return evidence
 
 
@@ -398,14 +412,20 @@ def radius(results: Results) -> Evidence:
         name = f"{near.noise * MM:g} mN, {kind}"
         text = f"{_scatter(near.scatter)} with and {_scatter(wide.scatter)} without the radius"
         measured = near.scatter is not None and wide.scatter is not None
-        evidence.add(name, text, measured and (near.scatter or 0.0) <= REJECTED * (wide.scatter or 0.0))
+        evidence.add(
+            name, text, measured and (near.scatter or 0.0) <= REJECTED * (wide.scatter or 0.0)
+        )
         if near.losses or wide.losses:
             lost.append(f"{name}: {near.losses} and {wide.losses} times")
     evidence.why = (
         f"It holds where the radius leaves {REJECTED:.0%} at most of what there is without it. Without it "
         "all cells the fingertip may touch are looked at. Where readings below five standard deviations "
         "count as none, as they do in this program, few are left outside the radius for it to reject. "
-        + (f"The fingertip was lost with and without the radius: {', '.join(lost)}." if lost else "")
+        + (
+            f"The fingertip was lost with and without the radius: {', '.join(lost)}."
+            if lost
+            else ""
+        )
     )
     return evidence
 
@@ -419,7 +439,11 @@ def varied(variant: str, results: Results) -> Evidence:
     title, evidence = variant.capitalize() if variant == GAUSSIAN else variant, Evidence()
     for method, name, changed, usual in _list_drags(results, variant):
         # What fails anyway says nothing of the variant.
-        holds = [changed.follows.meets(results.criterion)] if usual.follows.meets(results.criterion) else []
+        holds = (
+            [changed.follows.meets(results.criterion)]
+            if usual.follows.meets(results.criterion)
+            else []
+        )
         text = f"{_write_drag(usual)}, {title} {_write_drag(changed)}"
         evidence.add(f"{SHORT[method]}, {name}", text, *holds)
     evidence.why = "It holds where what is followed without the change is followed with it. "

@@ -32,8 +32,12 @@ def draw_heights(sessions: Mapping[str, Session], title: str) -> Any:
     cells = session_cells(sessions[METHODS[0]].history)
     spots = sessions[METHODS[0]].history["position"][cells] * MM
     names = [f"{name} ({x:.0f}, {y:.0f})" for name, (x, y) in zip(LETTERS, spots, strict=False)]
-    lowest = min(float(one.history["height"][:, cells].min()) for one in sessions.values()) * MM - 2.0
-    highest = max(float(one.history["height"][:, cells].max()) for one in sessions.values()) * MM + 2.0
+    lowest = (
+        min(float(one.history["height"][:, cells].min()) for one in sessions.values()) * MM - 2.0
+    )
+    highest = (
+        max(float(one.history["height"][:, cells].max()) for one in sessions.values()) * MM + 2.0
+    )
     strongest = 1.1 * max(float(one.history["total_force"].max()) for one in sessions.values())
     methods = list_methods(sessions)
     across = 0.5 + 6.5 * len(methods)
@@ -44,7 +48,9 @@ def draw_heights(sessions: Mapping[str, Session], title: str) -> Any:
             heights = place(f"{method} heights", left, 3.5, 5.75, 2.7)
             force = place(f"{method} force", left, 0.7, 5.75, 2.0)
             for name, color, cell in zip(names, LINES, cells, strict=False):
-                heights.plot(history["time"], history["height"][:, cell] * MM, color=color, label=name)
+                heights.plot(
+                    history["time"], history["height"][:, cell] * MM, color=color, label=name
+                )
             shade_contact(heights, history)
             draw_force(force, history, history["set_point"], "set point")
             ends = history["time"][0], history["time"][-1]
@@ -56,7 +62,10 @@ def draw_heights(sessions: Mapping[str, Session], title: str) -> Any:
                 axes.yaxis.label.set_visible(column == 0)
             heights.xaxis.label.set_visible(False)
         figure.text(0.85 / across, 1.0 - 0.78 / 7.4, "Cells at x, y (mm):")
-        beside: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (2.77 / across, 1.0 - 0.5 / 7.4)}
+        beside: dict[str, Any] = {
+            "loc": "upper left",
+            "bbox_to_anchor": (2.77 / across, 1.0 - 0.5 / 7.4),
+        }
         figure.legend(*heights.get_legend_handles_labels(), ncols=6, **beside)
     return figure
 
@@ -78,7 +87,11 @@ def details(results: Results) -> Any:
             press, lift = (_within(time, ends) for ends in (PRESSING, LIFTING))
             for number, cell in enumerate(cells):
                 away = f"{session.history['position'][cell, 0] * MM:.0f} mm"
-                style: dict[str, Any] = {"color": LINES[number], "linewidth": 1.5, "label": f"x = {away}"}
+                style: dict[str, Any] = {
+                    "color": LINES[number],
+                    "linewidth": 1.5,
+                    "label": f"x = {away}",
+                }
                 heights.plot(time[press], height[press, number], **style)
                 swing.plot(time[lift], _swinging(time[lift], height[lift, number]) * 1e3, **style)
             heights.set(title=name, xlim=PRESSING, ylim=(36.5, 40.5), ylabel="height (mm)")
@@ -108,7 +121,9 @@ def _under(session: Session) -> list[int]:
     """Return the cell the fingertip first presses, and some beside it in its row, outwards."""
     place, first = session.history["position"], session.history["fingertip"][0, :2]
     pitch = session.scene.layout.pitch
-    return [int(np.argmin(np.hypot(*(place - first - (step * pitch, 0.0)).T))) for step in range(0, 5)]
+    return [
+        int(np.argmin(np.hypot(*(place - first - (step * pitch, 0.0)).T))) for step in range(0, 5)
+    ]
 
 
 def _within(time: Any, ends: tuple[float, float]) -> Any:
@@ -125,11 +140,20 @@ def surfaces(results: Results) -> Any:
     """Draw the final surfaces in relief and from above, side by side for all methods."""
     methods = list_methods(results.session)
     across = 0.3 + 6.6 * len(methods)
-    with canvas(across, 9.6, f"Final surfaces. The paper's session{results.slowness}") as (figure, place):
+    with canvas(across, 9.6, f"Final surfaces. The paper's session{results.slowness}") as (
+        figure,
+        place,
+    ):
         for column, method in enumerate(methods):
             history, left = results.session[method].history, 6.6 * column
             relief = place(
-                f"{method} relief", left - 0.9, 3.9, 8.0, 5.9, projection="3d", computed_zorder=False
+                f"{method} relief",
+                left - 0.9,
+                3.9,
+                8.0,
+                5.9,
+                projection="3d",
+                computed_zorder=False,
             )
             room = (left + 0.3) / across, 4.75 / 9.6, (left + 6.3) / across, 8.7 / 9.6
             draw_relief(relief, history, room)
@@ -154,7 +178,9 @@ def surface_rows(sessions: Mapping[str, Session]) -> Iterator[tuple[str, float, 
 
 def profiles(results: Results) -> Any:
     """Draw sections through the final surfaces, formed and asked for."""
-    drawn = {method: list(sections(results.session[method])) for method in list_methods(results.session)}
+    drawn = {
+        method: list(sections(results.session[method])) for method in list_methods(results.session)
+    }
     count = len(drawn[METHODS[0]])
     with canvas(13.5, 8.6, f"Sections. The paper's session{results.slowness}") as (figure, place):
         for number in range(count):
@@ -166,7 +192,12 @@ def profiles(results: Results) -> Any:
                 asked: dict[str, Any] = {"color": color, "linewidth": 1.1, "linestyle": DASHES}
                 axes.plot(one.along * MM, one.asked * MM, label=f"{name}, asked for", **asked)
                 axes.plot(
-                    one.along * MM, one.formed * MM, color=color, marker=marker, markersize=4.5, label=name
+                    one.along * MM,
+                    one.formed * MM,
+                    color=color,
+                    marker=marker,
+                    markersize=4.5,
+                    label=name,
                 )
             axes.set(title=one.name, xlabel="y (mm)" if one.name.startswith("across") else "x (mm)")
             axes.set_ylabel("height over rest (mm)")

@@ -35,7 +35,10 @@ def compare_methods(results: Results) -> Iterator[str]:
 def _list_rows(results: Results, methods: list[str]) -> Iterator[tuple[str, list[float | None]]]:
     """Give the name and the values of each row of the table."""
     for key, name, factor, unit in TEXTS["metrics"]:
-        yield f"{name} ({unit})", _scale([results.session[each].metrics.get(key) for each in methods], factor)
+        yield (
+            f"{name} ({unit})",
+            _scale([results.session[each].metrics.get(key) for each in methods], factor),
+        )
     for way in WAYS:
         follows = [results.simple.get((method, way)) for method in methods]
         name = f"drag at {PAPER_SPEED * MM:g} mm/s, {way}"
@@ -44,24 +47,36 @@ def _list_rows(results: Results, methods: list[str]) -> Iterator[tuple[str, list
     for way in WAYS:
         speeds = [results.fastest.get((method, way)) for method in methods]
         yield f"largest speed, drag, {way} (mm/s)", _scale(speeds, MM)
-    yield "largest speed, lift (mm/s)", _scale([results.lifting.get(method) for method in methods], MM)
+    yield (
+        "largest speed, lift (mm/s)",
+        _scale([results.lifting.get(method) for method in methods], MM),
+    )
     formed = [list(sections(results.session[method])) for method in methods]
-    yield "sections, largest rms deviation (mm)", [MM * max(one.rms for one in row) for row in formed]
-    yield "sections, largest deviation (mm)", [MM * max(one.largest for one in row) for row in formed]
+    yield (
+        "sections, largest rms deviation (mm)",
+        [MM * max(one.rms for one in row) for row in formed],
+    )
+    yield (
+        "sections, largest deviation (mm)",
+        [MM * max(one.largest for one in row) for row in formed],
+    )
 
 
 def _scale(values: list[float | None], factor: float) -> list[float | None]:
     return [None if value is None else value * factor for value in values]
 
 
-def format_page(results: Results, judged: list[Claim], pictures: Mapping[str, str], took: float) -> str:
+def format_page(
+    results: Results, judged: list[Claim], pictures: Mapping[str, str], took: float
+) -> str:
     """Return the page; `pictures`: files' names to captions; `took`: time of simulations, s."""
     rows = [
         f"| {claim.printed} | {claim.measured.replace('; ', ';<br>')} | **{claim.verdict}** | {claim.why} |"
         for claim in judged
     ]
     figures = [
-        f"![{caption}]({name}.svg)\n\n*{caption}.* [Data]({name}.csv)" for name, caption in pictures.items()
+        f"![{caption}]({name}.svg)\n\n*{caption}.* [Data]({name}.csv)"
+        for name, caption in pictures.items()
     ]
     return (
         Path(__file__)
@@ -78,7 +93,8 @@ def format_page(results: Results, judged: list[Claim], pictures: Mapping[str, st
     )
 
 
-#: The figure whose data are heights of pins, and no curves; and the one of a session that was slowed.
+#: The figure whose data are heights of pins, and no curves; and the one of a session that was
+#: slowed.
 SURFACES, OWN_TIMES = "fig10_surfaces", "fig08_own_times"
 
 
@@ -96,7 +112,9 @@ def produce(folder: Path, extent: Extent, announce: Announce) -> list[str]:
         module, _, function = figure["draw"].partition(".")
         picture = getattr(import_module(f".{module}", __package__), function)(results)
         if name == SURFACES:
-            rows = table(figures_session.surface_rows(results.session), ("method", *"xy", "height (mm)"))
+            rows = table(
+                figures_session.surface_rows(results.session), ("method", *"xy", "height (mm)")
+            )
         else:
             letter(picture)
             rows = table(curves(picture))
@@ -154,7 +172,10 @@ def _plain(value: Any) -> Any:
     elif hasattr(value, "_asdict"):
         value = value._asdict()
     if isinstance(value, dict):
-        return {key if isinstance(key, str) else ", ".join(key): _plain(one) for key, one in value.items()}
+        return {
+            key if isinstance(key, str) else ", ".join(key): _plain(one)
+            for key, one in value.items()
+        }
     if isinstance(value, list):
         return [_plain(one) for one in value]
     return None if value == math.inf else value

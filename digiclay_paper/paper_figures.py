@@ -89,7 +89,9 @@ def blisters(results: Results) -> Any:
     with canvas(12.5, height, "Blisters in section, the fingertip in place") as (figure, place):
         for row, method in enumerate(methods):
             for column, shape in enumerate(HEIGHTS):
-                axes = place(f"{method} {shape}", 0.85 + 6.15 * column, height - 3.5 - 3.4 * row, 5.25, 2.55)
+                axes = place(
+                    f"{method} {shape}", 0.85 + 6.15 * column, height - 3.5 - 3.4 * row, 5.25, 2.55
+                )
                 for profile, look in PROFILES.items():
                     done = results.blisters[method, shape, profile]
                     _section(axes, done, look, profile)
@@ -120,7 +122,15 @@ def _section(axes: Any, done: Result, look: tuple[str, str, float], name: str) -
     row = np.abs(place[:, 1]) < 1e-6
     color, marker, size = look
     across, top, felt = place[row, 0] * MM, height[-1, row] * MM, force[-1, row] > 0.0
-    axes.plot(across, top, color=color, marker=marker, markersize=size, markerfacecolor="white", label=name)
+    axes.plot(
+        across,
+        top,
+        color=color,
+        marker=marker,
+        markersize=size,
+        markerfacecolor="white",
+        label=name,
+    )
     axes.plot(across[felt], top[felt], marker, color=color, markersize=size)
 
 
@@ -138,7 +148,10 @@ def freezing(results: Results) -> Any:
     """Draw sections along a drag at several times; frozen cells are marked."""
     methods = list_methods(results.drags)
     height = 0.8 + 3.7 * len(methods)
-    with canvas(12.5, height, "Freezing: what the fingertip has left keeps its height") as (figure, place):
+    with canvas(12.5, height, "Freezing: what the fingertip has left keeps its height") as (
+        figure,
+        place,
+    ):
         from matplotlib import colormaps
 
         for panel, method in enumerate(methods):
@@ -154,7 +167,12 @@ def freezing(results: Results) -> Any:
                 frozen = done.history["mode"][instant, ridge] == Mode.FROZEN
                 axes.plot(across, top, color=color, label=f"{moment - start:.1f} s")
                 axes.plot(
-                    across[frozen], top[frozen], "s", color=color, markersize=8, markeredgecolor="white"
+                    across[frozen],
+                    top[frozen],
+                    "s",
+                    color=color,
+                    markersize=8,
+                    markeredgecolor="white",
                 )
                 x, z = done.history["fingertip"][instant, [0, 2]] * MM
                 axes.plot(x, z + 6.0, "v", color=color, markersize=9)
@@ -177,7 +195,9 @@ def oscillation(results: Results) -> Any:
     """Draw the force after a quick press at three gains, and what the sweep of the gains came to."""
     gains = list(results.sweeps)
     middle = gains[len(gains) // 2]
-    with canvas(13.0, 7.6, f"Method I holding still after a quick press of {PRESSED * MM:g} mm") as (
+    with canvas(
+        13.0, 7.6, f"Method I holding still after a quick press of {PRESSED * MM:g} mm"
+    ) as (
         figure,
         place,
     ):
@@ -196,9 +216,13 @@ def oscillation(results: Results) -> Any:
         sweeps[f"{gains[0]:g} 1/m, quicker device"] = sorted(results.quicker)
         for number, (label, row) in enumerate(sweeps.items()):
             style: dict[str, Any] = {"color": LINES[number], "marker": MARKERS[number]}
-            swing.plot([one.gain for one in row], [one.amplitude for one in row], label=label, **style)
+            swing.plot(
+                [one.gain for one in row], [one.amplitude for one in row], label=label, **style
+            )
             calm = [one for one in row if one.settling is not None]
-            settle.plot([one.gain for one in calm], [one.settling for one in calm], label=label, **style)
+            settle.plot(
+                [one.gain for one in calm], [one.settling for one in calm], label=label, **style
+            )
         swing.axhline(SUSTAINED, **DASHED)
         swing.set(ylabel="amplitude in the last second (N)", title="Oscillation that goes on")
         settle.set(ylabel="time to settle within 10 % (s)", title="Response (no point: it goes on)")
@@ -221,7 +245,9 @@ def _scale_gains(axes: Any, highest: float, label: str) -> None:
 def _details(axes: Any, results: Results, position_gain: float) -> None:
     """Draw the force at the lowest gain, at the last one that is calm, and at the first that is not."""
     lowest = min(gain for gain, known in results.details if known == position_gain)
-    chosen = dict.fromkeys(gain for gain in (lowest, *results.onset(position_gain)) if gain is not None)
+    chosen = dict.fromkeys(
+        gain for gain in (lowest, *results.onset(position_gain)) if gain is not None
+    )
     for color, gain in zip(LINES, chosen, strict=False):
         label = f"$K_f$ = {gain:g} 1/N"
         axes.plot(*results.details[gain, position_gain], color=color, linewidth=1.4, label=label)
@@ -250,7 +276,9 @@ def tracking(results: Results) -> Any:
             axes.set(xlabel="finger's speed (mm/s)", ylabel=label, xlim=(0, None), ylim=(0, None))
             axes.set_title(label.split(" (")[0])
         first = panels[0][-1]
-        first.plot([], [], "o", color=INK, markerfacecolor="white", label="without contact, or lost")
+        first.plot(
+            [], [], "o", color=INK, markerfacecolor="white", label="without contact, or lost"
+        )
         first.plot([], [], **DASHED, label="criterion")
         first.plot([], [], **DOTTED, label="the paper's 15 mm/s")
         figure.legend(
@@ -328,11 +356,17 @@ def _radius(axes: Any, results: Results) -> None:
     kinds = sorted({(one.thresholds, one.radius) for one in results.located})
     least = min(radius for _, radius in kinds)
     for thresholds, radius in kinds:
-        row = [one for one in sorted(results.located) if (one.thresholds, one.radius) == (thresholds, radius)]
+        row = [
+            one
+            for one in sorted(results.located)
+            if (one.thresholds, one.radius) == (thresholds, radius)
+        ]
         # With thresholds both lie upon each other: the smaller markers on top.
         near = radius == least
         name = f"$r_{{VM}}$ = {radius * MM:g} mm" if near else "no radius"
-        look: dict[str, Any] = {"markersize": 5, "zorder": 3} if near else {"markersize": 9, "zorder": 2}
+        look: dict[str, Any] = (
+            {"markersize": 5, "zorder": 3} if near else {"markersize": 9, "zorder": 2}
+        )
         look |= {"linestyle": "--", "markerfacecolor": "white"} if thresholds else {}
         noise = [one.noise * MM for one in row]
         scatter = [np.nan if one.scatter is None else one.scatter * MM for one in row]

@@ -122,9 +122,14 @@ def sections(session: Session) -> Iterator[Section]:
         if np.any(cells) and np.any(middle):
             sign = -1.0 if part == "valley" else 1.0
             high, wanted = (float(np.median(sign * heights[middle])) for heights in (formed, asked))
-            scale, rim = high / wanted if wanted else 1.0, float((sign * formed)[cells].max()) - high
+            scale, rim = (
+                high / wanted if wanted else 1.0,
+                float((sign * formed)[cells].max()) - high,
+            )
             drawn, pins = scale * asked[cells], float((sign * formed)[parts[part]].max()) - high
-            yield Section(name, part, where[cells], formed[cells], drawn, high - wanted, wanted, rim, pins)
+            yield Section(
+                name, part, where[cells], formed[cells], drawn, high - wanted, wanted, rim, pins
+            )
 
 
 def blister_section(done: Result) -> Section:
@@ -141,4 +146,6 @@ def blister_section(done: Result) -> Section:
     high = sign * float(formed[middle])
     rim, pins = (float((sign * cells).max()) - high for cells in (formed[row], formed))
     level, wanted = high - sign * wanted, sign * wanted
-    return Section("blister", "blister", place[row, 0], formed[row], asked, level, wanted, rim, pins)
+    return Section(
+        "blister", "blister", place[row, 0], formed[row], asked, level, wanted, rim, pins
+    )

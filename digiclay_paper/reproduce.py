@@ -32,7 +32,9 @@ def add(commands: Any) -> None:
         "--quiet": "print errors only, without progress",
     }
     purpose = "reproduce the paper's results"
-    add_options(add_command(commands, "paper", purpose, EXAMPLES, description, carry_out=carry_out), options)
+    add_options(
+        add_command(commands, "paper", purpose, EXAMPLES, description, carry_out=carry_out), options
+    )
 
 
 def carry_out(arguments: argparse.Namespace) -> int:

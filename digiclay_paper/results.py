@@ -12,9 +12,14 @@ from .scenes import SINK, TALL
 
 #: The speed up to which the paper says both methods track, m/s, and its session.
 PAPER_SPEED, SESSION = 15e-3, "ridge_mound_valley"
-#: The simple trajectories: straight and level drags over the fingertip's height, m; and one more, less deep.
+#: The simple trajectories: straight and level drags over the fingertip's height, m; and one more,
+#: less deep.
 RIDGE = "a ridge 15 mm high"
-WAYS = {"in the surface": Drag(height=-4.5e-3), RIDGE: Drag(height=TALL), "a valley": Drag(height=SINK)}
+WAYS = {
+    "in the surface": Drag(height=-4.5e-3),
+    RIDGE: Drag(height=TALL),
+    "a valley": Drag(height=SINK),
+}
 DRAGS = WAYS | {"less deep": Drag(height=-1.5e-3)}
 #: How far ahead of the fingertip cells are looked at that do not feel it yet, m.
 AHEAD = (9e-3, 12e-3)
@@ -167,7 +172,10 @@ class Results:
     def sweeps(self) -> dict[float, list[Swing]]:
         """The swings by K_p, 1/m, in ascending order, each sweep by K_f."""
         gains = sorted({swing.position_gain for swing in self.swings})
-        return {gain: sorted(swing for swing in self.swings if swing.position_gain == gain) for gain in gains}
+        return {
+            gain: sorted(swing for swing in self.swings if swing.position_gain == gain)
+            for gain in gains
+        }
 
     def onset(self, position_gain: float) -> tuple[float | None, float | None]:
         """Return the `onset_among` those at one K_p, 1/m."""

@@ -20,7 +20,8 @@ NAMES = {
     "cell_states": "Method II, cell states",
     THIRD: "Method III, hybrid",
 }
-#: Finger over the bed at rest: for a blister 15 mm high (the pins press 1.5 mm into it), and in a valley, m.
+#: Finger over the bed at rest: for a blister 15 mm high (the pins press 1.5 mm into it), and in a
+#: valley, m.
 TALL, SINK = 13.5e-3, -10e-3
 #: How deep the first press goes: less never reaches the trigger, because the pulp relaxes, m.
 PRESS = 4.5e-3
@@ -54,8 +55,8 @@ def held(
 ) -> tuple[Scene, float]:
     """Return a scene that shapes, is pressed quickly by `PRESSED` and held; and when, s.
 
-    `gain`, `position_gain`: K_f of Method I or K_FF of Method II, 1/N, and K_p, 1/m; `device`: sections of
-    the scene that are not the default ones, such as `QUICKER`.
+    `gain`, `position_gain`: K_f of Method I or K_FF of Method II, 1/N, and K_p, 1/m; `device`:
+    sections of the scene that are not the default ones, such as `QUICKER`.
     """
     size = PRESSED
     quick = 2.2 + size / QUICKLY

@@ -49,12 +49,17 @@ WINDOWS = {
 def measure_windows(done: Result) -> dict[str, dict[str, float | None]]:
     """Return RFD, N, and deviations of force, N, and height, m, while shaping, by the names of `WINDOWS`."""
     time, sums = done.history["time"], summary.sum_cells(done.history)
-    weight, wanted = summary.compute_weights(time), find_set_point(done.scene.set_point, sums.following)
+    weight, wanted = (
+        summary.compute_weights(time),
+        find_set_point(done.scene.set_point, sums.following),
+    )
     above = np.full(len(time), np.nan)
     above[sums.touching] = summary.measure_surface_under(sums, done.history["fingertip"])
     windows = {}
     for name, spans in WINDOWS.items():
-        rows = sums.shaping & np.any([(time >= start) & (time <= end) for start, end in spans], axis=0)
+        rows = sums.shaping & np.any(
+            [(time >= start) & (time <= end) for start, end in spans], axis=0
+        )
         windows[name] = {
             "rfd": summary.compute_rfd(time, sums.total, wanted, rows),
             "force_deviation": summary.compute_deviation(sums.total[rows], weight[rows]),
@@ -84,7 +89,9 @@ def vary(results: Results, extent: Extent, announce: Announce) -> None:
         for method in methods:
             for name in extent.ways:
                 announce(f"drag {variant}, {name}, {method}")
-                results.dragged[variant, method, name] = dragged(_load(method, setting), WAYS[name])[0]
+                results.dragged[variant, method, name] = dragged(
+                    _load(method, setting), WAYS[name]
+                )[0]
     for noise in extent.noises:
         announce(f"finger located under a noise of {noise * 1e3:g} mN")
         for thresholds in (False, True):
@@ -92,12 +99,17 @@ def vary(results: Results, extent: Extent, announce: Announce) -> None:
                 results.located.append(located(noise, radius, thresholds=thresholds))
 
 
-def dragged(scene: Scene, way: speed_limits.Drag, speed: float = PAPER_SPEED) -> tuple[Dragged, Result]:
+def dragged(
+    scene: Scene, way: speed_limits.Drag, speed: float = PAPER_SPEED
+) -> tuple[Dragged, Result]:
     """Run a drag with a scene's device and method, and return what it came to, and the whole of it."""
     follows, done = speed_limits.track(scene, way, speed)
     _, start, end = way.path(speed, scene.actuator.rest_height)
     part = select_rows(done.history, start, end)
-    total, following = part["total_force"], np.count_nonzero(part["mode"] == Mode.FORCE_FOLLOW, axis=1)
+    total, following = (
+        part["total_force"],
+        np.count_nonzero(part["mode"] == Mode.FORCE_FOLLOW, axis=1),
+    )
     # The cells in the fingertip's line, short of the place where it stops.
     place = part["position"]
     line = np.abs(place[:, 1]) < 0.5 * scene.layout.pitch
@@ -120,7 +132,8 @@ def located(noise: float, radius: float | None, *, thresholds: bool) -> Located:
     """Hold a fingertip still under Method I with noisy force sensors, and look where it is located.
 
     `noise`: standard deviation of a cell's force sensor, N; `radius`: r_VM, m; None: its default;
-    `thresholds`: whether the controller knows of the noise, and takes readings below its threshold for none.
+    `thresholds`: whether the controller knows of the noise, and takes readings below its threshold
+    for none.
     """
     case = scenes.at_rest(noise, radius)
     assert isinstance(case.control, VirtualMaster)
@@ -158,7 +171,10 @@ def simulate(extent: Extent, announce: Announce) -> Results:
         announce(f"oscillation, K_p {position_gain:g} 1/m, K_f {gain:g} 1/N")
         swing, done, quick = _swing(gain, position_gain)
         results.swings.append(swing)
-        results.details[gain, position_gain] = done.history["time"] - quick, done.history["total_force"]
+        results.details[gain, position_gain] = (
+            done.history["time"] - quick,
+            done.history["total_force"],
+        )
     for gain in extent.gains:
         announce(f"oscillation, a quicker device, K_f {gain:g} 1/N")
         swing, done, _ = _swing(gain, extent.position_gains[0], QUICKER)
@@ -220,7 +236,9 @@ def _track(results: Results, method: str, extent: Extent, announce: Announce) ->
     results.tracks[method] = []
     for speed in extent.speeds:
         announce(f"drag at {speed * 1e3:g} mm/s, {method}")
-        results.tracks[method].append(speed_limits.track(scene, speed_limits.Drag(height=TALL), speed)[0])
+        results.tracks[method].append(
+            speed_limits.track(scene, speed_limits.Drag(height=TALL), speed)[0]
+        )
 
     def tried(one: speed_limits.Follows) -> None:
         announce(f"fastest drag, {name}, {one.speed * 1e3:.1f} mm/s, {method}")
@@ -283,7 +301,9 @@ def _boil_down(scene: Scene) -> Session:
     follow = np.sum(done.history["mode"] == Mode.FORCE_FOLLOW, axis=1)
     rows = {name: done.history[name] for name in ("time", "height", "total_force", "fingertip")}
     rows |= {"set_point": find_set_point(done.scene.set_point, follow), "following": follow}
-    kept = {name: np.concatenate([values[:-1:THINNED], values[-1:]]) for name, values in rows.items()}
+    kept = {
+        name: np.concatenate([values[:-1:THINNED], values[-1:]]) for name, values in rows.items()
+    }
     kept["position"] = done.history["position"]
     early = done.history["time"] <= DETAIL
     detail = {name: done.history[name][early] for name in ("time", "height")}
@@ -298,8 +318,13 @@ def _swing(
     case, quick = scenes.held(gain, position_gain, device, method)
     done = _run(case)
     end = float(done.history["time"][-1])
-    late, after = select_rows(done.history, end - WATCHED, end), select_rows(done.history, quick, end)
-    wanted = find_set_point(case.set_point, np.count_nonzero(after["mode"] == Mode.FORCE_FOLLOW, axis=1))
+    late, after = (
+        select_rows(done.history, end - WATCHED, end),
+        select_rows(done.history, quick, end),
+    )
+    wanted = find_set_point(
+        case.set_point, np.count_nonzero(after["mode"] == Mode.FORCE_FOLLOW, axis=1)
+    )
     settled = summary.measure_settling_time(after["time"], after["total_force"] / wanted, 1.0, 0.1)
     swing = Swing(
         gain,

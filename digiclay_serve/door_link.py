@@ -51,8 +51,8 @@ class DoorLink:
     def order(self, request: Pose | Poses | Reset | Status, client: object) -> Record | None:
         """Carry out a request of a client, equal to itself alone; return the answer, if there is one.
 
-        Raises FrequentError while another client moves the fingertip; and for what was wrong with some of
-        several fingers, after the others have been moved.
+        Raises FrequentError while another client moves the fingertip; and for what was wrong with
+        some of several fingers, after the others have been moved.
         """
         if isinstance(request, Status):
             return dict(self.counts)

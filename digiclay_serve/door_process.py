@@ -1,8 +1,8 @@
 """Process of the doors: ``python -m digiclay_serve.door_process``, started by `doors`.
 
-A process of its own: whatever clients do costs its time and its memory, not those of the session. Its
-standard input has a line of settings, then an empty one per frame; it ends when that input ends. Its output
-has a line of addresses, an empty one per order, and a line of counts.
+A process of its own: whatever clients do costs its time and its memory, not those of the session.
+Its standard input has a line of settings, then an empty one per frame; it ends when that input
+ends. Its output has a line of addresses, an empty one per order, and a line of counts.
 """
 
 import asyncio
@@ -85,7 +85,9 @@ async def _serve(settings: Record) -> None:
                 ports[key] = await doors.enter_async_context(door(link, host, settings[key]))
             except (OSError, OverflowError) as error:
                 reason = getattr(error, "strerror", None) or error
-                raise OutputError(f"Port {settings[key]} of {host} cannot be opened: {reason}.") from None
+                raise OutputError(
+                    f"Port {settings[key]} of {host} cannot be opened: {reason}."
+                ) from None
         _tell(ports)
         os.set_blocking(1, False)
         orders.bell = 1

@@ -23,9 +23,11 @@ from digiclay.core.files.tables import Record
 
 from .protocol import MOST_FINGERS, Bed, Poses
 
-#: Bytes before the value: number of the value, twice that and one more while it is written; its checksum.
+#: Bytes before the value: number of the value, twice that and one more while it is written; its
+#: checksum.
 HEAD = 16
-#: Times that a value overwritten during reading is read again; later ones are read at the next look.
+#: Times that a value overwritten during reading is read again; later ones are read at the next
+#: look.
 TRIES = 3
 #: Memory that is no disk, where there is one.
 MEMORY = Path("/dev/shm")
@@ -34,8 +36,9 @@ MEMORY = Path("/dev/shm")
 class LatestSlot:
     """Slot for values of one size in memory that two processes share; neither ever waits.
 
-    A reader that stalls misses values; a writer that stalls leaves the last one. Nothing is queued, so that
-    neither can fill the memory of the other. `memory`: `HEAD` bytes, 0 at first, and those of a value.
+    A reader that stalls misses values; a writer that stalls leaves the last one. Nothing is queued,
+    so that neither can fill the memory of the other. `memory`: `HEAD` bytes, 0 at first, and those
+    of a value.
     """
 
     def __init__(self, memory: mmap.mmap) -> None:
@@ -116,14 +119,23 @@ class Order(NamedTuple):
         alive = set(request.alive)
         there = [identity for identity in newest if identity in alive]
         fingers = tuple((identity, newest[identity]) for identity in there[:most])
-        order = self._replace(pose=None, number=request.number, named=self.named + 1, fingers=fingers)
+        order = self._replace(
+            pose=None, number=request.number, named=self.named + 1, fingers=fingers
+        )
         return order, len(there) - len(fingers)
 
 
 def pack_order(order: Order) -> bytes:
     """Write an order for `LatestSlot`."""
     pose = order.pose or (0.0,) * 7
-    head = (*pose, order.number, order.pose is not None, order.resets, order.named, len(order.fingers))
+    head = (
+        *pose,
+        order.number,
+        order.pose is not None,
+        order.resets,
+        order.named,
+        len(order.fingers),
+    )
     fingers = [value for identity, finger in order.fingers for value in (identity, *finger)]
     return LAYOUT.pack(*head, *fingers, *[0] * (8 * MOST_FINGERS - len(fingers)))
 
@@ -160,7 +172,11 @@ class Doors(AbstractContextManager["Doors"]):
         self._orders, orders = make_slot(LAYOUT.size)
         self._frames, frames = make_slot(-(-frame_size // 8) * 8)
         self._files = [orders, frames]
-        self._settings = {**settings, "slots": [str(path) for path in self._files], "bed": asdict(bed)}
+        self._settings = {
+            **settings,
+            "slots": [str(path) for path in self._files],
+            "bed": asdict(bed),
+        }
         self._order = Order()
 
     def __enter__(self) -> Doors:
@@ -231,7 +247,9 @@ class Doors(AbstractContextManager["Doors"]):
     def _read_line(self, patience: float) -> Record:
         """Read a line of JSON; an empty answer when there is none in time, s."""
         line = b"\n"
-        while line == b"\n" and select.select([self._output], [], [], patience)[0]:  # bells before it
+        while (
+            line == b"\n" and select.select([self._output], [], [], patience)[0]
+        ):  # bells before it
             line = self._output.readline()
         return dict(json.loads(line)) if line.strip() else {}
 

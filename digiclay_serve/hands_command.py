@@ -52,13 +52,29 @@ def add(commands: Any) -> None:
             "default": "hts",
             "help": "hts: Hand Tracking Streamer, the default; tuio: a touch pad",
         },
-        "--to ADDRESS": (None, f"of 'digiclay serve': ws://HOST:PORT or osc://HOST:PORT; default: {TO}", TO),
+        "--to ADDRESS": (
+            None,
+            f"of 'digiclay serve': ws://HOST:PORT or osc://HOST:PORT; default: {TO}",
+            TO,
+        ),
         "--token T": f"token of the server; default: {VARIABLE}",
-        "--host": (None, f"address of this machine to listen at, 0.0.0.0: all; default: {HOST}", HOST),
+        "--host": (
+            None,
+            f"address of this machine to listen at, 0.0.0.0: all; default: {HOST}",
+            HOST,
+        ),
         "--port N": (whole_number(1, 65535), "to listen at; default: 9000, of tuio 3333"),
         "--height MM": (millimeters, "height of the clay at rest, mm; default: 40", 40e-3),
-        "--size MM": (millimeters, "side of the bed that a touch pad covers, mm; default: 70", 70e-3),
-        "--depth MM": (millimeters, "depth of a finger on a pad at full pressure, mm; default: 20", 20e-3),
+        "--size MM": (
+            millimeters,
+            "side of the bed that a touch pad covers, mm; default: 70",
+            70e-3,
+        ),
+        "--depth MM": (
+            millimeters,
+            "depth of a finger on a pad at full pressure, mm; default: 20",
+            20e-3,
+        ),
         "--record FILE": (Path, "write what is received, with its times"),
         "--play FILE": (Path, "take a recording in place of a device"),
     }
@@ -71,10 +87,15 @@ def carry_out(arguments: Namespace) -> int:
     refuse_without("digiclay hands", "serve", "websockets", "pythonosc")
     from .tuio import Pad
 
-    logging.getLogger().addHandler(logging.NullHandler())  # python-osc prints what hostile senders like
+    logging.getLogger().addHandler(
+        logging.NullHandler()
+    )  # python-osc prints what hostile senders like
     if arguments.token is None and VARIABLE not in os.environ:
         raise OutputError(f"digiclay hands needs the token of the server: --token, or {VARIABLE}.")
-    token, pad = choose_token(arguments.token)[0], (arguments.height, arguments.size, arguments.depth)
+    token, pad = (
+        choose_token(arguments.token)[0],
+        (arguments.height, arguments.size, arguments.depth),
+    )
     for name, length in zip(("--height", "--size", "--depth"), pad, strict=True):
         if not 0.0 < length <= 1.0:
             raise OutputError(f"{name} must be above 0 and at most 1000 mm (got {1e3 * length:g}).")
@@ -84,7 +105,9 @@ def carry_out(arguments: Namespace) -> int:
             asyncio.run(_pass_on(arguments, source, token, stop))
         except OSError as error:
             where = f": {error.filename}" if error.filename else ""
-            raise OutputError(f"digiclay hands has ended: {error.strerror or error}{where}.") from None
+            raise OutputError(
+                f"digiclay hands has ended: {error.strerror or error}{where}."
+            ) from None
     return 0
 
 
@@ -106,7 +129,9 @@ async def _pass_on(arguments: Namespace, source: Any, token: str, stop: Stop) ->
             now = time.monotonic()
             try:
                 if file:
-                    print(json.dumps([round(now, 6), data.decode("latin-1")]), file=file, flush=True)
+                    print(
+                        json.dumps([round(now, 6), data.decode("latin-1")]), file=file, flush=True
+                    )
             except OSError as error:
                 file = None
                 tell(f"The recording ends here: {error.strerror}.")
@@ -132,7 +157,9 @@ async def _pass_on(arguments: Namespace, source: Any, token: str, stop: Stop) ->
             await send(source.fingers(time.monotonic()))
 
 
-async def _listen(stack: AsyncExitStack, arguments: Namespace, take: Callable[[bytes], None]) -> str:
+async def _listen(
+    stack: AsyncExitStack, arguments: Namespace, take: Callable[[bytes], None]
+) -> str:
     """Listen at a port by UDP and, to lines, by TCP; return it in words."""
     host, port = arguments.host, arguments.port or PORTS[arguments.source]
 
@@ -147,7 +174,9 @@ async def _listen(stack: AsyncExitStack, arguments: Namespace, take: Callable[[b
                     take(line)
         writer.close()
 
-    transport, _ = await asyncio.get_running_loop().create_datagram_endpoint(Datagrams, (host, port))
+    transport, _ = await asyncio.get_running_loop().create_datagram_endpoint(
+        Datagrams, (host, port)
+    )
     stack.callback(transport.close)
     if arguments.source == "hts":
         stack.callback((await asyncio.start_server(take_lines, host, port)).close)
@@ -166,7 +195,9 @@ def read_packets(path: Path) -> deque[tuple[float, bytes]]:
             at, text = json.loads(line)
             packets.append((float(at), str(text).encode("latin-1")))
             if not last <= float(at) < math.inf:
-                raise ValueError(f"a time must be finite and not before that of the line above ({at})")
+                raise ValueError(
+                    f"a time must be finite and not before that of the line above ({at})"
+                )
             last = float(at)
     except (OSError, ValueError, TypeError, OverflowError, RecursionError) as error:
         rule = "must be a recording of 'digiclay hands --record'"
@@ -189,7 +220,9 @@ async def _connect(address: str, token: str, tell: Callable[[object], None]) -> 
         if parts.scheme not in ("ws", "osc") or not parts.hostname or not parts.port:
             raise ValueError
     except ValueError:
-        raise OutputError(f"--to must be ws://HOST:PORT or osc://HOST:PORT (got {address!r}).") from None
+        raise OutputError(
+            f"--to must be ws://HOST:PORT or osc://HOST:PORT (got {address!r})."
+        ) from None
     missing = f"No server at {address}: it has ended, or is not started yet."
     if parts.scheme == "osc":
 
@@ -201,10 +234,16 @@ async def _connect(address: str, token: str, tell: Callable[[object], None]) -> 
                 tell(missing)
 
         where = parts.hostname, parts.port
-        transport, _ = await asyncio.get_running_loop().create_datagram_endpoint(Answers, remote_addr=where)
+        transport, _ = await asyncio.get_running_loop().create_datagram_endpoint(
+            Answers, remote_addr=where
+        )
 
         async def send_datagram(fingers: Mapping[int, Floats]) -> None:
-            values = [value for identity, place in fingers.items() for value in (identity, *place.tolist())]
+            values = [
+                value
+                for identity, place in fingers.items()
+                for value in (identity, *place.tolist())
+            ]
             transport.sendto(format_osc("poses", "si" + "hddd" * len(fingers), token, 0, *values))
 
         try:
@@ -214,7 +253,9 @@ async def _connect(address: str, token: str, tell: Callable[[object], None]) -> 
         return
 
     async def send(fingers: Mapping[int, Floats]) -> None:
-        places = [{"id": identity, "position": place.tolist()} for identity, place in fingers.items()]
+        places = [
+            {"id": identity, "position": place.tolist()} for identity, place in fingers.items()
+        ]
         await server.send(json.dumps({"type": "poses", "fingers": places}))
 
     async def take_answers() -> None:

@@ -11,10 +11,11 @@ import numpy as np
 from digiclay.core.base.arrays import Floats
 from digiclay.core.base.errors import ParameterError
 
-#: Identity of a hand's thumb; rows of fingertips; numbers of a line: place and x, y, z, w of a turn; joints.
+#: Identity of a hand's thumb; rows of fingertips; numbers of a line: place and x, y, z, w of a
+#: turn; joints.
 HANDS, TIPS, LINES = {"left": 0, "right": 5}, [4, 8, 12, 16, 20], {"wrist": 7, "landmarks": 63}
-#: Time after which a hand is gone; after which a wrist is too old for joints, and both hands are put over
-#: the bed anew, s; height there, m.
+#: Time after which a hand is gone; after which a wrist is too old for joints, and both hands are
+#: put over the bed anew, s; height there, m.
 GONE, ANEW, OVER = 0.05, 1.0, 20e-3
 
 
@@ -36,7 +37,11 @@ class Hands:
         hands = self
         for line in data.decode("utf-8", "replace").splitlines():
             side, kind, *_ = [*line.partition(":")[0].lower().split(), "", ""]
-            hands = hands._take_line(side, kind, line, now) if side in HANDS and kind in LINES else hands
+            hands = (
+                hands._take_line(side, kind, line, now)
+                if side in HANDS and kind in LINES
+                else hands
+            )
         return hands
 
     def _take_line(self, side: str, kind: str, line: str, now: float) -> Hands:
@@ -61,5 +66,11 @@ class Hands:
 
     def fingers(self, now: float) -> dict[int, Floats]:
         """Return the lowest points (3,), m, of the fingers that are there at a time, s, by identity."""
-        seen = {side: tips - self.origin for side, (time, tips) in self.tips.items() if now - time < GONE}
-        return {HANDS[side] + row: tip for side, tips in seen.items() for row, tip in enumerate(tips)}
+        seen = {
+            side: tips - self.origin
+            for side, (time, tips) in self.tips.items()
+            if now - time < GONE
+        }
+        return {
+            HANDS[side] + row: tip for side, tips in seen.items() for row, tip in enumerate(tips)
+        }

@@ -80,13 +80,17 @@ def format_osc_frame(frame: Frame, part: str) -> list[bytes]:
         format_osc("state", "hh" + 9 * "d", *state),
     ]
     if frame.fingers:
-        there = [(identity, force, *pose) for identity, force, pose in frame.fingers if identity >= 0]
+        there = [
+            (identity, force, *pose) for identity, force, pose in frame.fingers if identity >= 0
+        ]
         each = (value for finger in there for value in finger)
         datagrams.append(format_osc("fingers", "h" + len(there) * "hdddddddd", frame.period, *each))
     if part == "pins" and len(frame.heights) <= MOST_PINS:
         for name, values in (("heights", frame.heights), ("forces", frame.forces)):
             # OSC is big-endian.
-            datagrams.append(format_osc(name, "hb", frame.period, np.asarray(values, ">f4").tobytes()))
+            datagrams.append(
+                format_osc(name, "hb", frame.period, np.asarray(values, ">f4").tobytes())
+            )
     return datagrams
 
 
@@ -190,7 +194,9 @@ class _OscDoor(asyncio.DatagramProtocol):
 async def open_osc(link: DoorLink, host: str, port: int) -> AsyncIterator[int]:
     """Open the door at a port, 0: chosen by the system, and give the port; OSError if it cannot be used."""
     loop = asyncio.get_running_loop()
-    transport, door = await loop.create_datagram_endpoint(lambda: _OscDoor(link), local_addr=(host, port))
+    transport, door = await loop.create_datagram_endpoint(
+        lambda: _OscDoor(link), local_addr=(host, port)
+    )
     sending = asyncio.ensure_future(door.send_frames())
     try:
         yield transport.get_extra_info("sockname")[1]

@@ -1,6 +1,7 @@
 """Messages of the server, version 1: JSON and binary, little-endian; docs/serve.md is their table.
 
-A request is a pose of the fingertip, poses of several, or a reset. A frame is the state after a period.
+A request is a pose of the fingertip, poses of several, or a reset. A frame is the state after a
+period.
 """
 
 import hmac
@@ -36,7 +37,9 @@ def choose_token(given: str | None) -> tuple[str, bool]:
 
     Raises OutputError when a given one is none.
     """
-    token, source = (given, "--token") if given is not None else (os.environ.get(VARIABLE), VARIABLE)
+    token, source = (
+        (given, "--token") if given is not None else (os.environ.get(VARIABLE), VARIABLE)
+    )
     if token is None:
         return secrets.token_urlsafe(18), True
     if not ALLOWED.fullmatch(token):
@@ -48,7 +51,9 @@ def choose_token(given: str | None) -> tuple[str, bool]:
 
 def is_token(given: object, token: str) -> bool:
     """Return whether a client's token is the server's, in a time that does not depend on where it differs."""
-    return isinstance(given, str) and hmac.compare_digest(given.encode("utf-8", "replace"), token.encode())
+    return isinstance(given, str) and hmac.compare_digest(
+        given.encode("utf-8", "replace"), token.encode()
+    )
 
 
 VERSION = 1
@@ -61,7 +66,8 @@ BODY = struct.Struct("<QII9d")
 POSITION = struct.Struct("<7d")
 #: Identity, force and pose of a finger in a frame.
 FINGER = struct.Struct("<q8d")
-#: Estimated errors at the end of a frame, that of a height and of a pin's force; NaN: not estimated.
+#: Estimated errors at the end of a frame, that of a height and of a pin's force; NaN: not
+#: estimated.
 ERRORS = struct.Struct("<2d")
 #: Most fingers of a session.
 MOST_FINGERS = 32
@@ -109,7 +115,8 @@ class Flag(IntFlag):
 
     #: The contact law does not hold: `core.model.touch`.
     BEYOND_A_FINGER = 1
-    #: A finger's force was larger, and all are reduced by one factor: no finger has more than the ceiling.
+    #: A finger's force was larger, and all are reduced by one factor: no finger has more than the
+    #: ceiling.
     FORCE_LIMITED = 2
     #: The fingertip is on its way to the pose asked for, at its largest speed.
     POSE_LIMITED = 4
@@ -123,11 +130,12 @@ class Flag(IntFlag):
 class Limits:
     """Limits of what a session hands out to clients that may drive a motor; docs/serve.md has the sources."""
 
-    #: Largest force of a finger, N: up to it fingerpads were measured. The paper's pins, 0.157 N each at
-    #: the pressure of their reservoir, reach it with 13, more than lie under the contact of a fingertip.
+    #: Largest force of a finger, N: up to it fingerpads were measured. The paper's pins, 0.157 N
+    #: each at the pressure of their reservoir, reach it with 13, more than lie under the contact of
+    #: a fingertip.
     force: float = MOST_FORCE
-    #: Largest speed of a point of the fingertip, m/s: that of a robot's tool with people beside it, by ISO
-    #: 10218-1, and about three times that of fingers that explore a surface.
+    #: Largest speed of a point of the fingertip, m/s: that of a robot's tool with people beside it,
+    #: by ISO 10218-1, and about three times that of fingers that explore a surface.
     speed: float = 0.25
     #: Time without a pose after which the fingertip lifts, s.
     silence: float = 2.0
@@ -201,7 +209,8 @@ class Frame:
     flags: int = 0
     #: Identity, -1 for none, force, N, and pose (7,) of each of several fingertips.
     fingers: tuple[tuple[int, float, tuple[float, ...]], ...] = ()
-    #: Estimated errors of the session so far: of a height, m, and of a pin's force, N; None: not yet.
+    #: Estimated errors of the session so far: of a height, m, and of a pin's force, N; None: not
+    #: yet.
     errors: tuple[float, float] | None = None
 
 
@@ -227,7 +236,9 @@ def check_pose(values: Sequence[object]) -> tuple[float, ...]:
     return (*position, *(part / length for part in turn))
 
 
-def check_fingers(given: Sequence[tuple[object, Sequence[object]]], alive: object, number: int) -> Poses:
+def check_fingers(
+    given: Sequence[tuple[object, Sequence[object]]], alive: object, number: int
+) -> Poses:
     """Return the request for fingers by identity, 3 or 7 numbers each, and those alive; none: those given.
 
     A finger that is wrong is left out, and told; it stays where it was. Raises ParameterError.
@@ -249,7 +260,9 @@ def check_fingers(given: Sequence[tuple[object, Sequence[object]]], alive: objec
     if not isinstance(living, list) or any(type(identity) is not int for identity in living):
         raise ParameterError("poses", "alive", "must be a list of identities", repr(alive)[:40])
     more = f" And {len(faults) - 1} more." if len(faults) > 1 else ""
-    return Poses(tuple(fingers.items()), tuple(dict.fromkeys(living)), number, "".join(faults[:1]) + more)
+    return Poses(
+        tuple(fingers.items()), tuple(dict.fromkeys(living)), number, "".join(faults[:1]) + more
+    )
 
 
 def read_json(text: str) -> Pose | Poses | Reset | Status:
@@ -259,11 +272,15 @@ def read_json(text: str) -> Pose | Poses | Reset | Status:
     except (ValueError, RecursionError):
         raise ParameterError("message", "", "must be JSON", repr(text[:40])) from None
     if not isinstance(message, dict):
-        raise ParameterError("message", "", 'must be an object, such as {"type": "reset"}', repr(text[:40]))
+        raise ParameterError(
+            "message", "", 'must be an object, such as {"type": "reset"}', repr(text[:40])
+        )
     _check_version(message.get("version", VERSION))
     kind = message.get("type")
     if not isinstance(kind, str) or kind not in KEYS:
-        raise ParameterError("message", "type", f"must be one of {', '.join(KEYS)}", repr(kind)[:40])
+        raise ParameterError(
+            "message", "type", f"must be one of {', '.join(KEYS)}", repr(kind)[:40]
+        )
     _check_keys(message, {"type", "version", *KEYS[kind]})
     if kind in ("reset", "status"):
         return Reset() if kind == "reset" else Status()
@@ -283,7 +300,9 @@ def read_json(text: str) -> Pose | Poses | Reset | Status:
     for finger in fingers:
         _check_keys(finger, {"id", "position", "orientation"})
     return check_fingers(
-        [(finger.get("id"), _list_numbers(finger)) for finger in fingers], message.get("alive"), number
+        [(finger.get("id"), _list_numbers(finger)) for finger in fingers],
+        message.get("alive"),
+        number,
     )
 
 
@@ -336,7 +355,9 @@ def pack_frame(frame: Frame) -> bytes:
     pins = (np.asarray(values, "<f4").tobytes() for values in (frame.heights, frame.forces))
     fingers = (FINGER.pack(identity, force, *pose) for identity, force, pose in frame.fingers)
     errors = ERRORS.pack(*(frame.errors or (math.nan, math.nan)))
-    return b"".join([HEAD.pack(MARK, VERSION, STATE, len(frame.heights)), body, *pins, *fingers, errors])
+    return b"".join(
+        [HEAD.pack(MARK, VERSION, STATE, len(frame.heights)), body, *pins, *fingers, errors]
+    )
 
 
 def unpack_frame(data: bytes) -> Frame:
@@ -354,7 +375,9 @@ def unpack_frame(data: bytes) -> Frame:
     fingers = tuple((each[0], each[1], each[2:]) for each in FINGER.iter_unpack(data[end:last]))
     height, each = ERRORS.unpack(data[last:]) if data[last:] else (math.nan, math.nan)
     errors = None if math.isnan(height) else (height, each)
-    return Frame(period, number, time, force, np.array(pose), heights, forces, flags, fingers, errors)
+    return Frame(
+        period, number, time, force, np.array(pose), heights, forces, flags, fingers, errors
+    )
 
 
 def name_flags(flags: int) -> list[str]:

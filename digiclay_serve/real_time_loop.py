@@ -69,7 +69,9 @@ class TimeCounts:
 
     def count_above(self, time: float) -> int:
         """Return how many times exceed a limit, by whole bins. `time`, s."""
-        return sum(count for number, count in self.bins.items() if number >= round(time / self.width))
+        return sum(
+            count for number, count in self.bins.items() if number >= round(time / self.width)
+        )
 
     def find_share(self, share: float) -> float:
         """Return the time that a share of the times does not exceed, by whole bins, s; 0 without any."""
@@ -83,7 +85,9 @@ class TimeCounts:
     def describe(self) -> Record:
         """Return the figures for a report: shares and longest, s; and the bins that hold something."""
         shares = {f"p{100 * share:g}": self.find_share(share) for share in SHARES}
-        table = [[round(number * self.width, 9), count] for number, count in sorted(self.bins.items())]
+        table = [
+            [round(number * self.width, 9), count] for number, count in sorted(self.bins.items())
+        ]
         return {**shares, "longest": self.longest, "bin": self.width, "bins": table}
 
 
@@ -95,7 +99,8 @@ TOLD = 1.0
 BIN = 1e-5
 #: Longest time without a look at whether to stop, s.
 LOOK = 2e-2
-#: Time after which another thread of this process gets the interpreter, s; by default it is five periods.
+#: Time after which another thread of this process gets the interpreter, s; by default it is five
+#: periods.
 SWITCH = 2e-4
 
 
@@ -109,8 +114,8 @@ def run_session(
 ) -> tuple[Session, Record]:
     """Run a session in real time until it is to stop; return it, and the figures of its deadlines.
 
-    `session`: used up; `writer`: of a take; `part`: duration of a part of it, s; `stopped`: whether to stop;
-    `tell`: called with what a person has to know, a line at a time.
+    `session`: used up; `writer`: of a take; `part`: duration of a part of it, s; `stopped`: whether
+    to stop; `tell`: called with what a person has to know, a line at a time.
     """
     sys.setswitchinterval(SWITCH)
     period = session.system.period
@@ -121,8 +126,9 @@ def run_session(
     # What is there stays: the collector need not look through it again and again.
     gc.collect()
     gc.freeze()
-    # From the beginning of a period to the frame after it, those left out included: above a period it has
-    # missed its deadline. Processor time of a simulated one. From its beginning to that of its simulation.
+    # From the beginning of a period to the frame after it, those left out included: above a period
+    # it has missed its deadline. Processor time of a simulated one. From its beginning to that of
+    # its simulation.
     elapsed, spent, lateness = (TimeCounts(BIN) for _ in range(3))
     schedule = Schedule(time.perf_counter(), period, max(1, round(CATCH_UP / period)))
     resets, flagged, taken = 0, Counter[str](), doors.read_order()
@@ -183,7 +189,10 @@ def _find_effort(session: Session) -> Record:
     """Return simulated time, s, and errors since the last reset, as the metrics of a run have them."""
     simulated = {"simulated": session.state.period * session.system.period}
     if session.errors is None:
-        return {**simulated, "errors_absent": "not yet" if session.monitor else "the step cannot be halved"}
+        return {
+            **simulated,
+            "errors_absent": "not yet" if session.monitor else "the step cannot be halved",
+        }
     return simulated | {f"{name}_error": value for name, value in session.errors._asdict().items()}
 
 

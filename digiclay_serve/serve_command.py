@@ -10,7 +10,14 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from digiclay.commands.arguments import Options, add_command, add_options, add_scene, scene_of, whole_number
+from digiclay.commands.arguments import (
+    Options,
+    add_command,
+    add_options,
+    add_scene,
+    scene_of,
+    whole_number,
+)
 from digiclay.commands.refusals import refuse_unwritable, refuse_without
 from digiclay.commands.stop import Stop
 from digiclay.core.base.addresses import describe_exposure
@@ -44,7 +51,10 @@ def add(commands: Any) -> None:
     description = "Run a session in real time for other programs: poses in, forces and heights out."
     force, most_speed, port = LIMITS.force, 1e3 * LIMITS.speed, whole_number(0, 65535)
     options: Options = {
-        "--rate HZ": (_within(1, 1000, "Hz"), "control periods per second, 1 to 1000; default: the scene's"),
+        "--rate HZ": (
+            _within(1, 1000, "Hz"),
+            "control periods per second, 1 to 1000; default: the scene's",
+        ),
         "--host": (str, f"address of this machine to serve at; default: {HOST}", HOST),
         "--port N": (port, f"of the WebSocket, 0: any; default: {PORT}", PORT),
         "--osc-port N": (port, f"of OSC, 0: any; default: {OSC_PORT}", OSC_PORT),
@@ -64,11 +74,30 @@ def add(commands: Any) -> None:
             f"lift the fingertip after this time without a pose; default: {LIMITS.silence:g}",
             LIMITS.silence,
         ),
-        "--fingers N": (whole_number(1, MOST_FINGERS), "number of fingertips, all like the scene's first"),
-        "--lift MS": (_within(1.0, 1e4, "ms"), "lift fingers unnamed for this time; default: 100", 100.0),
-        "--clutch MM": (_within(0.0, 1e3, "mm"), "height over the pins where fingers begin, and slip", 0.0),
-        "--filter HZ": (_within(0.0, 1e3, "Hz"), "least cutoff of the 1-euro filter of fingers", 0.0),
-        "--coupling N/MM": (_within(0.0, 1e3, "N/mm"), "spring between tracked and simulated fingertip", 0.0),
+        "--fingers N": (
+            whole_number(1, MOST_FINGERS),
+            "number of fingertips, all like the scene's first",
+        ),
+        "--lift MS": (
+            _within(1.0, 1e4, "ms"),
+            "lift fingers unnamed for this time; default: 100",
+            100.0,
+        ),
+        "--clutch MM": (
+            _within(0.0, 1e3, "mm"),
+            "height over the pins where fingers begin, and slip",
+            0.0,
+        ),
+        "--filter HZ": (
+            _within(0.0, 1e3, "Hz"),
+            "least cutoff of the 1-euro filter of fingers",
+            0.0,
+        ),
+        "--coupling N/MM": (
+            _within(0.0, 1e3, "N/mm"),
+            "spring between tracked and simulated fingertip",
+            0.0,
+        ),
         "--out DIR": (Path, "record a take into this folder"),
         "--part S": (
             _within(0.1, 600.0, "s"),
@@ -95,23 +124,36 @@ def carry_out(arguments: argparse.Namespace) -> int:
         refuse_unwritable(arguments.report.resolve().parent)
     token, is_new = choose_token(arguments.token)
     if arguments.rate is not None:
-        arguments.settings.append(Setting("simulation.control_period", repr(1.0 / arguments.rate), "--rate"))
+        arguments.settings.append(
+            Setting("simulation.control_period", repr(1.0 / arguments.rate), "--rate")
+        )
     arguments.scene = arguments.scene or SCENE
     scene, _ = scene_of(arguments)
     if arguments.fingers is not None:
         scene = replace(scene, fingers=scene.fingers[:1] * arguments.fingers)
     limits = Limits(arguments.most_force, 1e-3 * arguments.most_speed, arguments.silence)
-    by_hand = (1e-3 * arguments.lift, 1e-3 * arguments.clutch, arguments.filter, 1e3 * arguments.coupling)
+    by_hand = (
+        1e-3 * arguments.lift,
+        1e-3 * arguments.clutch,
+        arguments.filter,
+        1e3 * arguments.coupling,
+    )
     session = begin_session(scene, limits, Tracking(*by_hand))
     bed, host = describe_bed(scene, session.system, session.limits), arguments.host
     size, out = len(pack_frame(make_frame(session))), arguments.out
     with (
-        PartWriter(out, overwrite=arguments.overwrite) if out is not None else nullcontext() as writer,
+        PartWriter(out, overwrite=arguments.overwrite)
+        if out is not None
+        else nullcontext() as writer,
         Stop() as stop,
-        Doors(bed, size, host=host, port=arguments.port, osc_port=arguments.osc_port, token=token) as doors,
+        Doors(
+            bed, size, host=host, port=arguments.port, osc_port=arguments.osc_port, token=token
+        ) as doors,
     ):
         rate, shown = 1.0 / session.system.period, f"[{host}]" if ":" in host else host
-        _tell(f"{scene.name or scene.method}: {scene.cells} pins, {rate:g} control periods per second")
+        _tell(
+            f"{scene.name or scene.method}: {scene.cells} pins, {rate:g} control periods per second"
+        )
         _tell(f"WebSocket ws://{shown}:{doors.port}")
         _tell(f"OSC       {shown}:{doors.osc_port} (UDP)")
         if is_new:
@@ -121,18 +163,28 @@ def carry_out(arguments: argparse.Namespace) -> int:
         end = math.inf if arguments.seconds is None else time.monotonic() + arguments.seconds
         try:
             session, figures = run_session(
-                session, doors, writer, arguments.part, lambda: stop() or time.monotonic() >= end, _tell
+                session,
+                doors,
+                writer,
+                arguments.part,
+                lambda: stop() or time.monotonic() >= end,
+                _tell,
             )
         finally:
             written = writer.finish() if writer else []
-        figures |= {"counts": doors.close(), "takes": list(writer.efforts.values()) if writer else []}
+        figures |= {
+            "counts": doors.close(),
+            "takes": list(writer.efforts.values()) if writer else [],
+        }
     if arguments.report is not None:
         write_whole(arguments.report, format_json({**figures, "diverged": session.diverged}))
     if not arguments.quiet:
         for line in _summary(figures):
             _tell(line)
     for path, effort in zip(written, figures["takes"], strict=False):
-        _tell(f"take written to {path}: {effort['simulated']:.1f} s in real time; {describe_errors(effort)}")
+        _tell(
+            f"take written to {path}: {effort['simulated']:.1f} s in real time; {describe_errors(effort)}"
+        )
     if writer and writer.failure:
         raise OutputError(writer.failure)
     return 0
@@ -147,7 +199,9 @@ def _within(least: float, most: float, unit: str) -> Callable[[str], float]:
         except ValueError:
             number = math.nan
         if not least <= number <= most:
-            raise argparse.ArgumentTypeError(f"must be from {least:g} to {most:g} {unit} (got {text!r})")
+            raise argparse.ArgumentTypeError(
+                f"must be from {least:g} to {most:g} {unit} (got {text!r})"
+            )
         return number
 
     return read
@@ -161,7 +215,9 @@ def _tell(line: str) -> None:
 def _summary(figures: Table) -> Iterator[str]:
     """Give the lines about a session that has ended."""
     elapsed, period, periods = figures["elapsed"], figures["period"], figures["periods"]
-    shares = ", ".join(f"{name} {1e3 * elapsed[name]:.2f} ms" for name in ("p50", "p99", "p99.9", "longest"))
+    shares = ", ".join(
+        f"{name} {1e3 * elapsed[name]:.2f} ms" for name in ("p50", "p99", "p99.9", "longest")
+    )
     missed = 100.0 * figures["missed"] / max(1, periods)
     yield (
         f"{periods} control periods of {1e3 * period:g} ms: {figures['missed']} late ({missed:.4g} %), "
@@ -169,7 +225,9 @@ def _summary(figures: Table) -> Iterator[str]:
     )
     yield f"{figures['simulated']:.1f} s simulated since the last reset; {describe_errors(figures)}"
     counts = dict(sorted(figures["counts"].items()))
-    flagged = {f"frames {name.replace('_', ' ')}": count for name, count in figures["flagged"].items()}
+    flagged = {
+        f"frames {name.replace('_', ' ')}": count for name, count in figures["flagged"].items()
+    }
     for words in (flagged, counts):
         if words:
             yield ", ".join(f"{name}: {count}" for name, count in words.items())

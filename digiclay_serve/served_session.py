@@ -47,9 +47,11 @@ from .tracked_fingers import (
 
 #: Time between two states that are kept for a session that diverges, s.
 KEEP = 0.5
-#: How far a point of the fingertip is from the lowest one at most, in the paper's device, m: a turn moves it.
+#: How far a point of the fingertip is from the lowest one at most, in the paper's device, m: a turn
+#: moves it.
 ARM = 0.02
-#: How far around a fingertip pins are looked at, m: whatever is under it, and what it could run into.
+#: How far around a fingertip pins are looked at, m: whatever is under it, and what it could run
+#: into.
 AROUND = 0.015
 
 
@@ -82,7 +84,11 @@ def begin_session(scene: Scene, limits: Limits = LIMITS, tracking: Tracking = TR
 
 
 def _begin_at_rest(
-    scene: Scene, system: System, limits: Limits, tracking: Tracking, monitor: accuracy.ErrorMonitor | None
+    scene: Scene,
+    system: System,
+    limits: Limits,
+    tracking: Tracking,
+    monitor: accuracy.ErrorMonitor | None,
 ) -> Session:
     """Return the session of a bed at rest; a fingertip in the place of another one is not there."""
     state = begin(system)
@@ -112,11 +118,13 @@ def lacks_pose(session: Session, order: Order, silence: float) -> bool:
     return silence > most or not (order.named or order.pose)
 
 
-def aim(session: Session, order: Order, count: int, silence: float = 0.0) -> tuple[Session, Floats, float]:
+def aim(
+    session: Session, order: Order, count: int, silence: float = 0.0
+) -> tuple[Session, Floats, float]:
     """Return the session, and where its fingertips (f, 7) are to be after control periods by an order.
 
-    And the height, m, over which they go there at once. An identity that is not named lifts, and so does the
-    fingertip of a pose that came long ago. `silence`: time since the order, s.
+    And the height, m, over which they go there at once. An identity that is not named lifts, and so
+    does the fingertip of a pose that came long ago. `silence`: time since the order, s.
     """
     targets, clear = session.poses.copy(), math.inf
     if order.named:
@@ -126,7 +134,9 @@ def aim(session: Session, order: Order, count: int, silence: float = 0.0) -> tup
             tracks = name_fingers(tracks, order.fingers)
         tracks, targets = advance(tracks, session.tracking, felt, time)
         _, rates = _read_pulp(session.scene)
-        relaxed = session.relaxed - np.expm1(-time * rates) * (felt.tension[:, None] - session.relaxed)
+        relaxed = session.relaxed - np.expm1(-time * rates) * (
+            felt.tension[:, None] - session.relaxed
+        )
         session = replace(session, tracks=tracks, named=order.named, relaxed=relaxed)
         clear = felt.peak + CLEAR
     if order.pose is not None:
@@ -140,7 +150,11 @@ def feel(session: Session, time: float) -> Felt:
     """Return what the fingertips feel, by the laws of the first, before a time, s."""
     state, system, poses = session.state, session.system, session.poses
     first, heights, force = session.scene.fingers[0], state.row(0), state.finger_forces()
-    law, tip, peak = first.contact or Contact(), first.fingertip or Fingertip(), float(heights.max())
+    law, tip, peak = (
+        first.contact or Contact(),
+        first.fingertip or Fingertip(),
+        float(heights.max()),
+    )
     # What grows is the tension: the force and what has relaxed of it meanwhile; none over the clay.
     tension = np.where(force > 0.0, force + session.relaxed @ _read_pulp(session.scene)[0], 0.0)
 
@@ -160,7 +174,9 @@ def feel(session: Session, time: float) -> Felt:
         stiffness = 2.0 * (law.exponent * tension + law.stiffness * law.share * pressed)
         return Around(stiffness, highest, meet)
 
-    return Felt(poses, force, tension, 1.0 / law.exponent, peak, cache(look), session.limits.speed * time)
+    return Felt(
+        poses, force, tension, 1.0 / law.exponent, peak, cache(look), session.limits.speed * time
+    )
 
 
 def _read_pulp(scene: Scene) -> tuple[Floats, Floats]:
@@ -169,13 +185,17 @@ def _read_pulp(scene: Scene) -> tuple[Floats, Floats]:
     return (pulp.shares, pulp.rates[:, 0]) if pulp else (np.zeros(0), np.zeros(0))
 
 
-def follow(session: Session, targets: Floats, number: int, count: int, clear: float = math.inf) -> Session:
+def follow(
+    session: Session, targets: Floats, number: int, count: int, clear: float = math.inf
+) -> Session:
     """Simulate control periods in which fingertips go straight to poses, at their largest speed at most.
 
-    A session that diverges goes back to a state it has kept, with the fingertips there; its recording too.
+    A session that diverges goes back to a state it has kept, with the fingertips there; its
+    recording too.
 
-    `session`: used up; `targets` (f, 7), lowest point, m, and unit quaternion, finite; `number`: of the pose;
-    `count`: control periods, at least 1; `clear`: height over which fingertips go anywhere at once, m.
+    `session`: used up; `targets` (f, 7), lowest point, m, and unit quaternion, finite; `number`: of
+    the pose; `count`: control periods, at least 1; `clear`: height over which fingertips go
+    anywhere at once, m.
     """
     system = session.system
     if session.refused is not None and np.array_equal(targets, session.refused):
@@ -184,9 +204,14 @@ def follow(session: Session, targets: Floats, number: int, count: int, clear: fl
     reach = session.limits.speed * system.period * count
     start = session.poses
     ends = np.array(
-        [_limit_way(*each, reach, clear) for each in zip(start.tolist(), goals.tolist(), strict=True)]
+        [
+            _limit_way(*each, reach, clear)
+            for each in zip(start.tolist(), goals.tolist(), strict=True)
+        ]
     )
-    path = np.array([start, ends]) if count == 1 else live_session.interpolate_path(start, ends, count)
+    path = (
+        np.array([start, ends]) if count == 1 else live_session.interpolate_path(start, ends, count)
+    )
     try:
         after = live_session.follow_path(session, path)
     except DivergenceError:
@@ -249,13 +274,19 @@ def make_frame(session: Session, flags: int = 0) -> Frame:
     if (largest := float(each.max())) > most:
         flags |= Flag.FORCE_LIMITED
         share = most / largest
-        forces, each, total = forces * share, each * share, total * share if system.fingers > 1 else most
+        forces, each, total = (
+            forces * share,
+            each * share,
+            total * share if system.fingers > 1 else most,
+        )
     pins = state.row(0).astype(np.float32), forces.astype(np.float32)
     time = state.period * system.period
     rows = session.tracks.identities.tolist(), each.tolist(), map(tuple, session.poses.tolist())
     fingers = tuple(zip(*rows, strict=True)) if system.fingers > 1 else ()
     errors = session.errors and (session.errors.height, session.errors.force)
-    return Frame(state.period, session.number, time, total, session.poses[0], *pins, flags, fingers, errors)
+    return Frame(
+        state.period, session.number, time, total, session.poses[0], *pins, flags, fingers, errors
+    )
 
 
 #: Most parts that wait for the disk.
@@ -267,8 +298,8 @@ TAKE = Content("take", ("take_[0-9][0-9][0-9].npz", f"take_[0-9][0-9][0-9]_part_
 class PartWriter(AbstractContextManager["PartWriter"]):
     """Thread that writes parts into a folder, which no other process writes until the block ends.
 
-    The folder is new or empty; with `overwrite` it may hold takes, which the first part that is written
-    replaces. Raises OutputError on entry when it cannot be used.
+    The folder is new or empty; with `overwrite` it may hold takes, which the first part that is
+    written replaces. Raises OutputError on entry when it cannot be used.
     """
 
     def __init__(self, folder: Path, *, overwrite: bool = False) -> None:
@@ -294,7 +325,9 @@ class PartWriter(AbstractContextManager["PartWriter"]):
             return
         self._waiting = [part for part in self._waiting if not part.done()]
         if len(self._waiting) > WAITING:
-            self.failure = f"The disk is too slow for the take: {self.folder} has what was written until now."
+            self.failure = (
+                f"The disk is too slow for the take: {self.folder} has what was written until now."
+            )
             return
         path = self.folder / f"take_{self.session:03}_part_{self._part:05}.npz"
         self._waiting.append(self._writing.submit(self._write, path, take))
@@ -312,7 +345,9 @@ class PartWriter(AbstractContextManager["PartWriter"]):
         written = []
         for name, group in groupby(files, lambda path: path.name.partition("_part_")[0]):
             parts, target = list(group), self.folder / f"{name}.npz"
-            write_whole(target, to_bytes(join_parts([from_bytes(path.read_bytes()) for path in parts])))
+            write_whole(
+                target, to_bytes(join_parts([from_bytes(path.read_bytes()) for path in parts]))
+            )
             for path in parts:
                 path.unlink()
             written.append(target)

@@ -1,7 +1,7 @@
 """Tracked fingers: poses with identities, which are off, late and trembling, to aims of fingertips.
 
-A tracked pose goes through a clutch, a filter and a virtual coupling; each is a pure function of arrays with
-one row per finger. No clock, no bed: `served_session` has both.
+A tracked pose goes through a clutch, a filter and a virtual coupling; each is a pure function of
+arrays with one row per finger. No clock, no bed: `served_session` has both.
 """
 
 import math
@@ -14,11 +14,12 @@ from digiclay.core.base.arrays import Flags, Floats, Indices
 
 #: Height of a fingertip that is not there, m; whatever is as high is simulated at next to no cost.
 PARKED = 1.0
-#: Height over the highest pin from which on a fingertip goes anywhere without touching, m; how often a second
-#: a pin that is felt comes in by `growth`.
+#: Height over the highest pin from which on a fingertip goes anywhere without touching, m; how
+#: often a second a pin that is felt comes in by `growth`.
 CLEAR, CREEP = 5e-3, 20.0
-#: A finger is no farther aside from where it was named last, m, and m per s since, and no finger is nearer to
-#: another, m: what is farther has another one's name, or is none. Nothing tracked is farther from the bed, m.
+#: A finger is no farther aside from where it was named last, m, and m per s since, and no finger is
+#: nearer to another, m: what is farther has another one's name, or is none. Nothing tracked is
+#: farther from the bed, m.
 JUMP, PACE, APART, FAR = 6e-3, 0.25, 15e-3, 1e3
 #: Of the 1-euro filter: cutoff of the speed, Hz, and what a speed adds to the cutoff, Hz per m/s.
 SPEED_CUTOFF, HASTE = 1.0, 20.0
@@ -44,7 +45,8 @@ TRACKING = Tracking()
 class Around(NamedTuple):
     """Pins around the fingertips: one row per finger."""
 
-    #: (f,): how much the force grows with depth at once, N/m; highest pin, m, of the bed where there is none.
+    #: (f,): how much the force grows with depth at once, N/m; highest pin, m, of the bed where
+    #: there is none.
     stiffness: Floats
     top: Floats
     #: Heights (k,), m, at which fingertips at poses (k, 7) touch a pin first.
@@ -106,8 +108,8 @@ def begin_tracks(poses: Floats) -> Tracks:
 def name_fingers(tracks: Tracks, named: Sequence[tuple[int, Sequence[float]]]) -> Tracks:
     """Return the tracks after a message: identities, none twice, and their poses (7,).
 
-    A known identity keeps its fingertip, a new one gets that of one gone from its place, or the first that is
-    free; without any it waits. What is elsewhere all at once counts as not named.
+    A known identity keeps its fingertip, a new one gets that of one gone from its place, or the
+    first that is free; without any it waits. What is elsewhere all at once counts as not named.
     """
     given = np.array([pose for _, pose in named]).reshape(-1, 7)
     given[:, :3] = given[:, :3].clip(-FAR, FAR)
@@ -118,7 +120,10 @@ def name_fingers(tracks: Tracks, named: Sequence[tuple[int, Sequence[float]]]) -
     _hand_over(ids, tracked, rows, given, most)
     slots_of = {identity: slot for slot, identity in enumerate(ids.tolist())}
     free = iter(np.flatnonzero(ids < 0).tolist())
-    taken = {identity: slots_of[identity] if identity in slots_of else next(free, None) for identity in rows}
+    taken = {
+        identity: slots_of[identity] if identity in slots_of else next(free, None)
+        for identity in rows
+    }
     here, there = given[:, :2].tolist(), tracked[:, :2].tolist()
     found = {
         identity: slot
@@ -128,7 +133,11 @@ def name_fingers(tracks: Tracks, named: Sequence[tuple[int, Sequence[float]]]) -
     }
     slots = [*found.values()]
     fresh[slots] = ids[slots] < 0
-    ids[slots], unnamed[slots], tracked[slots] = [*found], 0.0, given[[rows[identity] for identity in found]]
+    ids[slots], unnamed[slots], tracked[slots] = (
+        [*found],
+        0.0,
+        given[[rows[identity] for identity in found]],
+    )
     was = fresh[:, None]
     return replace(
         tracks,
@@ -143,18 +152,24 @@ def name_fingers(tracks: Tracks, named: Sequence[tuple[int, Sequence[float]]]) -
     )
 
 
-def _put_back_exchanged(ids: Indices, tracked: Floats, rows: Mapping[int, int], given: Floats) -> None:
+def _put_back_exchanged(
+    ids: Indices, tracked: Floats, rows: Mapping[int, int], given: Floats
+) -> None:
     """Put back identities (f,) that have changed places in a message: their rows in what is given."""
-    named_slots = np.array([slot for slot, identity in enumerate(ids.tolist()) if identity in rows], np.intp)
+    named_slots = np.array(
+        [slot for slot, identity in enumerate(ids.tolist()) if identity in rows], np.intp
+    )
     now = given[[rows[identity] for identity in ids[named_slots].tolist()], :3]
     moved = np.linalg.norm(now - tracked[named_slots, :3], axis=1)
     if moved.max(initial=0.0) <= JUMP:
         return
     distance = np.linalg.norm(now[:, None] - tracked[named_slots, :3], axis=2)
-    # Fingers go on where they were: what is far nearer to another's place has its name. Those that go around
-    # in a ring of such places have exchanged theirs.
+    # Fingers go on where they were: what is far nearer to another's place has its name. Those that
+    # go around in a ring of such places have exchanged theirs.
     nearest = np.where(
-        (2.0 * distance.min(1) < moved) & (moved > JUMP), distance.argmin(1), np.arange(named_slots.size)
+        (2.0 * distance.min(1) < moved) & (moved > JUMP),
+        distance.argmin(1),
+        np.arange(named_slots.size),
     )
     ring = nearest
     for _ in nearest:
@@ -162,7 +177,9 @@ def _put_back_exchanged(ids: Indices, tracked: Floats, rows: Mapping[int, int], 
     ids[named_slots[nearest[ring]]] = ids[named_slots[ring]]
 
 
-def _hand_over(ids: Indices, tracked: Floats, rows: Mapping[int, int], given: Floats, most: Floats) -> None:
+def _hand_over(
+    ids: Indices, tracked: Floats, rows: Mapping[int, int], given: Floats, most: Floats
+) -> None:
     """Give identities (f,) that are not named to new ones that are nearest to them, `most` (f,) m away."""
     held = np.flatnonzero(ids >= 0)
     named = set(ids.tolist())
@@ -221,7 +238,9 @@ def smooth(tracks: Tracks, cutoff: float, time: float) -> tuple[Floats, Floats]:
     quick = cutoff + HASTE * np.linalg.norm(speed, axis=1, keepdims=True)
     # A quaternion and its negative are one turn.
     sign = np.sign((tracks.tracked[:, 3:] * tracks.filtered[:, 3:]).sum(1, keepdims=True))
-    goal = np.hstack([tracks.tracked[:, :3], np.where(sign < 0.0, -1.0, 1.0) * tracks.tracked[:, 3:]])
+    goal = np.hstack(
+        [tracks.tracked[:, :3], np.where(sign < 0.0, -1.0, 1.0) * tracks.tracked[:, 3:]]
+    )
     filtered = tracks.filtered + _share(quick, time) * (goal - tracks.filtered)
     filtered[:, 3:] /= np.linalg.norm(filtered[:, 3:], axis=1, keepdims=True)
     return filtered, speed
@@ -235,14 +254,17 @@ def _share(cutoff: float | Floats, time: float) -> float | Floats:
 def give_way(goal: Floats, felt: Felt, coupling: float, time: float) -> Floats:
     """Return the poses (f, 7) of fingertips on springs, N/m, from tracked ones, after a time, s.
 
-    In balance with the force at the new height, which its stiffness foretells: no step is too long, and no
-    force too large. A pin comes in by `growth`, then slowly: a fingertip goes over what stands in its way.
+    In balance with the force at the new height, which its stiffness foretells: no step is too long,
+    and no force too large. A pin comes in by `growth`, then slowly: a fingertip goes over what
+    stands in its way.
     """
     here, height, after = felt.poses[:, 2], goal[:, 2], goal.copy()
     around = felt.look()
     meets, now = around.meet(np.concatenate([goal, felt.poses])).reshape(2, -1)
     deep = np.maximum(now - here, 0.0)
-    balanced = (coupling * height + felt.force + around.stiffness * here) / (coupling + around.stiffness)
+    balanced = (coupling * height + felt.force + around.stiffness * here) / (
+        coupling + around.stiffness
+    )
     lowest = meets - np.maximum(deep + CREEP * time * felt.growth, felt.growth)
     # The spring never pulls: clay does not stick to a fingertip.
     after[:, 2] = np.maximum(np.maximum(balanced, height), lowest)

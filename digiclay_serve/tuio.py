@@ -10,8 +10,8 @@ from digiclay.core.base.arrays import Floats
 from digiclay.core.base.errors import ParameterError
 from pythonosc.osc_packet import OscPacket
 
-#: Time after which a pad is gone, s: one that is touched repeats itself each second. Pressure of one that has
-#: none. Most contacts between two lists of those alive.
+#: Time after which a pad is gone, s: one that is touched repeats itself each second. Pressure of
+#: one that has none. Most contacts between two lists of those alive.
 GONE, USUAL, MOST = 1.2, 0.5, 256
 
 
@@ -19,11 +19,13 @@ GONE, USUAL, MOST = 1.2, 0.5, 256
 class Pad:
     """Pad that was heard; its middle is that of the bed."""
 
-    #: m: of the clay at rest; side of the bed that the pad covers; depth of a finger at full pressure.
+    #: m: of the clay at rest; side of the bed that the pad covers; depth of a finger at full
+    #: pressure.
     height: float
     size: float
     depth: float
-    #: Position from the upper left corner and pressure, 0 to 1, of those alive; None before the first.
+    #: Position from the upper left corner and pressure, 0 to 1, of those alive; None before the
+    #: first.
     contacts: dict[int, list[float] | None] = field(default_factory=dict)
     heard: float = 0.0  # s
     senses: bool = False  # pressure
@@ -35,16 +37,26 @@ class Pad:
             for each in OscPacket(data).messages:
                 contacts = _take_message(contacts, each.message.address, each.message.params)
         except Exception:  # python-osc raises errors of many kinds over bytes that are no OSC
-            raise ParameterError("datagram", "", "must be TUIO 1.1 or 2.0", repr(data[:40])) from None
+            raise ParameterError(
+                "datagram", "", "must be TUIO 1.1 or 2.0", repr(data[:40])
+            ) from None
         senses = self.senses or any(touch and touch[2] for touch in contacts.values())
         return replace(self, contacts=contacts, heard=now, senses=bool(senses))
 
     def fingers(self, now: float) -> dict[int, Floats]:
         """Return the lowest points (3,), m, of the fingers that are there at a time, s, by identity."""
-        corner, scale = (-0.5 * self.size, 0.5 * self.size, self.height), (self.size, -self.size, -self.depth)
-        there, usual = self.contacts.items() if now - self.heard <= GONE else (), not self.senses and USUAL
+        corner, scale = (
+            (-0.5 * self.size, 0.5 * self.size, self.height),
+            (self.size, -self.size, -self.depth),
+        )
+        there, usual = (
+            self.contacts.items() if now - self.heard <= GONE else (),
+            not self.senses and USUAL,
+        )
         return {
-            identity: corner + np.add(touch, (0.0, 0.0, usual)) * scale for identity, touch in there if touch
+            identity: corner + np.add(touch, (0.0, 0.0, usual)) * scale
+            for identity, touch in there
+            if touch
         }
 
 

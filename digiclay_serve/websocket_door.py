@@ -17,9 +17,17 @@ from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 
 from .door_link import DoorLink, FrequentError
-from .protocol import LARGEST_REQUEST, format_frame, format_message, is_token, read_binary, read_json
+from .protocol import (
+    LARGEST_REQUEST,
+    format_frame,
+    format_message,
+    is_token,
+    read_binary,
+    read_json,
+)
 
-#: Most clients, and most connections that have not said yet who they are: beyond it the oldest is cut.
+#: Most clients, and most connections that have not said yet who they are: beyond it the oldest is
+#: cut.
 MOST_CLIENTS, MOST_SILENT = 64, 512
 #: Time for a client to say who it is, s; and to answer a ping.
 OPENING, PING = 5.0, 10.0
@@ -27,7 +35,8 @@ OPENING, PING = 5.0, 10.0
 FLOOD, WRONG = 4000, 20
 #: Bytes that wait for a slow reader; then frames pass it by.
 UNSENT = 64 * 1024
-#: Bytes that wait for one at most, and some frames; websockets answers pings without regard to a limit.
+#: Bytes that wait for one at most, and some frames; websockets answers pings without regard to a
+#: limit.
 MOST_UNSENT = 4 * 1024 * 1024
 #: Frames a second of a client that names no rate.
 USUAL_RATE = 60.0
@@ -57,13 +66,17 @@ def read_wishes(path: str) -> Wishes:
         wrong = repr(unknown[0] if unknown else address.path)[:40]
         raise ParameterError("address", "", "must be / with format, rate and token alone", wrong)
     if given.get("format", "json") not in ("json", "binary"):
-        raise ParameterError("address", "format", "must be json or binary", repr(given["format"])[:40])
+        raise ParameterError(
+            "address", "format", "must be json or binary", repr(given["format"])[:40]
+        )
     try:
         rate = float(given.get("rate", USUAL_RATE))
     except ValueError:
         rate = math.nan
     if not 0.0 <= rate <= 1000.0:
-        raise ParameterError("address", "rate", "must be from 0 to 1000 Hz", repr(given["rate"])[:40])
+        raise ParameterError(
+            "address", "rate", "must be from 0 to 1000 Hz", repr(given["rate"])[:40]
+        )
     return Wishes(given.get("format") == "binary", rate, given.get("token", ""))
 
 
@@ -149,7 +162,9 @@ class _WebSocketDoor:
         given = given.strip() if scheme.lower() == "bearer" else wishes.token
         if not is_token(given, self.link.token):
             self.link.counts["wrong tokens"] += 1
-            return connection.respond(http.HTTPStatus.UNAUTHORIZED, "The token is missing or wrong.\n")
+            return connection.respond(
+                http.HTTPStatus.UNAUTHORIZED, "The token is missing or wrong.\n"
+            )
         self.silent.pop(connection, None)
         if len(self.clients) >= MOST_CLIENTS:
             self.link.counts["clients beyond the limit"] += 1

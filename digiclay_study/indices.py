@@ -25,8 +25,8 @@ def count_points(samples: int, parameters: int, *, second: bool) -> int:
 def sample_shares(samples: int, parameters: int, seed: int, *, second: bool) -> Floats:
     """Return the points of Saltelli's design as shares of the ranges.
 
-    Each sample gives a block of points: A, A with one parameter of B each, for the second order B with one
-    parameter of A each, and B. A and B are halves of a scrambled Sobol point.
+    Each sample gives a block of points: A, A with one parameter of B each, for the second order B
+    with one parameter of A each, and B. A and B are halves of a scrambled Sobol point.
     """
     from SALib.sample import sobol
 
@@ -38,9 +38,9 @@ def sample_shares(samples: int, parameters: int, seed: int, *, second: bool) -> 
 CONFIDENCE, RESAMPLES = 0.95, 1000
 
 
-#: Sobol indices of one output over d parameters, each with half the width of its confidence interval: shares
-#: of the variance by the parameter alone, with all its interactions, (d,), and by the interaction of two
-#: parameters, (d, d), above the diagonal, if they were requested.
+#: Sobol indices of one output over d parameters, each with half the width of its confidence
+#: interval: shares of the variance by the parameter alone, with all its interactions, (d,), and by
+#: the interaction of two parameters, (d, d), above the diagonal, if they were requested.
 Indices = dict[str, tuple[Floats, Floats]]
 #: Their names, and those of SALib.
 ORDERS = {"first": "S1", "total": "ST", "second": "S2"}
@@ -60,11 +60,13 @@ def compute_indices(values: Floats, parameters: int, seed: int, *, second: bool)
         conf_level=CONFIDENCE,
         seed=seed,
     )
-    return {name: (result[key], result[f"{key}_conf"]) for name, key in ORDERS.items() if key in result}
+    return {
+        name: (result[key], result[f"{key}_conf"]) for name, key in ORDERS.items() if key in result
+    }
 
 
-#: The metric by which a run loses the fingertip, and how far it may exceed that of the unchanged scene, which
-#: may lift the fingertip on purpose.
+#: The metric by which a run loses the fingertip, and how far it may exceed that of the unchanged
+#: scene, which may lift the fingertip on purpose.
 LOSS, ALLOWED = "contact_loss_share", 0.05
 #: Metrics of the contact itself: a loss is a value of theirs.
 CONTACT = (LOSS, "contact_share")
@@ -92,16 +94,20 @@ def find_excess_losses(records: Sequence[Record], reference: Record) -> Floats:
 def make_response(name: str, records: Sequence[Record], excess: Floats) -> Response:
     """Return an output of all runs; those without it, or that lost the fingertip, have the others' worst.
 
-    Left out they would leave holes in the design of a study; at their own values runs that touch for a moment
-    only would count as good.
+    Left out they would leave holes in the design of a study; at their own values runs that touch
+    for a moment only would count as good.
     """
     values = np.array([get_figure(record, name) for record in records])
     absent = np.isnan(values)
     lost = (excess > 0.0) & ~absent & (name not in CONTACT)
     replaced = absent | lost
     if replaced.all():
-        errors = (f"; the first error: {record['error']}" for record in records if "error" in record)
-        raise OutputError(f"No run that keeps the fingertip has the metric {name}{next(errors, '.')}")
+        errors = (
+            f"; the first error: {record['error']}" for record in records if "error" in record
+        )
+        raise OutputError(
+            f"No run that keeps the fingertip has the metric {name}{next(errors, '.')}"
+        )
     pick = np.min if FIGURES[name].worse == "lower" else np.max
     values[replaced] = pick(values[~replaced])
     return Response(name, values, int(absent.sum()), int(lost.sum()))

@@ -1,7 +1,7 @@
 """League of control methods: confidence intervals over seeds of the noise, and one row per method.
 
-An interval is Student's t for the mean over the seeds, of which each has the same trajectories. It states
-what other noise would do, and nothing about other trajectories.
+An interval is Student's t for the mean over the seeds, of which each has the same trajectories. It
+states what other noise would do, and nothing about other trajectories.
 """
 
 import math
@@ -75,7 +75,8 @@ class Row(NamedTuple):
     """Row of the league."""
 
     method: str
-    #: `MEANS`, ``max_total_force``, ``losses``, ``period_cost``, ``cost_ratio`` and a limit a motion.
+    #: `MEANS`, ``max_total_force``, ``losses``, ``period_cost``, ``cost_ratio`` and a limit a
+    #: motion.
     measures: Mapping[str, Interval | None]
     #: On how many trajectories the mean RFD is above that of the first method; None of that one.
     worse: int | None
@@ -105,7 +106,11 @@ def show_digits(value: float, digits: int = 3) -> str:
 
 def list_values(table: Table, method: str, trajectory: str, measure: str) -> list[float]:
     """Return a measure of a method on a trajectory, one value per seed that has one."""
-    trials = (figures for (other, name, _), figures in table.items() if (other, name) == (method, trajectory))
+    trials = (
+        figures
+        for (other, name, _), figures in table.items()
+        if (other, name) == (method, trajectory)
+    )
     return [value for figures in trials if (value := figures.get(measure)) is not None]
 
 
@@ -120,15 +125,20 @@ def find_league(table: Table, methods: Sequence[str]) -> list[Row]:
             for name in (*MEANS, *REDUCED)
         }
         costs = [
-            [_reduce(table, each, "period_cost", seed) for each in (method, methods[0])] for seed in seeds
+            [_reduce(table, each, "period_cost", seed) for each in (method, methods[0])]
+            for seed in seeds
         ]
-        measures["cost_ratio"] = find_interval([cost / first for cost, first in costs if cost and first])
+        measures["cost_ratio"] = find_interval(
+            [cost / first for cost, first in costs if cost and first]
+        )
         for limit in LIMITS:
             speeds = [table.get((method, limit, seed), {}).get("speed_limit") for seed in seeds]
             measures[limit] = find_interval(speeds)
         searched = frozenset(name for other, name, _ in table if other == method and name in LIMITS)
         rows.append(Row(method, measures, *worse[method], searched))
-    return sorted(rows, key=lambda row: math.inf if row.measures["rfd"] is None else row.measures["rfd"].mean)
+    return sorted(
+        rows, key=lambda row: math.inf if row.measures["rfd"] is None else row.measures["rfd"].mean
+    )
 
 
 def count_worse(table: Table, methods: Sequence[str]) -> dict[str, tuple[int | None, int]]:
@@ -137,7 +147,9 @@ def count_worse(table: Table, methods: Sequence[str]) -> dict[str, tuple[int | N
     for (method, name, _), figures in table.items():
         if (rfd := figures.get("rfd")) is not None:
             values[method].setdefault(name, []).append(rfd)
-    first, *others = ({name: fmean(rfd) for name, rfd in values[method].items()} for method in methods)
+    first, *others = (
+        {name: fmean(rfd) for name, rfd in values[method].items()} for method in methods
+    )
     counted: dict[str, tuple[int | None, int]] = {methods[0]: (None, len(first))}
     for method, means in zip(methods[1:], others, strict=True):
         both = means.keys() & first.keys()

@@ -41,7 +41,8 @@ LEVEL: Turn = (0.0, 0.0, 0.0)
 Drawn = tuple[Any, ...]
 #: How far a fingertip is lifted at the end, m, in which time, and how long it then stays away, s.
 AWAY, LIFTED, SETTLED = 40e-3, 0.3, 1.5
-#: Seed of the random drags, and how far their fingertips are pitched and rolled, rad: 30 degrees in all.
+#: Seed of the random drags, and how far their fingertips are pitched and rolled, rad: 30 degrees in
+#: all.
 DRAG_SEED, TILT = 1, 0.37
 
 
@@ -121,7 +122,9 @@ def list_paths() -> dict[str, Drawn]:
     eight = _lift(0.0, 0.0, 8.0)
     for angle in np.linspace(0.0, 2.0 * math.pi, 81)[1:].tolist():
         time = eight[4][0] + 10.0 * angle / (2.0 * math.pi)
-        eight.append((time, 20.0 * math.sin(angle), 12.0 * math.sin(2.0 * angle), 8.0, 0.0, 0.0, 0.0))
+        eight.append(
+            (time, 20.0 * math.sin(angle), 12.0 * math.sin(2.0 * angle), 8.0, 0.0, 0.0, 0.0)
+        )
     twisted = _lift(-20.0, -5.0, 10.0)
     begun = twisted[-1][0]
     turns = ((0.8, 0.0, 0.2), (0.0, 0.25, 0.0), (-0.8, 0.0, -0.2), (0.0, 0.0, 0.0))
@@ -141,11 +144,21 @@ def list_hands() -> dict[str, Drawn]:
     """Return the paths of several fingertips by name."""
     pinch, five = [], []
     for y in (-1.0, 1.0):
-        points = ((4.0, -18.0, 6.0 * y), (4.4, -18.0, 6.0 * y), (7.4, 18.0, 6.0 * y), (7.9, 18.0, 6.0 * y))
-        pinch.append([*_lift(-18.0, 10.0 * y, 0.0, press=FELT), *((*at, 7.0, *LEVEL) for at in points)])
+        points = (
+            (4.0, -18.0, 6.0 * y),
+            (4.4, -18.0, 6.0 * y),
+            (7.4, 18.0, 6.0 * y),
+            (7.9, 18.0, 6.0 * y),
+        )
+        pinch.append(
+            [*_lift(-18.0, 10.0 * y, 0.0, press=FELT), *((*at, 7.0, *LEVEL) for at in points)]
+        )
     for start in np.linspace(0.0, 2.0 * math.pi, 6)[:-1].tolist():
         turned = [(0.0, 0.0), (5.5, 0.3), (7.0, 0.0), (8.5, -0.3), (10.0, 0.0)]
-        arc = [(t, 16.0 * math.cos(start + angle), 16.0 * math.sin(start + angle)) for t, angle in turned]
+        arc = [
+            (t, 16.0 * math.cos(start + angle), 16.0 * math.sin(start + angle))
+            for t, angle in turned
+        ]
         five.append([*_lift(*arc[0][1:], 7.0, press=FELT), *((*at, 7.0, *LEVEL) for at in arc[1:])])
     # The second one starts so much later that it passes 11 mm behind the first.
     along, later = _drag(-20.0, 0.0, 6.0, 12.0, press=FELT), 11.0 * math.sqrt(2.0) / 12.0
@@ -173,7 +186,9 @@ def draw_drags(count: int) -> list[Drawn]:
         x, y = random.uniform(-10.0, 10.0, 2)
         dx, dy = 0.5 * length * np.array((math.cos(angle), math.sin(angle)))
         facing, turned = random.uniform((-math.pi, -1.0), (math.pi, 1.0)).tolist()
-        first, last = ((turn, *random.uniform(-TILT, TILT, 2).tolist()) for turn in (facing, facing + turned))
+        first, last = (
+            (turn, *random.uniform(-TILT, TILT, 2).tolist()) for turn in (facing, facing + turned)
+        )
         poses = _lift(float(x - dx), float(y - dy), height, first)
         end = poses[-1][0] + length / speed
         poses += [(t, float(x + dx), float(y + dy), height, *last) for t in (end, end + 0.5)]
@@ -239,7 +254,9 @@ def read_groups(words: Sequence[str]) -> tuple[str, ...]:
         if word not in GROUPS:
             close = find_nearest_name(word, list(GROUPS))
             hint = f"Did you mean {close}?" if close else ""
-            raise ParameterError("--trajectories", "", f"must be among {', '.join(GROUPS)}", repr(word), hint)
+            raise ParameterError(
+                "--trajectories", "", f"must be among {', '.join(GROUPS)}", repr(word), hint
+            )
     return tuple(group for group in GROUPS if group in words)
 
 
@@ -263,7 +280,11 @@ def place_trial(scene: Scene, trajectory: str, *, errors: bool = False) -> tuple
     if trajectory == SESSION:
         return recorded, measure
     group, _, number = trajectory.partition("-")
-    drawn = draw_drags(int(number))[-1] if group == RANDOM else (list_paths() | list_hands())[trajectory]
+    drawn = (
+        draw_drags(int(number))[-1]
+        if group == RANDOM
+        else (list_paths() | list_hands())[trajectory]
+    )
     return lift_off(with_paths(recorded, *drawn)), measure
 
 

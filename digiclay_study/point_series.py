@@ -97,7 +97,9 @@ def fit_ranges(ranges: Sequence[Range], path: Path, settings: Sequence[Setting])
 def _fit(varied: Range, scene: Scene, path: Path, settings: Sequence[Setting]) -> Range:
     """Return a range as the scene's parameter has it."""
     declared = axes.find_quantity(scene, varied.key)
-    if declared is None or varied.words:  # an unknown key, or a word: the scene file's own rules tell
+    if (
+        declared is None or varied.words
+    ):  # an unknown key, or a word: the scene file's own rules tell
         for word in varied.words or (varied.find_word(0.0),):
             load(path, [*settings, Setting(varied.key, word, "--vary")])
         return varied
@@ -146,7 +148,9 @@ class Subject:
     def make_points(self, shares: Floats, first: int, progress: Any = None) -> list[axes.Point]:
         """Return the points at shares (points, parameters) of the ranges. `first`: index of the first."""
         rows = [tuple(map(Range.find_word, self.ranges, row)) for row in shares]
-        points = axes.place_points(self.path, self.settings, self.keys, rows, first=first, progress=progress)
+        points = axes.place_points(
+            self.path, self.settings, self.keys, rows, first=first, progress=progress
+        )
         return judge_all(points) if any(name in ERRORS for name in self.names) else points
 
     def open_folder(self, path: Path, name: str, plan: Table) -> AbstractContextManager[Folder]:
@@ -162,7 +166,9 @@ class Subject:
             for key, here in description.items():
                 if there.get(key) != here:
                     plain = isinstance(there.get(key), (int, str)) and key != "scene"
-                    return f"{key} {there[key]}" if plain else f"with another {key.removesuffix('s')}"
+                    return (
+                        f"{key} {there[key]}" if plain else f"with another {key.removesuffix('s')}"
+                    )
             return "of another kind"
 
         return open_points(path, name, description, describe)
@@ -210,7 +216,9 @@ def read_subject(arguments: argparse.Namespace) -> Subject:
     """Return what the options vary and measure; ParameterError, SceneError, OutputError in one line."""
     names = read_metrics(arguments.metric)
     path, settings = find(arguments.scene), settings_of(arguments)
-    ranges = fit_ranges([read_range(name_methods(varied)) for varied in arguments.vary], path, settings)
+    ranges = fit_ranges(
+        [read_range(name_methods(varied)) for varied in arguments.vary], path, settings
+    )
     scene = load(path, settings)
     if scene.recorder is None:
         raise OutputError("Metrics need a recorder, and the scene has recorder = 'absent'.")
@@ -220,4 +228,6 @@ def read_subject(arguments: argparse.Namespace) -> Subject:
 def refuse_too_many(option: str, points: int) -> None:
     """Refuse a plan of more points than a sweep may have. `option`: the one that sets their number."""
     if points > axes.MOST:
-        raise ParameterError(option, "", f"must come to {axes.MOST} points at most", f"{points} points")
+        raise ParameterError(
+            option, "", f"must come to {axes.MOST} points at most", f"{points} points"
+        )

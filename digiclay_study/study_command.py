@@ -52,7 +52,9 @@ MOST_SAMPLES = 4096
 
 def add(commands: Any) -> None:
     """Add the command."""
-    description = "Find which parameters matter: Sobol indices of metrics over ranges of parameters."
+    description = (
+        "Find which parameters matter: Sobol indices of metrics over ranges of parameters."
+    )
     purpose = "find which parameters matter for which metric"
     parser = add_command(commands, "study", purpose, EXAMPLES, description, carry_out=carry_out)
     add_subject(parser, METRICS)
@@ -103,7 +105,9 @@ def carry_out(arguments: Namespace) -> int:
         return [*lines, *bundles.describe(), f"written to {arguments.out}: start with study.md"]
 
     opened = subject.open_folder(arguments.out, "study", plan)
-    return run_series(arguments, "study", total + 1, opened, evaluate, write, pieces=len(bundles.every))
+    return run_series(
+        arguments, "study", total + 1, opened, evaluate, write, pieces=len(bundles.every)
+    )
 
 
 def _write(
@@ -126,7 +130,9 @@ def _write(
     if not responses:
         raise OutputError(notes[0])
     indices = {
-        name: compute_indices(response.values, len(subject.ranges), arguments.seed, second=arguments.second)
+        name: compute_indices(
+            response.values, len(subject.ranges), arguments.seed, second=arguments.second
+        )
         for name, response in responses.items()
     }
     unchanged = records[UNCHANGED]["figures"]
@@ -172,7 +178,11 @@ def _summarize(findings: Findings) -> Iterator[str]:
             continue
         parts = (f"{keys[i]} {_format(indices, 'total', i)}" for i in _rank(indices["total"]))
         _, _, absent, lost = findings.responses[name]
-        gaps = f" ({absent} runs without a value, {lost} that lost the fingertip)" if absent + lost else ""
+        gaps = (
+            f" ({absent} runs without a value, {lost} that lost the fingertip)"
+            if absent + lost
+            else ""
+        )
         yield f"{name}: total indices {', '.join(parts)}{gaps}"
 
 
@@ -197,7 +207,11 @@ def format_index_table(findings: Findings) -> str:
     for name, indices in findings.indices.items():
         for order in ("first", "total"):
             for i, key in enumerate(keys):
-                pair = ["", ""] if indices is None else [repr(float(part[i])) for part in indices[order]]
+                pair = (
+                    ["", ""]
+                    if indices is None
+                    else [repr(float(part[i])) for part in indices[order]]
+                )
                 rows.append([name, order, key, "", *pair])
         if indices and "second" in indices:
             for i, j in zip(*np.triu_indices(len(keys), 1), strict=True):
@@ -216,9 +230,13 @@ def list_page(findings: Findings) -> Iterator[str]:
         "All values of a range are equally likely; on a logarithmic scale, equal ratios are. "
         f"With the unchanged scene, {findings.effort}.\n"
     )
-    yield from _list_table(("parameter", "range"), [(f"`{each.key}`", each) for each in subject.ranges], 2)
+    yield from _list_table(
+        ("parameter", "range"), [(f"`{each.key}`", each) for each in subject.ranges], 2
+    )
     yield "\n## Outputs\n"
-    outputs = [_describe(findings.unchanged[name], each) for name, each in findings.responses.items()]
+    outputs = [
+        _describe(findings.unchanged[name], each) for name, each in findings.responses.items()
+    ]
     yield from _list_table(HEAD, outputs, 2)
     yield (
         "\n*Without a value* are runs that failed or to which the output does not apply. *Fingertip lost* "
@@ -249,12 +267,16 @@ def list_page(findings: Findings) -> Iterator[str]:
             first, second = np.triu_indices(len(keys), 1)
             ranked = _rank(indices["second"], (first, second))
             pairs = zip(first[ranked], second[ranked], strict=True)
-            rows = [[f"`{keys[i]}`, `{keys[j]}`", _format(indices, "second", (i, j))] for i, j in pairs]
+            rows = [
+                [f"`{keys[i]}`, `{keys[j]}`", _format(indices, "second", (i, j))] for i, j in pairs
+            ]
             yield from _list_table(("interaction of", "second order"), rows)
             yield ""
 
 
-def _list_table(head: Sequence[str], rows: Sequence[Sequence[object]], texts: int = 1) -> Iterator[str]:
+def _list_table(
+    head: Sequence[str], rows: Sequence[Sequence[object]], texts: int = 1
+) -> Iterator[str]:
     """Give the lines of a table in Markdown; the first `texts` columns are texts, all others numbers."""
     yield f"| {' | '.join(head)} |"
     yield f"|{' --- |' * texts}{' ---: |' * (len(head) - texts)}"
@@ -266,7 +288,9 @@ def _describe(unchanged: float | None, response: Response) -> list[object]:
     factor, unit = read_unit(FIGURES[response.name].unit, response.values)
     values = response.values * factor
     usual = "–" if unchanged is None else f"{unchanged * factor:.4g}"
-    numbers = (f"{number:.4g}" for number in (values.mean(), values.std(), values.min(), values.max()))
+    numbers = (
+        f"{number:.4g}" for number in (values.mean(), values.std(), values.min(), values.max())
+    )
     return [f"`{response.name}`", unit or "1", usual, *numbers, response.absent, response.lost]
 
 

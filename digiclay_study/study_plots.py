@@ -27,7 +27,9 @@ PADS = dict.fromkeys(("figure.constrained_layout.w_pad", "figure.constrained_lay
 
 
 @contextmanager
-def panels(title: str, width: float, height: float, rows: int, columns: int) -> Iterator[tuple[Figure, Any]]:
+def panels(
+    title: str, width: float, height: float, rows: int, columns: int
+) -> Iterator[tuple[Figure, Any]]:
     """Give a figure, inches, and its panels, row by row."""
     with empty(width, height, STYLE | PADS, layout="constrained") as figure:
         figure.suptitle(title, x=0.01, ha="left", fontsize=14, fontweight="bold")
@@ -60,7 +62,9 @@ def draw_front(
     title: str,
 ) -> Figure:
     """Draw the trials over two outputs; the first one upwards, the second one to the right."""
-    units = [read_unit(FIGURES[name].unit, values[sound, number]) for number, name in enumerate(names)]
+    units = [
+        read_unit(FIGURES[name].unit, values[sound, number]) for number, name in enumerate(names)
+    ]
     shown = values * [factor for factor, _ in units]
     y_label, x_label = (
         f"{name} ({unit})" if unit else name for name, (_, unit) in zip(names, units, strict=True)
@@ -70,8 +74,19 @@ def draw_front(
     lost = lost[np.isfinite(shown[lost]).all(axis=1)]
     edge = {"edgecolors": INK, "linewidths": 0.8, "zorder": 4}
     marks: list[tuple[Any, dict[str, Any]]] = [
-        (followed, {"marker": "o", "color": "#B9C7D3", "s": 22, "label": f"{len(followed)} trials"}),
-        (lost, {"marker": "x", "color": "#D9C3B5", "s": 24, "label": f"{len(lost)} without the fingertip"}),
+        (
+            followed,
+            {"marker": "o", "color": "#B9C7D3", "s": 22, "label": f"{len(followed)} trials"},
+        ),
+        (
+            lost,
+            {
+                "marker": "x",
+                "color": "#D9C3B5",
+                "s": 24,
+                "label": f"{len(lost)} without the fingertip",
+            },
+        ),
         ([0], {"marker": "D", "color": LINES[1], "s": 75, "label": "unchanged scene", **edge}),
         ([chosen], {"marker": "*", "color": LINES[2], "s": 260, "label": "chosen", **edge}),
     ]
@@ -125,7 +140,9 @@ def draw_indices(keys: Sequence[str], outputs: Mapping[str, Indices | None], tit
     with panels(title, *size, 1, len(outputs)) as (figure, axes):
         for panel, (name, indices) in zip(axes, outputs.items(), strict=True):
             for each, side, color, hatch, label in BARS:
-                values, interval = (part[order] for part in indices[each]) if indices else (rows * 0.0, None)
+                values, interval = (
+                    (part[order] for part in indices[each]) if indices else (rows * 0.0, None)
+                )
                 look = {
                     "color": color,
                     "hatch": hatch,
@@ -135,14 +152,19 @@ def draw_indices(keys: Sequence[str], outputs: Mapping[str, Indices | None], tit
                 }
                 panel.barh(rows + side * BAR, values, BAR, xerr=interval, error_kw=whisker, **look)
             if indices is None:
-                panel.text(0.5, 0.5, "does not vary", transform=panel.transAxes, ha="center", va="center")
+                panel.text(
+                    0.5, 0.5, "does not vary", transform=panel.transAxes, ha="center", va="center"
+                )
             name_rows(panel, [keys[i] for i in order] if panel is axes[0] else [""] * len(keys))
             panel.set(title=name, xlabel="share of the variance")
             panel.tick_params(axis="y", length=0)
             panel.grid(visible=False, axis="y")
             panel.axvline(0.0, color=INK, linewidth=0.8)
         ends = np.array([panel.get_xlim() for panel in axes])
-        low, high = max(min(ends.min(), -0.05), FARTHEST[0]), min(max(ends.max(), 1.05), FARTHEST[1])
+        low, high = (
+            max(min(ends.min(), -0.05), FARTHEST[0]),
+            min(max(ends.max(), 1.05), FARTHEST[1]),
+        )
         for panel in axes:
             panel.set_xlim(low, high)
         figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower right", ncols=2)
@@ -152,14 +174,25 @@ def draw_indices(keys: Sequence[str], outputs: Mapping[str, Indices | None], tit
 #: Marks of the methods, which differ without their colors.
 MARKS = "osD^vP*X<>"
 #: Panels of the league.
-PANELS = ("lag_mean", "ridge_unevenness", "ridge-limit", "lift-limit", "max_total_force", "period_cost")
+PANELS = (
+    "lag_mean",
+    "ridge_unevenness",
+    "ridge-limit",
+    "lift-limit",
+    "max_total_force",
+    "period_cost",
+)
 
 
-def mark(axes: Any, row: float, mean: Interval, number: int, factor: float, **more: Any) -> dict[str, Any]:
+def mark(
+    axes: Any, row: float, mean: Interval, number: int, factor: float, **more: Any
+) -> dict[str, Any]:
     """Mark the mean of a method in a row, with its interval; return the look of the method's marks."""
     look = {"color": LINES[number % len(LINES)], "marker": MARKS[number % len(MARKS)]}
     half = (mean.half or 0.0) * factor
-    axes.errorbar(mean.mean * factor, row, xerr=half, linestyle="", markersize=8, capsize=4, **look, **more)
+    axes.errorbar(
+        mean.mean * factor, row, xerr=half, linestyle="", markersize=8, capsize=4, **look, **more
+    )
     return look
 
 
@@ -171,7 +204,9 @@ def draw_rfd(table: Table, methods: Sequence[str]) -> Figure:
     from matplotlib.ticker import LogFormatter
 
     names = list(
-        dict.fromkeys(name for (_, name, _), figures in table.items() if figures.get("rfd") is not None)
+        dict.fromkeys(
+            name for (_, name, _), figures in table.items() if figures.get("rfd") is not None
+        )
     )
     size = 11.0, 0.27 * max(len(names), 1) + 1.7
     with panels("Reference force deviation by trajectory", *size, 1, 1) as (figure, (axes,)):
@@ -186,7 +221,9 @@ def draw_rfd(table: Table, methods: Sequence[str]) -> Figure:
                     axes.plot(1e3 * np.array(values), np.full(len(values), row), **small)
                     label = None
         points = [
-            figures.get("set_point") for (method, _, _), figures in table.items() if method == methods[0]
+            figures.get("set_point")
+            for (method, _, _), figures in table.items()
+            if method == methods[0]
         ]
         set_point = next((value for value in points if value is not None), None)
         if set_point is not None:
@@ -217,7 +254,12 @@ def draw_measures(league: Sequence[Row], methods: Sequence[str]) -> Figure:
                     continue
                 mark(panel, -line, mean, methods.index(row.method), factor)
                 right = (mean.mean + (mean.half or 0.0)) * factor, -line
-                beside = {"xytext": (8, 0), "textcoords": "offset points", "va": "center", "fontsize": 11}
+                beside = {
+                    "xytext": (8, 0),
+                    "textcoords": "offset points",
+                    "va": "center",
+                    "fontsize": 11,
+                }
                 panel.annotate(show_digits(mean.mean * factor), right, **beside)
             name_rows(panel, [row.method for row in league])
             panel.set(title=MEASURES[name].title, xlim=(0.0, 1.3 * max(panel.get_xlim()[1], 1e-9)))

@@ -57,9 +57,13 @@ def list_suite_methods() -> tuple[str, ...]:
 def run_suite(arguments: Namespace, methods: Sequence[str], words: Sequence[str]) -> int:
     """Run what is not done yet, and write tables, page and plots."""
     if arguments.overwrite:
-        raise OutputError("--overwrite is not for --suite, which continues its folder: choose another --out.")
+        raise OutputError(
+            "--overwrite is not for --suite, which continues its folder: choose another --out."
+        )
     if arguments.speed:
-        raise OutputError("--speed is not for --suite: trajectories ridge-limit and lift-limit measure it.")
+        raise OutputError(
+            "--speed is not for --suite: trajectories ridge-limit and lift-limit measure it."
+        )
     refuse_without("digiclay compare --suite", "suite", "matplotlib", "scipy")
     plan = make_plan(arguments, methods)
     out = arguments.out or Path(f"{plan.title}_suite")
@@ -144,7 +148,9 @@ def _write(out: Path, plan: Plan, records: dict[int, tables.Record], command: st
     if not table:
         raise DigiclayError(f"Every trial failed; the first one: {next(iter(errors.values()))}")
     league = find_league(table, plan.methods)
-    source = Provenance(plan, describe_machine("scipy"), datetime.now(UTC).date().isoformat(), command)
+    source = Provenance(
+        plan, describe_machine("scipy"), datetime.now(UTC).date().isoformat(), command
+    )
     figures = draw_rfd(table, plan.methods), draw_measures(league, plan.methods)
     for figure, name in zip(figures, PICTURES, strict=True):
         save(figure, out / name)
@@ -152,7 +158,9 @@ def _write(out: Path, plan: Plan, records: dict[int, tables.Record], command: st
         write_whole(out / name, text.encode())
     lines = print_league(league)
     if failed:
-        lines.append(f"{len(failed)} of {len(plan.points)} trials failed; the first one: {failed[0]}")
+        lines.append(
+            f"{len(failed)} of {len(plan.points)} trials failed; the first one: {failed[0]}"
+        )
     return [*lines, f"written to {out}: start with {out / 'index.html'}"]
 
 

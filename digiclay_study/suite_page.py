@@ -24,10 +24,17 @@ from .method_trials import HIGH, LIMITS, LOW, OUTCOMES
 
 def describe_machine(*packages: str) -> str:
     """Return one line: versions, those of more packages too, and the kind of machine."""
-    versions = [f"digiclay {__version__}", f"Python {platform.python_version()}", f"numpy {np.__version__}"]
+    versions = [
+        f"digiclay {__version__}",
+        f"Python {platform.python_version()}",
+        f"numpy {np.__version__}",
+    ]
     versions += [f"{name} {importlib.metadata.version(name)}" for name in packages]
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
-    return ", ".join(versions) + f"; {platform.system()}, {platform.machine()}, {_processor()}, {cores} cores"
+    return (
+        ", ".join(versions)
+        + f"; {platform.system()}, {platform.machine()}, {_processor()}, {cores} cores"
+    )
 
 
 def _processor() -> str:
@@ -127,7 +134,10 @@ def format_files(
 
 def format_results(source: Provenance, records: Mapping[int, Record]) -> str:
     """Return all trials as CSV in SI units. `records`: by the index of their point."""
-    units = [name if metric.unit == "1" else f"{name} ({metric.unit})" for name, metric in OUTCOMES.items()]
+    units = [
+        name if metric.unit == "1" else f"{name} ({metric.unit})"
+        for name, metric in OUTCOMES.items()
+    ]
     rows = []
     for point in source.plan.points:
         record = records[point.index]
@@ -169,11 +179,18 @@ def print_league(league: Sequence[Row]) -> list[str]:
     """Return the lines of the league for a terminal."""
     names = [name for name in MEASURES if name in PRINTED]
     titles = [f"{MEASURES[name].label} {MEASURES[name].shown}".strip() for name in names]
-    return [*aligned(("method", *titles, WORSE), [_list_cells(row, names) for row in league]), JUDGED]
+    return [
+        *aligned(("method", *titles, WORSE), [_list_cells(row, names) for row in league]),
+        JUDGED,
+    ]
 
 
 def format_page(
-    source: Provenance, league: Sequence[Row], table: Table, failed: Sequence[str], pictures: Sequence[str]
+    source: Provenance,
+    league: Sequence[Row],
+    table: Table,
+    failed: Sequence[str],
+    pictures: Sequence[str],
 ) -> str:
     """Return the page. `failed`: one line per failed trial; `pictures`: files beside it."""
     titles = {name: metric.title for name, metric in MEASURES.items()}
@@ -183,7 +200,8 @@ def format_page(
         f"<p>{len(table)} trials of {len(methods)} methods, {len(source.plan.seeds)} seeds.</p>",
         "<h2>League</h2>",
         *make_table(
-            ["method", *titles.values(), WORSE], [_list_cells(row, list(MEASURES)) for row in league]
+            ["method", *titles.values(), WORSE],
+            [_list_cells(row, list(MEASURES)) for row in league],
         ),
         f"<p>Means over the trajectories, the random drags together as one; ± {escape(KIND)}. Of several "
         "fingers the worst counts. Largest force: over all trajectories. Losses: sum. Cost: median time; "
@@ -194,7 +212,9 @@ def format_page(
     for name in SHOWN:
         body, factor = [], MEASURES[name].factor
         for trajectory in _list_trajectories(table):
-            intervals = [find_interval(list_values(table, method, trajectory, name)) for method in methods]
+            intervals = [
+                find_interval(list_values(table, method, trajectory, name)) for method in methods
+            ]
             if any(intervals):
                 body.append([trajectory, *(_format(interval, factor) for interval in intervals)])
         lines.append(f"<h2>{escape(titles[name])} by trajectory</h2>")

@@ -40,7 +40,9 @@ KNEE = "knee"
 
 def add(commands: Any) -> None:
     """Add the command."""
-    description = "Find the best trade-off of two metrics: their Pareto front over ranges of parameters."
+    description = (
+        "Find the best trade-off of two metrics: their Pareto front over ranges of parameters."
+    )
     purpose = "find the best trade-off of two metrics"
     parser = add_command(commands, "tune", purpose, EXAMPLES, description, carry_out=carry_out)
     add_subject(parser, METRICS)
@@ -68,7 +70,11 @@ def carry_out(arguments: Namespace) -> int:
     choice = _read_choice(arguments.choose, subject.names)
     total = arguments.population * arguments.generations + 1
     refuse_too_many("--population times --generations", total)
-    plan = {"metrics": list(subject.names), "population": arguments.population, "seed": arguments.seed}
+    plan = {
+        "metrics": list(subject.names),
+        "population": arguments.population,
+        "seed": arguments.seed,
+    }
     points: list[Point] = []
 
     def write(records: dict[int, Record]) -> list[str]:
@@ -78,7 +84,10 @@ def carry_out(arguments: Namespace) -> int:
         _evolve(arguments, subject, evaluation, points)
         if len(points) + 1 == total:
             outcome = find_outcome(subject, points, evaluation.collect(), choice)
-            ends = [outcome.every[index] for index in {outcome.front[0], outcome.front[-1], outcome.chosen}]
+            ends = [
+                outcome.every[index]
+                for index in {outcome.front[0], outcome.front[-1], outcome.chosen}
+            ]
             evaluation.judge([*find_ends(points, subject.keys), *ends], subject.keys)
 
     opened = subject.open_folder(arguments.out, "tuning", plan)
@@ -94,7 +103,9 @@ def _read_choice(word: str, names: Sequence[str]) -> str:
     raise ParameterError("--choose", "", f"must be {KNEE}, {' or '.join(names)}", repr(word))
 
 
-def _evolve(arguments: Namespace, subject: Subject, evaluation: Evaluation, done: list[Point]) -> None:
+def _evolve(
+    arguments: Namespace, subject: Subject, evaluation: Evaluation, done: list[Point]
+) -> None:
     """Evaluate all generations, or those before a stop, and add their points to those that are done."""
     generations = propose_generations(len(subject.ranges), arguments.population, arguments.seed)
     unchanged = subject.evaluate_unchanged(evaluation, quiet=arguments.quiet)
@@ -182,8 +193,8 @@ def _describe(names: Sequence[str], values: Any) -> str:
 def find_front(values: Floats) -> Cells:
     """Return the points that no other dominates, ordered by the first output.
 
-    A point dominates another if it is at most as large in both outputs, and less in one. Of equal points the
-    first one is returned.
+    A point dominates another if it is at most as large in both outputs, and less in one. Of equal
+    points the first one is returned.
     """
     valid = np.flatnonzero(~np.isnan(values).any(axis=1))
     order = valid[np.lexsort((values[valid, 1], values[valid, 0]))]
@@ -198,8 +209,9 @@ def find_front(values: Floats) -> Cells:
 def find_knee(front: Floats) -> int:
     """Return the index of the point of a front that is farthest below the line between its ends.
 
-    With both outputs scaled to 0 to 1 over the front, the ends are (0, 1) and (1, 0), and that point has the
-    least sum. It is the place where less of one output begins to cost much of the other.
+    With both outputs scaled to 0 to 1 over the front, the ends are (0, 1) and (1, 0), and that
+    point has the least sum. It is the place where less of one output begins to cost much of the
+    other.
     """
     extent = np.ptp(front, axis=0)
     scaled = (front - front.min(axis=0)) / np.where(extent > 0.0, extent, 1.0)
@@ -215,8 +227,8 @@ class Trials(NamedTuple):
 
     #: (points, 2), SI, to be minimized; infinite in both where a run has no such outputs.
     values: Floats
-    #: (points,), by how much the loss of contact exceeds what is allowed, 0 for a run that keeps the
-    #: fingertip, and `WITHOUT` for one without outputs.
+    #: (points,), by how much the loss of contact exceeds what is allowed, 0 for a run that keeps
+    #: the fingertip, and `WITHOUT` for one without outputs.
     violation: Floats
 
     @property
@@ -228,7 +240,9 @@ class Trials(NamedTuple):
         """Return the runs on the front, ordered by the first output."""
         front = find_front(np.where(self.sound[:, None], self.values, np.nan))
         if not front.size:
-            raise OutputError("No run has both metrics without losing the fingertip: there is no front.")
+            raise OutputError(
+                "No run has both metrics without losing the fingertip: there is no front."
+            )
         return front
 
 
@@ -246,7 +260,9 @@ def find_outcome(
 ) -> Outcome:
     """Return the outcome of points that are done. `choice`: a metric, or the knee of the front."""
     every = [subject.unchanged, *points]
-    trials = judge_trials(subject.names, [records[point.index] for point in every], records[UNCHANGED])
+    trials = judge_trials(
+        subject.names, [records[point.index] for point in every], records[UNCHANGED]
+    )
     front = trials.find_front()
     knee = find_knee(trials.values[front])
     least = {name: int(np.argmin(trials.values[front, i])) for i, name in enumerate(subject.names)}
@@ -262,24 +278,32 @@ def judge_trials(names: Sequence[str], records: Sequence[Record], reference: Rec
     return Trials(values, np.where(without, WITHOUT, np.maximum(excess, 0.0)))
 
 
-def propose_generations(parameters: int, population: int, seed: int) -> Generator[Floats, Trials, None]:
+def propose_generations(
+    parameters: int, population: int, seed: int
+) -> Generator[Floats, Trials, None]:
     """Yield generations without end; each is asked for with the trials of the one before.
 
-    The same trials lead to the same generations: a search that is given kept trials from its beginning goes
-    on as if it had never stopped. Of two runs that are no solution the lesser violation is preferred.
+    The same trials lead to the same generations: a search that is given kept trials from its
+    beginning goes on as if it had never stopped. Of two runs that are no solution the lesser
+    violation is preferred.
     """
     import optuna
     from optuna.samplers.nsgaii import PolynomialMutation, SBXCrossover
 
     optuna.logging.set_verbosity(optuna.logging.WARNING)
     space: dict[str, optuna.distributions.BaseDistribution] = {
-        f"x{number}": optuna.distributions.FloatDistribution(0.0, 1.0) for number in range(parameters)
+        f"x{number}": optuna.distributions.FloatDistribution(0.0, 1.0)
+        for number in range(parameters)
     }
     with warnings.catch_warnings():
-        # Crossover and mutation of the original NSGA-II; optuna's own are coarser, and no experiment.
+        # Crossover and mutation of the original NSGA-II; optuna's own are coarser, and no
+        # experiment.
         warnings.simplefilter("ignore", optuna.exceptions.ExperimentalWarning)
         sampler = optuna.samplers.NSGAIISampler(
-            population_size=population, crossover=SBXCrossover(), mutation=PolynomialMutation(), seed=seed
+            population_size=population,
+            crossover=SBXCrossover(),
+            mutation=PolynomialMutation(),
+            seed=seed,
         )
     study = optuna.create_study(directions=["minimize", "minimize"], sampler=sampler)
     while True:

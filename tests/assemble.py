@@ -101,8 +101,8 @@ def make_system(
 ):
     """Return a bed; parts that are None are left out, and without `control` every valve stays shut.
 
-    `others`: what further fingers have unlike the first.
-    `control` is the parameters of Method I, or a function that makes a controller for a control period.
+    `others`: what further fingers have unlike the first. `control` is the parameters of Method I,
+    or a function that makes a controller for a control period.
     """
     master = control if isinstance(control, VirtualMaster) else None
     given = {
@@ -154,7 +154,9 @@ class Scripted:
         """Command what the script says."""
         _, x, y, *_ = seen.quadratic_basis
         command = np.broadcast_to(self.script(memory * self.period, x, y), x.shape).astype(float)
-        return memory + 1, Commands(seen.target.copy(), np.full(x.size, Mode.HOLD, np.int8), command)
+        return memory + 1, Commands(
+            seen.target.copy(), np.full(x.size, Mode.HOLD, np.int8), command
+        )
 
 
 def scripted(script):
@@ -253,7 +255,9 @@ def followed(method, way, cells=15, **sections):
     points = [{"time": t, "position": [x * 1e-3, y * 1e-3, z * 1e-3]} for t, x, y, z in way]
     layout = {"rows": cells, "columns": cells, **sections.pop("layout", {})}
     trajectory = {"waypoints": points, **sections.pop("trajectory", {})}
-    return resolve({"layout": layout, "control": {"method": method}, "trajectory": trajectory, **sections})
+    return resolve(
+        {"layout": layout, "control": {"method": method}, "trajectory": trajectory, **sections}
+    )
 
 
 def beginning(name, lasting, stepper, step, *settings):

@@ -11,13 +11,15 @@ from hypothesis import HealthCheck, Phase, settings
 
 # Set before anything imports matplotlib or Blender: no window, and nobody's own Blender settings.
 os.environ.setdefault("MPLBACKEND", "Agg")
-# pytest makes errors of warnings in its own process; in those that tests start, numpy's are errors by this.
+# pytest makes errors of warnings in its own process; in those that tests start, numpy's are errors
+# by this.
 os.environ.setdefault("PYTHONWARNINGS", "error::RuntimeWarning")
 SETTINGS = tempfile.TemporaryDirectory(prefix="digiclay-blender-")
 if "PYTEST_XDIST_WORKER" in os.environ or "BLENDER_USER_RESOURCES" not in os.environ:
     os.environ["BLENDER_USER_RESOURCES"] = SETTINGS.name  # each worker its own: presets, extensions
 
-# The same examples in every run, so that a failure can be seen again; no deadline, since machines are shared.
+# The same examples in every run, so that a failure can be seen again; no deadline, since machines
+# are shared.
 settings.register_profile(
     "repeatable",
     derandomize=True,
@@ -38,8 +40,8 @@ settings.load_profile(os.environ.get("DIGICLAY_HYPOTHESIS", "repeatable"))
 
 WINDOW = Path(__file__).parent / "window"
 
-# Thousands of tests are collected, none of which is garbage. They are not frozen: Blender's module, whose
-# objects were never looked at again, would hang at the end of the process.
+# Thousands of tests are collected, none of which is garbage. They are not frozen: Blender's module,
+# whose objects were never looked at again, would hang at the end of the process.
 gc.disable()
 
 

@@ -43,7 +43,9 @@ COPY_TWO = COPY.replace("virtual_master", "cell_states").replace(".VirtualMaster
 COPY_THREE = COPY.replace("virtual_master", "hybrid").replace(".VirtualMaster", ".Hybrid")
 #: A memory as of a controller that follows a fingertip, and none.
 PLACED = (
-    PAD.replace("    def command", "    def begin(self, device):\n        return Kept()\n\n    def command")
+    PAD.replace(
+        "    def command", "    def begin(self, device):\n        return Kept()\n\n    def command"
+    )
     + "\nclass Kept(NamedTuple):\n    place: float = 0.5\n"
 )
 
@@ -51,7 +53,9 @@ PLACED = (
 class Mine(digiclay.Method):
     """Pins under a force give way."""
 
-    yield_force: float = digiclay.quantity(0.03, "force above which a pin gives way", unit="N", above=0.0)
+    yield_force: float = digiclay.quantity(
+        0.03, "force above which a pin gives way", unit="N", above=0.0
+    )
 
     def command(self, memory, cells, device):
         down = cells.force > self.yield_force

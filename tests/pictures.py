@@ -10,8 +10,8 @@ RAMP = (1000.0 + 5003.0 * np.arange(12)).reshape(3, 4)
 COLORS = [RAMP, RAMP[::-1, ::-1] // 2, RAMP.T.reshape(3, 4)]
 #: Clear on the left, half clear beside it.
 ALPHA = np.tile([0.0, 32768 / 65535, 1.0, 1.0], (3, 1))
-#: Least difference of brightness that files of a depth keep, of 65535. Colors of CMYK and of a JPEG are
-#: rounded several times.
+#: Least difference of brightness that files of a depth keep, of 65535. Colors of CMYK and of a JPEG
+#: are rounded several times.
 STEPS = {"16": 1.0, "32": 1.0, "64": 1.0, "4": 65535 / 15, "8": 65535 / 255, "k": 4 * 65535 / 255}
 READ = {
     "gray16.png": "16",

@@ -1,8 +1,9 @@
 """Numbers that tests compare with, made anew after a change that is meant: ``python -m tests.renew``.
 
-It writes the golden run, `samples/golden.json`, and what is simulated anew from samples of old formats:
-heights and forces of states and takes, histories and metrics of runs. The files of old formats stay as they
-are. Commit the differences with their reason, and add it to `samples/README.md`.
+It writes the golden run, `samples/golden.json`, and what is simulated anew from samples of old
+formats: heights and forces of states and takes, histories and metrics of runs. The files of old
+formats stay as they are. Commit the differences with their reason, and add it to
+`samples/README.md`.
 """
 
 import json
@@ -32,15 +33,18 @@ REMEDY = "If the change is meant, 'python -m tests.renew' writes the numbers ane
 def run_golden(*settings):
     """Return forces, N, and heights, mm, of the first nine seconds of the paper's session.
 
-    ``forces``: in total, every second; ``heights``: at the end, of every eighth pin that is off its rest by
-    more than 1 mm; ``weighed``: sum over all rows and cells of force times row times cell, both from 0 to 1.
+    ``forces``: in total, every second; ``heights``: at the end, of every eighth pin that is off its
+    rest by more than 1 mm; ``weighed``: sum over all rows and cells of force times row times cell,
+    both from 0 to 1.
     """
     history = run(sample("ridge_mound_valley", "simulation.duration=9", *settings)).history
     height, force = history["height"][-1], history["force"]
     return {
         "forces": history["total_force"][::200].tolist(),
         "heights": (height[np.abs(height - 40e-3) > 1e-3][::8] * 1e3).tolist(),
-        "weighed": float(np.linspace(0.0, 1.0, len(force)) @ force @ np.linspace(0.0, 1.0, force.shape[1])),
+        "weighed": float(
+            np.linspace(0.0, 1.0, len(force)) @ force @ np.linspace(0.0, 1.0, force.shape[1])
+        ),
     }
 
 
@@ -49,7 +53,9 @@ def run_turbulent():
     system = one_cell(
         fluid=Fluid(viscosity=1.6e-9), control=scripted(lambda t, x, y: 0.05 * np.sin(40.0 * t))
     )
-    done = record(system, path((0.0, 0.0, 0.0, 40.2), (0.2, 0.0, 0.0, 37.5), (0.4, 0.0, 0.0, 39.5)), 80)
+    done = record(
+        system, path((0.0, 0.0, 0.0, 40.2), (0.2, 0.0, 0.0, 37.5), (0.4, 0.0, 0.0, 39.5)), 80
+    )
     return {
         "scripted_heights": (done.height[::10, 0] * 1e3).tolist(),
         "scripted_forces": done.force[::10, 0].tolist(),
@@ -75,12 +81,18 @@ def list_declarations():
 def go_on(file):
     """Return heights and forces of 50 periods from a state, or heights of a take, every tenth row."""
     if file.suffix == ".take":
-        return {"height": np.array([state.row(0) for state in replay(from_bytes(file.read_bytes()))][::10])}
+        return {
+            "height": np.array(
+                [state.row(0) for state in replay(from_bytes(file.read_bytes()))][::10]
+            )
+        }
     scene = load(file.with_suffix(".toml"))
     system = assemble(scene)
     rows = [
         (state.row(0), state.row(system.rows.force))
-        for state in periods(system, scene.trajectories(), snapshot.load(system, file.read_bytes()), 50)
+        for state in periods(
+            system, scene.trajectories(), snapshot.load(system, file.read_bytes()), 50
+        )
     ]
     return {
         "height": np.array([row for row, _ in rows][::10]),
@@ -110,7 +122,8 @@ def renew():
         text = file.read_text(encoding="utf-8")
         metrics = json.loads(text)
         result = run_again(load(file.with_name("scene.toml")), metrics)
-        # What says when and where it was run stays, and so does what an older version did not measure.
+        # What says when and where it was run stays, and so does what an older version did not
+        # measure.
         kept = ("run_time", "real_time_factor", "versions", "units")
         metrics |= {name: result.metrics[name] for name in metrics if name not in kept}
         end = "\n" if text.endswith("\n") else ""

@@ -64,7 +64,9 @@ def read_json(path):
 
 def timeless(path):
     """Return the rows of a table without the run times, which are others each time."""
-    return [{name: text for name, text in row.items() if name != "run_time (s)"} for row in rows(path)]
+    return [
+        {name: text for name, text in row.items() if name != "run_time (s)"} for row in rows(path)
+    ]
 
 
 def left(folder):

@@ -42,7 +42,10 @@ class Server:
         header = {"Authorization": f"Bearer {token}"} if token else {}
         address = f"ws://127.0.0.1:{self.port}/{wishes}"
         return connect(
-            address, additional_headers=header, compression=None, **{"close_timeout": 1.0, **options}
+            address,
+            additional_headers=header,
+            compression=None,
+            **{"close_timeout": 1.0, **options},
         )
 
     def count(self, name):
@@ -80,7 +83,17 @@ def frame_message(packed):
 def serve(folder, *options, rate=200):
     """Run a server of a small bed, and end it with the block."""
     settings = [word for one in SMALL for word in ("--set", one)]
-    command = [sys.executable, "-m", "digiclay", "serve", *settings, "--rate", str(rate), "--port", "0"]
+    command = [
+        sys.executable,
+        "-m",
+        "digiclay",
+        "serve",
+        *settings,
+        "--rate",
+        str(rate),
+        "--port",
+        "0",
+    ]
     command += ["--osc-port", "0", "--token", TOKEN, "--report", "report.json", *options]
     path = os.pathsep.join([str(ROOT / "addon"), str(ROOT)])
     process = subprocess.Popen(

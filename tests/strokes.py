@@ -11,14 +11,16 @@ from digiclay.strokes.stroke import draw, start
 from tests import hand
 from tests.hand import heights, let_go
 
-#: Control periods that are simulated at a time: a stroke leaves the same bits in any number of them, and each
-#: time its state is packed.
+#: Control periods that are simulated at a time: a stroke leaves the same bits in any number of
+#: them, and each time its state is packed.
 CHUNK = 64
 
 
 def begin_bed(name, rows, columns):
     """Return a session on a part of a bed that Add offers."""
-    scene = make_scene("paper", Layout(rows, columns, BEDS[name].pitch), "virtual_master", BEDS[name].share)
+    scene = make_scene(
+        "paper", Layout(rows, columns, BEDS[name].pitch), "virtual_master", BEDS[name].share
+    )
     above = np.array([0.0, 0.0, 46e-3, *LEVEL])
     session, _ = sculpting.begin_session(7, "Bed", scene, above)
     return sculpting.advance(session, above, 0.0, 100)
@@ -33,7 +35,9 @@ def queue(session, ends, brush, depth=15.0, share=1.0):
     )
     for part in np.arange(1, 31) / 30:
         at = tuple(np.interp(part * way[-1], way, places[:, axis]) for axis in (0, 1))
-        session = change_stroke(session, number, lambda stroke, at=at: draw(stroke, *at, depth * 1e-3, share))
+        session = change_stroke(
+            session, number, lambda stroke, at=at: draw(stroke, *at, depth * 1e-3, share)
+        )
     return let_go(session, number)
 
 
@@ -73,5 +77,7 @@ def measure_spikes(formed):
                 if max(abs(i), abs(j)) == reach
             ]
         )
-        worst = max(worst, float((formed - around.max(0)).max()), float((around.min(0) - formed).max()))
+        worst = max(
+            worst, float((formed - around.max(0)).max()), float((around.min(0) - formed).max())
+        )
     return worst

@@ -2,7 +2,8 @@
 
 import time
 
-#: A process that starts in a second takes fifteen on a slow machine that is busy; beyond this it hangs, s.
+#: A process that starts in a second takes fifteen on a slow machine that is busy; beyond this it
+#: hangs, s.
 TIMEOUT = 240.0
 
 

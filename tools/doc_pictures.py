@@ -1,7 +1,7 @@
 """Pictures of the docs: `python tools/doc_pictures.py NAME ...` draws those that need no window.
 
-`python tools/doc_pictures.py --guide FOLDER` takes those of the guide and of its tutorial, and the film, from
-the screenshots of window tests in a folder.
+`python tools/doc_pictures.py --guide FOLDER` takes those of the guide and of its tutorial, and the
+film, from the screenshots of window tests in a folder.
 
 CONTRIBUTING.md has the command of every picture.
 """
@@ -25,8 +25,8 @@ PICTURES = Path(__file__).resolve().parents[1] / "docs" / "pictures"
 Area = tuple[int, int, int, int]
 #: The area of the 3D view in a window of 1100 x 720.
 VIEW = (0, 28, 910, 646)
-#: Other areas of screenshots: the dialog of the preferences, menus. The area of a film of the view, its size,
-#: pixels, and its duration, ms.
+#: Other areas of screenshots: the dialog of the preferences, menus. The area of a film of the view,
+#: its size, pixels, and its duration, ms.
 AREAS = {"relief_install": (207, 89, 894, 431), "relief_export": (0, 0, 910, 646)}
 FILM_AREA, FILM_SIZE, LASTS = (50, 84, 770, 564), (640, 427), 20_000
 #: Size of the picture of a series' page, pixels.
@@ -68,7 +68,11 @@ arrows = false
 #: Size of each of the four views, pixels; how much of the world one shows, mm.
 SIZE, SHOWN = (576, 395), 116.0
 #: Colors of solids, bosses and creases: told apart with any color vision.
-GRAY, ORANGES, BLUE = (0.55, 0.60, 0.65), ((0.80, 0.36, 0.02), (1.0, 0.70, 0.20)), (0.02, 0.32, 0.75)
+GRAY, ORANGES, BLUE = (
+    (0.55, 0.60, 0.65),
+    ((0.80, 0.36, 0.02), (1.0, 0.70, 0.20)),
+    (0.02, 0.32, 0.75),
+)
 #: What is exported for each view.
 VIEWS = (
     ["--kind", "solid"],
@@ -94,7 +98,9 @@ def save_jpeg(picture: Path, name: str, quality: int = 88, area: Area | None = N
 def save_film(frames: list[Image.Image], name: str, shown_for: int) -> None:
     """Write frames, each shown for a time, ms, as an animated WebP, which pages show everywhere."""
     timing = {"duration": shown_for, "loop": 0}
-    frames[0].save(PICTURES / name, save_all=True, append_images=frames[1:], quality=60, method=6, **timing)
+    frames[0].save(
+        PICTURES / name, save_all=True, append_images=frames[1:], quality=60, method=6, **timing
+    )
 
 
 def cut_guide(folder: Path) -> None:
@@ -107,7 +113,9 @@ def cut_guide(folder: Path) -> None:
     for shot in shots:
         save_jpeg(shot, f"{shot.stem}.jpg", 85, AREAS.get(shot.stem, VIEW))
     size = Image.Resampling.LANCZOS
-    film = [Image.open(frame).convert("RGB").crop(FILM_AREA).resize(FILM_SIZE, size) for frame in frames]
+    film = [
+        Image.open(frame).convert("RGB").crop(FILM_AREA).resize(FILM_SIZE, size) for frame in frames
+    ]
     save_film(film, "relief.webp", round(LASTS / len(film)))
 
 
@@ -120,7 +128,9 @@ def draw_pins(folder: Path) -> None:
 
 def draw_session(folder: Path) -> None:
     """Plot heights and force of the paper's session."""
-    carry_out("run", "ridge_mound_valley", "--out", folder / "run", "--plots", "--no-errors", "--quiet")
+    carry_out(
+        "run", "ridge_mound_valley", "--out", folder / "run", "--plots", "--no-errors", "--quiet"
+    )
     shutil.copyfile(folder / "run" / "session.png", PICTURES / "session.png")
 
 
@@ -178,7 +188,9 @@ def draw_by_program(folder: Path, page: str, program: str, name: str) -> None:
 
 def draw_hand_forces(folder: Path) -> None:
     """Plot heights and force of each finger of a hand."""
-    carry_out("run", "five_fingers_mound", "--out", folder / "run", "--plots", "--no-errors", "--quiet")
+    carry_out(
+        "run", "five_fingers_mound", "--out", folder / "run", "--plots", "--no-errors", "--quiet"
+    )
     with Image.open(folder / "run" / "session.png") as opened:
         size = opened.width // 2, opened.height // 2
         opened.convert("RGB").resize(size, Image.Resampling.LANCZOS).save(
@@ -190,7 +202,12 @@ def draw_series(folder: Path) -> None:
     """Show the page of the sample series in Chromium; its jobs take minutes."""
     carry_out("batch", "first", "--out", folder / "first", "--quiet")
     shown, page = folder / "page.png", (folder / "first" / "index.html").as_uri()
-    options = ("--headless", "--no-sandbox", "--hide-scrollbars", "--window-size={},{}".format(*SERIES))
+    options = (
+        "--headless",
+        "--no-sandbox",
+        "--hide-scrollbars",
+        "--window-size={},{}".format(*SERIES),
+    )
     command = ["chromium", *options, f"--screenshot={shown}", page]
     subprocess.run(command, check=True, capture_output=True, timeout=300)
     save_jpeg(shown, "batch.jpg")
@@ -232,7 +249,9 @@ def set_up_scene() -> None:
     camera.data.clip_end = 1e4
     camera.rotation_euler = radians(55.0), 0.0, radians(32.0)
     bpy.context.view_layer.update()
-    camera.location = Vector((0.0, 0.0, 36.0)) + camera.matrix_world.to_3x3() @ Vector((0.0, 0.0, 500.0))
+    camera.location = Vector((0.0, 0.0, 36.0)) + camera.matrix_world.to_3x3() @ Vector(
+        (0.0, 0.0, 500.0)
+    )
     scene.render.engine = "BLENDER_WORKBENCH"
     scene.render.resolution_x, scene.render.resolution_y = SIZE
     scene.render.film_transparent = True
@@ -285,7 +304,9 @@ DRAWN: dict[str, Callable[[Path], None]] = {
     **{f"samples/{name}.jpg": partial(draw_sample, name=name) for name in list_samples()},
     "two_hands.webp": draw_hand_film,
     "hand_forces.png": draw_hand_forces,
-    "noise.svg": partial(draw_by_program, page="figure.md", program="question.py", name="noise.svg"),
+    "noise.svg": partial(
+        draw_by_program, page="figure.md", program="question.py", name="noise.svg"
+    ),
     "animation.png": partial(
         draw_by_program, page="animation.md", program="animate.py", name="animation.png"
     ),

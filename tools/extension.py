@@ -2,10 +2,11 @@
 
 usage: python tools/extension.py [--out FOLDER]
 
-The Python must have Blender's module, which brings the tool along, and pip. The folder addon/digiclay is
-copied as git knows it; the wheels of requirements/extension.txt are fetched once, put beside it and listed
-in the copy's manifest. The zip stands in the folder only when it is valid. Its bytes depend on the files
-alone, and on the time in SOURCE_DATE_EPOCH or else of the last commit.
+The Python must have Blender's module, which brings the tool along, and pip. The folder
+addon/digiclay is copied as git knows it; the wheels of requirements/extension.txt are fetched once,
+put beside it and listed in the copy's manifest. The zip stands in the folder only when it is valid.
+Its bytes depend on the files alone, and on the time in SOURCE_DATE_EPOCH or else of the last
+commit.
 """
 
 import argparse
@@ -69,7 +70,14 @@ def wheels() -> list[Path]:
     FETCHED.mkdir(parents=True, exist_ok=True)
     if any(not (FETCHED / name).is_file() for name in names):
         with tempfile.TemporaryDirectory(dir=FETCHED.parent) as folder:
-            pip = [sys.executable, "-m", "pip", "--disable-pip-version-check", "download", "--quiet"]
+            pip = [
+                sys.executable,
+                "-m",
+                "pip",
+                "--disable-pip-version-check",
+                "download",
+                "--quiet",
+            ]
             what = ["--no-deps", "--only-binary=:all:", "--dest", folder, "-r", PINS]
             carry_out([*pip, "--retries", "5", *what], "Fetching the wheels")
             for wheel in Path(folder).glob("*.whl"):
@@ -107,7 +115,9 @@ def read_instant() -> int:
     """Return the time that the files of the zip have, s since 1970 UTC."""
     named = os.environ.get("SOURCE_DATE_EPOCH", "")
     if named and not (named.isdecimal() and int(named) < LATEST):
-        stop(f"SOURCE_DATE_EPOCH must be a number of seconds from 1970 to 2107 (got {named[:40]!r}).")
+        stop(
+            f"SOURCE_DATE_EPOCH must be a number of seconds from 1970 to 2107 (got {named[:40]!r})."
+        )
     if named:
         return int(named)
     done = subprocess.run(
@@ -123,7 +133,9 @@ def repack_zip(archive: Path, instant: int) -> None:
     packed = archive.with_name(f"{archive.name}.new")
     with zipfile.ZipFile(archive) as old, zipfile.ZipFile(packed, "w") as new:
         # The metadata of a wheel stand last, as its specification recommends.
-        for part in sorted(old.infolist(), key=lambda part: (".dist-info/" in part.filename, part.filename)):
+        for part in sorted(
+            old.infolist(), key=lambda part: (".dist-info/" in part.filename, part.filename)
+        ):
             entry = zipfile.ZipInfo(part.filename, when)
             entry.compress_type = part.compress_type
             entry.create_system = 3  # Unix, wherever it is built: the modes are Unix's
@@ -159,7 +171,9 @@ def build(out: Path) -> Path:
 def main() -> None:
     """Build what the arguments ask for."""
     parser = argparse.ArgumentParser(description="Build and validate the extension's zip.")
-    parser.add_argument("--out", type=Path, default=ROOT / "dist", help="folder of the zip, default dist")
+    parser.add_argument(
+        "--out", type=Path, default=ROOT / "dist", help="folder of the zip, default dist"
+    )
     archive = build(parser.parse_args().out.resolve())
     print(f"{archive} ({archive.stat().st_size / 1e6:.1f} MB), valid, tags included")
 

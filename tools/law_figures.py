@@ -36,13 +36,21 @@ def draw_laws(out: Path) -> None:
         save(figure, out)
 
 
-def draw_curves(valve: Any, conduit: Any, lag: Any, contact: Any, relaxation: Any, sensors: Any) -> None:
+def draw_curves(
+    valve: Any, conduit: Any, lag: Any, contact: Any, relaxation: Any, sensors: Any
+) -> None:
     """Draw the curves of each law into its panel."""
     scene = digiclay.scene({"sensors": {"force_noise": STEP, "force_step": STEP}})
     system, limit = assemble(scene), {"color": "k", "linestyle": "--"}
-    law, high, sizes = scene.valve.flow_law(scene.fluid), scene.supply.high, np.array([1.0, 0.5, 0.25])
+    law, high, sizes = (
+        scene.valve.flow_law(scene.fluid),
+        scene.supply.high,
+        np.array([1.0, 0.5, 0.25]),
+    )
     drops, knees = np.logspace(3, 7.5)[:, None], law.knee / sizes**2
-    valve.loglog(drops / BAR, 1e9 * law.flow(sizes, drops), label=[f"h* = {size:g}" for size in sizes])
+    valve.loglog(
+        drops / BAR, 1e9 * law.flow(sizes, drops), label=[f"h* = {size:g}" for size in sizes]
+    )
     valve.plot(knees / BAR, 1e9 * law.flow(sizes, knees), "ko", label="$ΔP_{crit}$")
     valve.axvline(high / BAR, label="$P_{high}$", **limit)
 
@@ -53,11 +61,19 @@ def draw_curves(valve: Any, conduit: Any, lag: Any, contact: Any, relaxation: An
         speeds = cell.flow.flow(openings, np.full(50, high)) / cell.actuator.area
         conduit.plot(openings, MM * speeds, label=f"$D_c$ = {diameter} mm")
         contact.plot(MM * depths, cell.touch.contact.tension(depths), label=f"m = {exponent} 1/m")
-    contact.plot(MM * depths, cell.touch.contact.stiffness * depths, "k--", label="slope b at $x_0$ = 0")
+    contact.plot(
+        MM * depths, cell.touch.contact.stiffness * depths, "k--", label="slope b at $x_0$ = 0"
+    )
 
-    dead, end, times = scene.delay.dead_time, scene.valve_lag.time_constant, np.linspace(0.0, 12e-3, 241)
+    dead, end, times = (
+        scene.delay.dead_time,
+        scene.valve_lag.time_constant,
+        np.linspace(0.0, 12e-3, 241),
+    )
     lag.plot(
-        MM * times, system.cell.lag.response(split_delay(scene.delay, 1.0), times)[:, -1], label="opening K"
+        MM * times,
+        system.cell.lag.response(split_delay(scene.delay, 1.0), times)[:, -1],
+        label="opening K",
     )
     lag.axhline(1.0, label="command", **limit)
     lag.axvspan(0.0, MM * dead, alpha=0.3, label="$t_d$")

@@ -33,13 +33,20 @@ LIMIT = 300
 LOOK = 0.05
 #: Largest zip, bytes.
 LARGEST = 2_000_000
-#: Differences between the two builds: modes and time of the sources, language, time zone, order of sets.
+#: Differences between the two builds: modes and time of the sources, language, time zone, order of
+#: sets.
 BUILDS = (
     ("first", 0o022, 1e9, {"LC_ALL": "C", "TZ": "UTC", "PYTHONHASHSEED": "1"}),
-    ("the second build", 0o077, 1.6e9, {"LC_ALL": "C.UTF-8", "TZ": "NPT-5:45", "PYTHONHASHSEED": "2"}),
+    (
+        "the second build",
+        0o077,
+        1.6e9,
+        {"LC_ALL": "C.UTF-8", "TZ": "NPT-5:45", "PYTHONHASHSEED": "2"},
+    ),
 )
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-#: Signals that have come. A handler that raised would be lost where Python ignores errors, as in `__del__`.
+#: Signals that have come. A handler that raised would be lost where Python ignores errors, as in
+#: `__del__`.
 SIGNALED: list[int] = []
 
 
@@ -53,7 +60,9 @@ def refuse_stopped() -> None:
         raise ReleaseError(f"stopped by {signal.Signals(SIGNALED[0]).name}.")
 
 
-def carry_out(command: list[str | Path], folder: Path, added: dict[str, str], umask: int = 0o022) -> None:
+def carry_out(
+    command: list[str | Path], folder: Path, added: dict[str, str], umask: int = 0o022
+) -> None:
     """Run a command in a folder, with an addition to the environment; end all that it has started."""
     refuse_stopped()
     name = " ".join(map(str, command[1:4]))
@@ -77,7 +86,8 @@ def carry_out(command: list[str | Path], folder: Path, added: dict[str, str], um
                 if status is None and time.monotonic() - started > LIMIT:
                     raise ReleaseError(f"'{name}' takes more than {LIMIT} s.")
         finally:
-            # Also when the release is stopped: nothing goes on writing into a folder that is being removed.
+            # Also when the release is stopped: nothing goes on writing into a folder that is being
+            # removed.
             with suppress(ProcessLookupError):
                 os.killpg(process.pid, signal.SIGKILL)
                 process.wait()
@@ -126,7 +136,14 @@ def build_twice(scratch: Path, commit: str, instant: int) -> Path:
     extension.wheels()  # fetched once
     for name, umask, touched, added in BUILDS:
         source, out = scratch / name, scratch / f"files of {name}"
-        clone: list[str | Path] = [*extension.GIT, "clone", "-q", "--no-tags", "--no-checkout", "--shared"]
+        clone: list[str | Path] = [
+            *extension.GIT,
+            "clone",
+            "-q",
+            "--no-tags",
+            "--no-checkout",
+            "--shared",
+        ]
         carry_out([*clone, ROOT, source], scratch, {}, umask)
         carry_out(["git", "checkout", "-q", "--detach", commit], source, {}, umask)
         for path in source.rglob("*"):
@@ -136,7 +153,9 @@ def build_twice(scratch: Path, commit: str, instant: int) -> Path:
         build(source, out, instant, added, umask)
         folders.append(out)
     first, second = ({path.name: path.read_bytes() for path in out.iterdir()} for out in folders)
-    differing = sorted(name for name in first.keys() | second.keys() if first.get(name) != second.get(name))
+    differing = sorted(
+        name for name in first.keys() | second.keys() if first.get(name) != second.get(name)
+    )
     if differing:
         raise ReleaseError(f"two builds of the same commit differ in {', '.join(differing)}.")
     return folders[0]
@@ -145,12 +164,17 @@ def build_twice(scratch: Path, commit: str, instant: int) -> Path:
 def check_files(folder: Path, version: str) -> None:
     """Check names, versions and size of the three files, and how a package index would show them."""
     wheel, source = f"digiclay-{version}-py3-none-any.whl", f"digiclay-{version}.tar.gz"
-    wanted, names = {f"digiclay-{version}.zip", wheel, source}, {path.name for path in folder.iterdir()}
+    wanted, names = (
+        {f"digiclay-{version}.zip", wheel, source},
+        {path.name for path in folder.iterdir()},
+    )
     if names != wanted:
         raise ReleaseError(f"the files are {sorted(names)}, and {sorted(wanted)} was to be built.")
     size = (folder / f"digiclay-{version}.zip").stat().st_size
     if size > LARGEST:
-        raise ReleaseError(f"the zip has {size / 1e6:.2f} MB, and {LARGEST / 1e6:g} MB is the most.")
+        raise ReleaseError(
+            f"the zip has {size / 1e6:.2f} MB, and {LARGEST / 1e6:g} MB is the most."
+        )
     with zipfile.ZipFile(folder / wheel) as archive:
         metadata = archive.read(f"digiclay-{version}.dist-info/METADATA").decode()
     with tarfile.open(folder / source) as archive:
@@ -159,7 +183,9 @@ def check_files(folder: Path, version: str) -> None:
     if any(f"\nVersion: {version}\n" not in text for text in (metadata, metadata_too)):
         raise ReleaseError(f"wheel or source archive have another version than {version}.")
     carry_out(
-        [sys.executable, "-m", "twine", "check", "--strict", folder / wheel, folder / source], folder, {}
+        [sys.executable, "-m", "twine", "check", "--strict", folder / wheel, folder / source],
+        folder,
+        {},
     )
 
 
@@ -183,7 +209,9 @@ def publish(built: Path, folder: Path, version: str, commit: str) -> None:
     folder.parent.mkdir(exist_ok=True)
     built.rename(folder)
     notes = str(folder / "release-notes.md")
-    done = git(ROOT, "tag", "--annotate", "--cleanup=verbatim", "--file", notes, tag_of(version), commit)
+    done = git(
+        ROOT, "tag", "--annotate", "--cleanup=verbatim", "--file", notes, tag_of(version), commit
+    )
     if done.returncode:
         shutil.rmtree(folder)
         raise ReleaseError(f"the tag {tag_of(version)} cannot be made: {done.stderr.strip()}")
@@ -204,7 +232,9 @@ def release(version: str) -> Path:
     scratch = ROOT / "build"
     scratch.mkdir(exist_ok=True)
     print(f"building {version} of commit {commit[:7]} twice ...", flush=True)
-    with tempfile.TemporaryDirectory(prefix="release-", dir=scratch, ignore_cleanup_errors=True) as temporary:
+    with tempfile.TemporaryDirectory(
+        prefix="release-", dir=scratch, ignore_cleanup_errors=True
+    ) as temporary:
         built = build_twice(Path(temporary), commit, instant)
         check_files(built, version)
         write_texts(built, version)
@@ -226,7 +256,9 @@ def main() -> None:
     except (ReleaseError, OSError) as error:
         sys.exit("\n".join(f"Nothing is released: {line}" for line in str(error).splitlines()))
     print((folder / "SHA256SUMS").read_text(encoding="utf-8"), end="")
-    print(f"released: {folder.relative_to(ROOT)}, tag {tag_of(version)}; what remains is in docs/release.md")
+    print(
+        f"released: {folder.relative_to(ROOT)}, tag {tag_of(version)}; what remains is in docs/release.md"
+    )
 
 
 if __name__ == "__main__":

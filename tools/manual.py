@@ -1,7 +1,7 @@
 """Generator of the manual that the extension opens: `python tools/manual.py` writes it from docs/guide.md.
 
-The page is one file without scripts and without pictures. Links to other pages become text, since those are
-not shipped.
+The page is one file without scripts and without pictures. Links to other pages become text, since
+those are not shipped.
 """
 
 import re
@@ -19,7 +19,10 @@ TEMPLATE = Path(__file__).with_suffix(".html")
 
 
 #: A picture with its paragraph, and a link to another page.
-PICTURE, LINK = re.compile(r"<p><img [^>]*></p>\n?"), re.compile(r'<a href="(?!#)[^"]*">(.*?)</a>', re.DOTALL)
+PICTURE, LINK = (
+    re.compile(r"<p><img [^>]*></p>\n?"),
+    re.compile(r'<a href="(?!#)[^"]*">(.*?)</a>', re.DOTALL),
+)
 
 
 def make_anchor(heading: str, separator: str) -> str:

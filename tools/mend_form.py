@@ -26,7 +26,9 @@ def show_functions(text: str) -> str:
 
     def source(match: re.Match[str]) -> str:
         code = (ROOT / match[2]).read_text(encoding="utf-8")
-        (node,) = (n for n in ast.parse(code).body if isinstance(n, ast.FunctionDef) and n.name == match[3])
+        (node,) = (
+            n for n in ast.parse(code).body if isinstance(n, ast.FunctionDef) and n.name == match[3]
+        )
         return f"{match[1]}{ast.get_source_segment(code, node)}\n{match[5]}"
 
     return SHOWN.sub(source, text)

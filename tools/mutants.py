@@ -1,7 +1,8 @@
 """Mutation test: cosmic-ray changes the core's physics, engine, control and metrics, one change at a time.
 
-Without modules named, a sample is judged: the mutants whose lines have the smallest hashes. It is the same in
-every run, and an edit changes only what it touches. Each mutant is written into its file while the tests run.
+Without modules named, a sample is judged: the mutants whose lines have the smallest hashes. It is
+the same in every run, and an edit changes only what it touches. Each mutant is written into its
+file while the tests run.
 """
 
 import argparse
@@ -24,7 +25,10 @@ from cosmic_ray.work_item import MutationSpec, TestOutcome
 ROOT = Path(__file__).parents[1]
 CORE = Path("addon", "digiclay", "core")
 #: Packages of the core that are changed, but modules that only declare or list.
-PACKAGES, DECLARING = ("model", "steppers", "engine", "control", "metrics"), ("methods", "interfaces")
+PACKAGES, DECLARING = (
+    ("model", "steppers", "engine", "control", "metrics"),
+    ("methods", "interfaces"),
+)
 #: Operators of cosmic-ray whose mutants mean something in numerical code.
 OPERATORS = re.compile(
     r"""core/(AddNot|NumberReplacer|ZeroIterationForLoop|Replace(AndWithOr|OrWithAnd|TrueWithFalse|FalseWithTrue
@@ -44,7 +48,9 @@ def list_modules() -> dict[str, Path]:
     """Return the files of the core that are changed, by package and module."""
     files = (path for package in PACKAGES for path in sorted((CORE / package).glob("*.py")))
     return {
-        f"{path.parent.name}.{path.stem}": path for path in files if path.stem not in ("__init__", *DECLARING)
+        f"{path.parent.name}.{path.stem}": path
+        for path in files
+        if path.stem not in ("__init__", *DECLARING)
     }
 
 
@@ -64,7 +70,9 @@ def list_mutants(path: Path) -> Iterator[tuple[str, MutationSpec]]:
     tree, silent, lines = get_ast(source), find_silent(source), source.splitlines()
     for name in filter(OPERATORS.fullmatch, operator_names()):
         operator = get_operator(name)()
-        places = (position for node in ast_nodes(tree) for position in operator.mutation_positions(node))
+        places = (
+            position for node in ast_nodes(tree) for position in operator.mutation_positions(node)
+        )
         for occurrence, (start, end) in enumerate(places):
             if any(first <= start and end <= last for first, last in silent):
                 continue
@@ -79,7 +87,9 @@ def main() -> int:
     os.chdir(ROOT)
     modules = list_modules()
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("modules", nargs="*", help="modules of the core, all of whose mutants are judged")
+    parser.add_argument(
+        "modules", nargs="*", help="modules of the core, all of whose mutants are judged"
+    )
     parser.add_argument("--count", type=int, default=100, help="mutants of the sample")
     parser.add_argument("--most", type=float, default=1.0, help="share that may survive")
     arguments, started = parser.parse_args(), time.monotonic()
@@ -87,7 +97,9 @@ def main() -> int:
         raise SystemExit(f"MODULES must be of {', '.join(modules)} (got {', '.join(unknown)})")
     os.environ["DIGICLAY_HYPOTHESIS"] = "first_failure"
     tests = " ".join([*FIRST, *(f"tests/{folder}" for folder in FOLDERS)])
-    command = f"{sys.executable} -m pytest -q -x -n auto --dist loadfile -p no:cacheprovider {tests}"
+    command = (
+        f"{sys.executable} -m pytest -q -x -n auto --dist loadfile -p no:cacheprovider {tests}"
+    )
     outcome, output = run_tests(command, LONGEST)
     if outcome != TestOutcome.SURVIVED:
         raise SystemExit(f"{output[-4000:]}\nmutants: FAILED (the tests fail without a mutation)")

@@ -37,7 +37,9 @@ def tag_of(version: str) -> str:
 def read_versions(root: Path) -> dict[str, str]:
     """Return the version in each file that has one, empty where there is none."""
     version = re.search(
-        r'^__version__ = "([^"]*)"$', (root / VERSION_FILE).read_text(encoding="utf-8"), re.MULTILINE
+        r'^__version__ = "([^"]*)"$',
+        (root / VERSION_FILE).read_text(encoding="utf-8"),
+        re.MULTILINE,
     )
     manifest = tomllib.loads((root / MANIFEST).read_text(encoding="utf-8"))
     heading = HEADING.search((root / CHANGELOG).read_text(encoding="utf-8"))
@@ -74,7 +76,9 @@ def _find_in_files(root: Path, version: str) -> list[str]:
     elif dated > datetime.datetime.now(datetime.UTC).date():
         wrong.append(f"{CHANGELOG}: {dated} in the heading of {version} is in the future.")
     if not read_notes(root):
-        wrong.append(f"{CHANGELOG}: the section of {version} is empty, and the notes are taken from it.")
+        wrong.append(
+            f"{CHANGELOG}: the section of {version} is empty, and the notes are taken from it."
+        )
     manifest = tomllib.loads((root / MANIFEST).read_text(encoding="utf-8"))
     page = f"https://extensions.blender.org/add-ons/{manifest.get('id')}/"
     if manifest.get("website") != page:
@@ -95,7 +99,9 @@ def _find_in_history(root: Path, version: str) -> list[str]:
         commit = git(root, "rev-parse", "--short", f"{tag_of(version)}^{{commit}}").stdout.strip()
         wrong.append(f"{version} is released already, as tag {tag_of(version)} of commit {commit}.")
     elif released and max(released) > tuple(map(int, version.split("."))):
-        wrong.append(f"{version} is below {'.'.join(map(str, max(released)))}, which is released already.")
+        wrong.append(
+            f"{version} is below {'.'.join(map(str, max(released)))}, which is released already."
+        )
     if git(root, "var", "GIT_COMMITTER_IDENT").returncode:
         wrong.append("git has no user.name and user.email, which a tag needs.")
     return wrong
@@ -104,7 +110,9 @@ def _find_in_history(root: Path, version: str) -> list[str]:
 def _find_in_reports(root: Path) -> list[str]:
     """Return the tests that failed since the commit was made; older reports are of other commits."""
     committed = float(git(root, "log", "-1", "--format=%ct").stdout or 0)
-    recent = [path for path in sorted((root / REPORTS).glob("*.txt")) if path.stat().st_mtime >= committed]
+    recent = [
+        path for path in sorted((root / REPORTS).glob("*.txt")) if path.stat().st_mtime >= committed
+    ]
     return [
         f"{path.relative_to(root)} has a failure: {line.strip()}"
         for path in recent

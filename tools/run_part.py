@@ -1,8 +1,8 @@
 """Run of one part of the tests under a time limit, evaluated by its results.
 
-A part has passed when pytest ended with status 0 and at least one test passed: nothing collected, everything
-skipped, a crash or a hang after the results are all failures. A line about it goes to the report file, which
-the caller prints.
+A part has passed when pytest ended with status 0 and at least one test passed: nothing collected,
+everything skipped, a crash or a hang after the results are all failures. A line about it goes to
+the report file, which the caller prints.
 """
 
 import argparse
@@ -34,7 +34,9 @@ def count(results: Path) -> tuple[int, int]:
     if not results.exists():
         return 0, 0
     suite = ElementTree.parse(results).getroot()[0].attrib
-    total, failed, wrong, skipped = (int(suite[key]) for key in ("tests", "failures", "errors", "skipped"))
+    total, failed, wrong, skipped = (
+        int(suite[key]) for key in ("tests", "failures", "errors", "skipped")
+    )
     return total - failed - wrong - skipped, skipped
 
 
@@ -64,7 +66,8 @@ def main() -> int:
     results: Path = arguments.report.with_suffix(".xml")
     results.unlink(missing_ok=True)
     status = run(
-        [sys.executable, "-m", "pytest", f"--junitxml={results}", *arguments.pytest], arguments.limit
+        [sys.executable, "-m", "pytest", f"--junitxml={results}", *arguments.pytest],
+        arguments.limit,
     )
     passed, skipped = count(results)
     reason = judge(status, passed, skipped, arguments)

@@ -59,7 +59,8 @@ section `[layout]`, is `--set "layout.pitch=2.5 mm"` on the command line. In Ble
 unit of the parameter. It does not contain rules that join several parameters. A range without an end has the
 limits of its unit:
 """
-#: The page of what `digiclay` offers in Python, by subject; its tables are made of the declarations.
+#: The page of what `digiclay` offers in Python, by subject; its tables are made of the
+#: declarations.
 PYTHON = """\
 # Python
 
@@ -180,7 +181,9 @@ def make_commands_page() -> str:
     lines = [COMMANDS]
     for top, where in ((parser(), ""), (benchmarks_parser(), " In a checkout alone.")):
         lines += [f"## {top.prog}", "", write_cell(top.description or "") + where, ""]
-        (listed,) = [action for action in top._actions if isinstance(action, argparse._SubParsersAction)]
+        (listed,) = [
+            action for action in top._actions if isinstance(action, argparse._SubParsersAction)
+        ]
         summaries = {entry.dest: entry.help or "" for entry in listed._choices_actions}
         for name, command in listed.choices.items():
             summary = "" if command.description else write_cell(summaries.get(name, ""))
@@ -199,10 +202,19 @@ def _section(name: str, method: str) -> list[str]:
     """Return the heading and the table of one section of a scene file."""
     kind: type[Parameters] = import_parameters(name, method)
     title = f"## [{name}]" + (f' with method = "{method}"' if name == "control" else "")
-    rows: list[Sequence[str]] = [("Symbol", "Name", "Unit", "Meaning", "Range", "Default", "Source")]
+    rows: list[Sequence[str]] = [
+        ("Symbol", "Name", "Unit", "Meaning", "Range", "Default", "Source")
+    ]
     for field, declared in list_quantities(kind).items():
         default, meaning = write_value(getattr(kind(), field)), describe_meaning(declared)
-        cells = (f"`{name}.{field}`", declared.unit, meaning, write_range(declared), default, declared.source)
+        cells = (
+            f"`{name}.{field}`",
+            declared.unit,
+            meaning,
+            write_range(declared),
+            default,
+            declared.source,
+        )
         rows.append((declared.symbol, *cells))
     return ["", title, "", write_cell((kind.__doc__ or "").split("\n\n")[0]), write_table(*rows)]
 
@@ -235,11 +247,16 @@ def list_packages() -> dict[str, list[str]]:
     for name, folder in CODE.items():
         for path in sorted(folder.rglob("__init__.py")):
             package = ".".join((name, *path.parent.relative_to(folder).parts))
-            modules = [f"{package}.{module.stem}" for module in sorted(path.parent.glob("[!_]*.py"))]
+            modules = [
+                f"{package}.{module.stem}" for module in sorted(path.parent.glob("[!_]*.py"))
+            ]
             # The names of the extension itself stand by subject on the page before.
             packages[package] = modules if package == "digiclay" else [package, *modules]
     return dict(
-        sorted(packages.items(), key=lambda row: (".core" not in row[0], "digiclay" in row[0].split(".")))
+        sorted(
+            packages.items(),
+            key=lambda row: (".core" not in row[0], "digiclay" in row[0].split(".")),
+        )
     )
 
 
@@ -260,7 +277,9 @@ def make_python_page() -> str:
         for name, array in HISTORY_ARRAYS.items()
     ]
     modes = [(str(int(mode)), mode.name.lower(), meaning) for mode, meaning in MEANINGS.items()]
-    metrics = [(f"`{name}`", metric.unit, metric.worse, metric.doc) for name, metric in FIGURES.items()]
+    metrics = [
+        (f"`{name}`", metric.unit, metric.worse, metric.doc) for name, metric in FIGURES.items()
+    ]
     return ENTRY.sub(write_entry, PYTHON).format(
         arrays=write_table(("Name", "Shape", "Type", "Unit", "Meaning"), *arrays),
         modes=write_table(("Code", "Mode", "Meaning"), *modes),
@@ -312,7 +331,9 @@ def on_files(files: Any, config: Any) -> None:
         "reference/python.md": make_python_page(),
     }
     for name, modules in list_packages().items():
-        made[f"reference/python/{name}.md"] = BEHIND + "\n".join(f"::: {module}\n" for module in modules)
+        made[f"reference/python/{name}.md"] = BEHIND + "\n".join(
+            f"::: {module}\n" for module in modules
+        )
     for page, source in ELSEWHERE.items():
         made[page] = (ROOT / source).read_text(encoding="utf-8")
     for path in (ROOT / "benchmarks" / "results").iterdir():

@@ -3,9 +3,8 @@
 As a package this is the simulation, its command line, and for Python the functions below; as a Blender
 extension it registers what shows in Blender. Importing it does no work and needs neither numpy nor Blender::
 
-    scene = digiclay.scene("slow_press", {"control.method": "hybrid", "control.force_setpoint": "0.3 N"})
-    run = digiclay.run(scene)
-    run.save("out")
+    scene = digiclay.scene("slow_press", {"control.method": "hybrid", "control.force_setpoint": "0.3
+    N"}) run = digiclay.run(scene) run.save("out")
 """
 
 from __future__ import annotations
@@ -79,14 +78,16 @@ def scene(
     Parameters
     ----------
     content : Scene, mapping, path or name, optional
-        Another scene; tables as in a scene file, ``{"control": {"force_setpoint": "0.3 N"}}``; a scene file,
-        the folder of a run; or a name of `samples`, such as ``"ridge_mound_valley"``, the session of the
-        paper. What is left out has its default: the device of the paper, pressed once at its middle.
+        Another scene; tables as in a scene file, ``{"control": {"force_setpoint": "0.3 N"}}``; a
+        scene file, the folder of a run; or a name of `samples`, such as ``"ridge_mound_valley"``,
+        the session of the paper. What is left out has its default: the device of the paper, pressed
+        once at its middle.
     changes : mapping, optional
-        Other values by their keys, ``{"control.method": "hybrid", "conduit": "absent"}``, or in nested
-        tables. Numbers are in SI units, texts may have a unit, ``"0.3 N"``. ``control.method`` is a name of
-        `methods`, a subclass of `Method`, or the file of one, ``"yielding.py:Yielding"``, whose code is then
-        run. What follows from a changed method, preset or arrangement of pins changes too.
+        Other values by their keys, ``{"control.method": "hybrid", "conduit": "absent"}``, or in
+        nested tables. Numbers are in SI units, texts may have a unit, ``"0.3 N"``.
+        ``control.method`` is a name of `methods`, a subclass of `Method`, or the file of one,
+        ``"yielding.py:Yielding"``, whose code is then run. What follows from a changed method,
+        preset or arrangement of pins changes too.
 
     Returns
     -------
@@ -108,7 +109,9 @@ def scene(
     return change_scene({} if content is None else content, changes)
 
 
-def run(scene: Scene, progress: Callable[[int, int], None] | None = None, *, errors: bool = True) -> Result:
+def run(
+    scene: Scene, progress: Callable[[int, int], None] | None = None, *, errors: bool = True
+) -> Result:
     """Simulate a scene from rest to its end.
 
     Parameters
@@ -124,10 +127,11 @@ def run(scene: Scene, progress: Callable[[int, int], None] | None = None, *, err
     Returns
     -------
     Result
-        ``history``, the arrays of ``history.npz`` by name: ``time`` (t,), s; ``height`` (t, n), m; ``force``
-        (t, n) and ``total_force`` (t,), N; ``position`` of the pins (n, 2), m; and more. ``metrics``, the
-        content of ``metrics.json``, in SI units. ``finger_force`` (t, f), N, and ``fingers``, contact time
-        and losses of each. ``save``, ``surface``, ``plot`` and ``summary`` are its methods.
+        ``history``, the arrays of ``history.npz`` by name: ``time`` (t,), s; ``height`` (t, n), m;
+        ``force`` (t, n) and ``total_force`` (t,), N; ``position`` of the pins (n, 2), m; and more.
+        ``metrics``, the content of ``metrics.json``, in SI units. ``finger_force`` (t, f), N, and
+        ``fingers``, contact time and losses of each. ``save``, ``surface``, ``plot`` and
+        ``summary`` are its methods.
 
     Raises
     ------
@@ -150,9 +154,9 @@ def load(folder: str | PathLike[str]) -> Result:
     Returns
     -------
     Result
-        As of `run`. No code is run: if the scene's method is one of your own that is not loaded, its
-        ``scene.control`` is None, and the scene is refused where it would be simulated or saved. If the
-        loaded one has other code than that of the run, a warning says so.
+        As of `run`. No code is run: if the scene's method is one of your own that is not loaded,
+        its ``scene.control`` is None, and the scene is refused where it would be simulated or
+        saved. If the loaded one has other code than that of the run, a warning says so.
 
     Raises
     ------
@@ -172,15 +176,16 @@ def sweep(
 ) -> NDArray[Any]:
     """Run a scene over a grid of values, many points at once where they have the same bed, parts and steps.
 
-    It runs in this process and keeps nothing. The command ``digiclay sweep`` uses all cores, and continues
-    after a stop.
+    It runs in this process and keeps nothing. The command ``digiclay sweep`` uses all cores, and
+    continues after a stop.
 
     Parameters
     ----------
     scene : Scene
         From `scene`, with a recorder.
     varied : mapping
-        Lists of values by their keys, ``{"control.force_gain": [1, 2, 4]}``; the last key varies fastest.
+        Lists of values by their keys, ``{"control.force_gain": [1, 2, 4]}``; the last key varies
+        fastest.
     metrics : iterable of str
         Keys of `METRICS`.
     progress : callable, optional
@@ -189,15 +194,16 @@ def sweep(
     Returns
     -------
     ndarray
-        Structured, a row for each point: ``table["rfd"]`` is a column, ``pandas.DataFrame(table)`` the table.
-        Columns are the varied keys and the metrics, in SI units; ``run_time``, s, and the estimated
-        ``height_error``, m, and ``force_error``, N; ``lost``, losses of contact; ``error``, why a point
-        failed. What a point does not have is NaN.
+        Structured, a row for each point: ``table["rfd"]`` is a column, ``pandas.DataFrame(table)``
+        the table. Columns are the varied keys and the metrics, in SI units; ``run_time``, s, and
+        the estimated ``height_error``, m, and ``force_error``, N; ``lost``, losses of contact;
+        ``error``, why a point failed. What a point does not have is NaN.
 
     Raises
     ------
     DigiclayError
-        For an unknown key or metric, a value that is not allowed, no value at all, or if every point fails.
+        For an unknown key or metric, a value that is not allowed, no value at all, or if every
+        point fails.
     """
     from . import front_door
 

@@ -22,12 +22,14 @@ UNEVEN = 1e-3
 #: A bed scaled to less than this can be neither seen nor inverted.
 SMALLEST_SCALE = 1e-6
 
-#: Matrices of fingertips that differ by less, in Blender units, stand alike on a palm: they are float32.
+#: Matrices of fingertips that differ by less, in Blender units, stand alike on a palm: they are
+#: float32.
 STRAY = 1e-4
 #: Where an empty keeps the semi-axes of its finger, m.
 AXES = "digiclay_axes"
 
-#: Attributes of a bed's mesh, one value per pin: type in Blender, name of its value, type of the array.
+#: Attributes of a bed's mesh, one value per pin: type in Blender, name of its value, type of the
+#: array.
 ATTRIBUTES = {"mode": ("INT", "value", np.int32), "force": ("FLOAT", "value", np.float32)}
 
 
@@ -57,7 +59,9 @@ def find_fault(bed: Mesh, pins: int | None = None) -> str:
     if bed.is_editmode:  # its attributes have length 0
         return localize("the bed is being edited: go back to Object Mode to go on")
     if pins not in (None, len(bed.vertices)):
-        return localize("the bed has {} pins now instead of {}: undo that to go on", len(bed.vertices), pins)
+        return localize(
+            "the bed has {} pins now instead of {}: undo that to go on", len(bed.vertices), pins
+        )
     return ""
 
 
@@ -116,7 +120,10 @@ def move_fingertips(
         if number in every:
             parts.setdefault(every[number].parent, []).append((every[number], _place(at, finger)))
     for above, tips in parts.items():
-        role, stood = above and above.get(ROLE), np.array(above.matrix_world if above else np.eye(4))
+        role, stood = (
+            above and above.get(ROLE),
+            np.array(above.matrix_world if above else np.eye(4)),
+        )
         if role == PALM and len(tips) == sum(tip.parent == above for tip in every.values()):
             ways = [whole @ pose @ np.linalg.pinv(tip.matrix_world) for tip, pose in tips]
             if np.ptp(ways, axis=0).max() < STRAY:
@@ -144,7 +151,9 @@ def resize_fingertip(tip: Object, finger: Fingertip) -> None:
     tip[AXES] = axes.tolist()
     tip.empty_display_size = 1.3 * float(axes.max()) * SCALE
     for ball in tip.children:
-        if ball.get(ROLE) == ELLIPSOID:  # other things may hang on the fingertip, and keep their size
+        if (
+            ball.get(ROLE) == ELLIPSOID
+        ):  # other things may hang on the fingertip, and keep their size
             ball.scale = axes * SCALE
 
 
@@ -231,7 +240,9 @@ def project(context: Context, bed: Object, points: Floats) -> Floats:
     return (clip[:, :2] / depth + 1.0) / 2.0 * size
 
 
-def linear(color: tuple[float, float, float], alpha: float = 1.0) -> tuple[float, float, float, float]:
+def linear(
+    color: tuple[float, float, float], alpha: float = 1.0
+) -> tuple[float, float, float, float]:
     """Return an sRGB color in the linear light of Blender's materials."""
     r, g, b = (c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in color)
     return r, g, b, alpha

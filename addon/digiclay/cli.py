@@ -69,8 +69,9 @@ def run_as_program(parse: Callable[[], Namespace]) -> NoReturn:
     """Read arguments, carry out the command they name, and leave with its exit code.
 
     On one core, unless the environment says otherwise: a session's products are small, and a second
-    thread would spend its time waiting for the next, which counts as well. What is imported by then is never
-    searched for garbage, which would take a seventh of a short command; Blender's module is imported later.
+    thread would spend its time waiting for the next, which counts as well. What is imported by then
+    is never searched for garbage, which would take a seventh of a short command; Blender's module
+    is imported later.
     """
 
     def parse_and_freeze() -> Namespace:

@@ -52,11 +52,14 @@ except ModuleNotFoundError as error:
         "This needs Blender's Python module, bpy: install digiclay[blender] with pip, or run inside Blender."
     ) from None
 except ImportError as error:
-    raise DigiclayError(f"Blender's Python module, bpy, is installed but cannot be loaded: {error}") from None
+    raise DigiclayError(
+        f"Blender's Python module, bpy, is installed but cannot be loaded: {error}"
+    ) from None
 
 #: The name Blender knows the extension by.
 PACKAGE = __package__
-#: Of a property that takes paths beside the open file: without it Blender 4.5 to 5.2 crash in preferences.
+#: Of a property that takes paths beside the open file: without it Blender 4.5 to 5.2 crash in
+#: preferences.
 RELATIVE_PATH = {"PATH_SUPPORTS_BLEND_RELATIVE"} if bpy.app.version >= (4, 5) else set()
 #: What inputs of the bed's geometry nodes are called in older files.
 FORMER_INPUTS = {"Color by Force": "Colour by Force", "Top Color at (N)": "Top Colour at (N)"}
@@ -93,7 +96,9 @@ def has_node_setting(modifier: Modifier, name: str) -> bool:
 def node_setting(modifier: Modifier, name: str) -> Any:
     """Return what a geometry nodes modifier sets an input of its tree to."""
     identifier = _identifier(modifier, name)
-    if hasattr(modifier, "properties"):  # from 5.2 on; before that the modifier itself is the dictionary
+    if hasattr(
+        modifier, "properties"
+    ):  # from 5.2 on; before that the modifier itself is the dictionary
         return getattr(modifier.properties.inputs, identifier).value
     return modifier[identifier]
 
@@ -101,7 +106,9 @@ def node_setting(modifier: Modifier, name: str) -> Any:
 def read_stored(owner: ID, name: str) -> dict[str, Any]:
     """Return all that is stored in a property group of an object, nested; what was never set is not in it."""
     # From 5.0 on these values are kept apart from the custom properties.
-    properties = owner.bl_system_properties_get() if hasattr(owner, "bl_system_properties_get") else owner
+    properties = (
+        owner.bl_system_properties_get() if hasattr(owner, "bl_system_properties_get") else owner
+    )
     group = properties.get(name) if properties is not None else None
     return group.to_dict() if group is not None else {}
 
@@ -151,7 +158,9 @@ def own_curves(owner: ID) -> None:
     data = owner.animation_data
     if not data or data.action is None:
         return
-    slot = getattr(data, "action_slot", None)  # up to 4.3 an action has the same curves for all its users
+    slot = getattr(
+        data, "action_slot", None
+    )  # up to 4.3 an action has the same curves for all its users
     if (data.action.users if slot is None else len(slot.users())) < 2:
         return
     action = data.action.copy()

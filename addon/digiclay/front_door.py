@@ -22,7 +22,14 @@ from .core.files.run_folder import write_folder
 from .core.files.tables import Record, Table
 from .core.mesh_io.export_model import Model, make_bodies
 from .core.mesh_io.mesh_writer import write
-from .core.scene.scene_source import Setting, Source, list_changes, make_scene, read_source, write_word
+from .core.scene.scene_source import (
+    Setting,
+    Source,
+    list_changes,
+    make_scene,
+    read_source,
+    write_word,
+)
 from .core.scene.schema import Scene
 from .core.session import finished_run, run_scene
 from .core.session.probes import require_scene
@@ -71,7 +78,11 @@ class Surface:
     """Pins now and before: ``position`` (n, 2), ``height``, ``former`` (n,), m, ``force`` (n,), N."""
 
     def export(
-        self, path: str | os.PathLike[str], kind: str = "solid", skin: str = "bilinear", unit: str = "mm"
+        self,
+        path: str | os.PathLike[str],
+        kind: str = "solid",
+        skin: str = "bilinear",
+        unit: str = "mm",
     ) -> Path:
         """Write the surface as a mesh, complete or not at all, in place of an older file.
 
@@ -80,7 +91,8 @@ class Surface:
         path : path
             Its ending selects the format: stl, obj, ply, glb or 3mf.
         kind : {"solid", "surface", "pins", "features"}
-            A watertight body for printing, the skin alone, the stepped bed, or each boss and crease.
+            A watertight body for printing, the skin alone, the stepped bed, or each boss and
+            crease.
         skin : {"bilinear", "smooth", "membrane"}
             Skin between the pins.
         unit : {"mm", "m"}
@@ -94,7 +106,8 @@ class Surface:
         Raises
         ------
         DigiclayError
-            For an unknown ending, kind, skin or unit, without features, or if the file cannot be written.
+            For an unknown ending, kind, skin or unit, without features, or if the file cannot be
+            written.
         """
         model = Model(kind=kind, skin=skin, cap=self.scene.actuator.bore / 2.0)
         return write(make_bodies(self.formed, model, Finding()), read_path(path), unit)
@@ -107,8 +120,8 @@ class Result(run_scene.Result):
     def save(self, folder: str | os.PathLike[str], overwrite: bool = False) -> Path:
         """Write the run's folder, complete or not at all: scene.toml, history.npz, metrics.json.
 
-        The code of a method of your own is written as method.py. Of a class without a file, such as one of a
-        notebook, there is no code to write: a warning says so.
+        The code of a method of your own is written as method.py. Of a class without a file, such as
+        one of a notebook, there is no code to write: a warning says so.
 
         Parameters
         ----------
@@ -204,7 +217,9 @@ class Result(run_scene.Result):
 
 def write_value(key: str, value: Any) -> str:
     """Return the word of a value in a scene file, with the method loaded that it names."""
-    return write_word(load_method(value) if key == METHOD and isinstance(value, (str, type)) else value)
+    return write_word(
+        load_method(value) if key == METHOD and isinstance(value, (str, type)) else value
+    )
 
 
 def change_scene(source: Source, changes: Table | None) -> Scene:
@@ -217,7 +232,9 @@ def change_scene(source: Source, changes: Table | None) -> Scene:
         refuse_former(source)
     elif isinstance(source, Mapping) and isinstance(control, Mapping) and "method" in control:
         given.insert(0, (METHOD, control["method"]))
-    return make_scene(path, table, [Setting(key, write_value(key, value), "changes") for key, value in given])
+    return make_scene(
+        path, table, [Setting(key, write_value(key, value), "changes") for key, value in given]
+    )
 
 
 def run(scene: Scene, progress: Callable[[int, int], None] | None, *, errors: bool) -> Result:
@@ -246,7 +263,9 @@ def sweep(
 ) -> NDArray[Any]:
     """Run a scene over a grid of values; return a row for each point."""
     if not isinstance(varied, Mapping) or not varied:
-        raise SceneError(f"A sweep must vary at least one key: {{key: values}} (got {varied!r:.60}).")
+        raise SceneError(
+            f"A sweep must vary at least one key: {{key: values}} (got {varied!r:.60})."
+        )
     words = metrics.split(",") if isinstance(metrics, str) else metrics
     if not isinstance(words, Iterable):
         raise ParameterError("metrics", "", "must be a list of metrics", repr(metrics))

@@ -7,8 +7,9 @@ from .compat import bpy
 #: `tools/manual.py` makes it from docs/guide.md.
 PAGE = Path(__file__).absolute().with_name("manual") / "guide.html"
 
-#: Pattern of what is looked up, in lower case, and the anchor of its section; the first that fits counts. The
-#: properties of an operator are looked up as the operator. An empty anchor is the page's beginning.
+#: Pattern of what is looked up, in lower case, and the anchor of its section; the first that fits
+#: counts. The properties of an operator are looked up as the operator. An empty anchor is the
+#: page's beginning.
 ENTRIES = (
     ("bpy.ops.mesh.digital_clay_add", "#first-ridge"),
     ("bpy.ops.mesh.digital_clay_make", "#export"),

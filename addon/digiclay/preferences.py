@@ -87,7 +87,9 @@ class Preferences(bpy.types.AddonPreferences):
         default=True,
     )
     show_cursor_text: flag(
-        "Text at the Cursor", "The Press tool writes size, brush and amount beside the cursor", default=True
+        "Text at the Cursor",
+        "The Press tool writes size, brush and amount beside the cursor",
+        default=True,
     )
     overlay_corner: choice(
         "Overlay Corner",
@@ -129,7 +131,9 @@ class Preferences(bpy.types.AddonPreferences):
         """Draw a warning, the permission, what was loaded, and what was refused."""
         warning = column.column()
         warning.alert = True
-        warning.label(text="Every Python file in this folder is run with all your rights:", icon="ERROR")
+        warning.label(
+            text="Every Python file in this folder is run with all your rights:", icon="ERROR"
+        )
         advice = "choose a folder that only you can write to, with code that you have read."
         warning.label(text=advice, icon="BLANK1")
         column.prop(self, "run_own_methods")

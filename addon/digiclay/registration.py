@@ -44,8 +44,9 @@ def register() -> None:
 
 def unregister() -> None:
     """Undo `register` in the opposite order."""
-    # Blender 4.2 keeps callbacks of properties for good, and with them the names of their modules, `bpy` too;
-    # its Python module then crashes at exit. Python clears the names of a module that something refers to.
+    # Blender 4.2 keeps callbacks of properties for good, and with them the names of their modules,
+    # `bpy` too; its Python module then crashes at exit. Python clears the names of a module that
+    # something refers to.
     for name, module in list(sys.modules.items()):
         if name.startswith(__package__):
             vars(module)["_this_module"] = module

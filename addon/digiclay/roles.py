@@ -11,19 +11,27 @@ if TYPE_CHECKING:
 
 #: Property that holds an object's role.
 ROLE = "digiclay_role"
-#: A housing is an object of its own in older files only. A pin is whatever the bed's nodes draw, and a bake
-#: holds baked pins: both stand in no scene.
-BED, FINGERTIP, ELLIPSOID, HOUSING, PIN, BAKE = "bed", "fingertip", "ellipsoid", "housing", "pin", "bake"
+#: A housing is an object of its own in older files only. A pin is whatever the bed's nodes draw,
+#: and a bake holds baked pins: both stand in no scene.
+BED, FINGERTIP, ELLIPSOID, HOUSING, PIN, BAKE = (
+    "bed",
+    "fingertip",
+    "ellipsoid",
+    "housing",
+    "pin",
+    "bake",
+)
 #: The empty between a bed and the fingertips of a hand, which moves them as one.
 PALM = "palm"
-#: Properties by which a bed holds its fingertip, and that its ellipsoid: what is held is appended along.
+#: Properties by which a bed holds its fingertip, and that its ellipsoid: what is held is appended
+#: along.
 FINGER, BALL = "digiclay_fingertip", "digiclay_ellipsoid"
 #: Property by which a fingertip holds its palm, so that one that is deleted is still known.
 HAND = "digiclay_hand"
 #: Those by which beds and palms hold their fingertips, by number, from 1 on.
 FINGERS = (FINGER, *(f"{FINGER}_{number}" for number in range(2, MOST_FINGERS + 1)))
-#: Marks what was seen to belong to a bed: only that can be left behind by one. What older files have lying
-#: about without a bed stays.
+#: Marks what was seen to belong to a bed: only that can be left behind by one. What older files
+#: have lying about without a bed stays.
 OWNED = "digiclay_owned"
 
 
@@ -103,4 +111,8 @@ def _part(owner: Object, name: str, role: str) -> Object | None:
     part = owner.get(name)
     if name in (FINGER, BALL) and name not in owner:  # older files do not have it as a property
         part = next((child for child in owner.children if child.get(ROLE) == role), None)
-    return part if part is not None and owner_of(part, owner[ROLE]) == owner and is_linked(part) else None
+    return (
+        part
+        if part is not None and owner_of(part, owner[ROLE]) == owner and is_linked(part)
+        else None
+    )

@@ -87,13 +87,20 @@ class Law:
         self.period, self.pin, self.tip = file["period"], file["pin"], file["fingertip"]
         self.x, self.y = (at[pins] for at in problem.places)
         self.across, self.along = self.x / self.tip["length"], self.y / self.tip["width"]
-        self.times, self.points = [t for t, *_ in file["path"]], [point for _, *point in file["path"]]
+        self.times, self.points = (
+            [t for t, *_ in file["path"]],
+            [point for _, *point in file["path"]],
+        )
         self.exponent, self.unit = (file["contact"][key] for key in ("exponent", "unit"))
         pulp = file.get("relaxation") or {"times": [], "weights": [1.0]}
         self.rates = 1.0 / np.array(pulp["times"])[:, None]
         self.shares = np.array(pulp["weights"][1:]) / sum(pulp["weights"])
         self.area = math.pi * self.pin["bore"] ** 2 / 4.0
-        self.damping, self.lag, dead = file.get("damping"), file.get("lag", 0.0), file.get("dead_time", 0.0)
+        self.damping, self.lag, dead = (
+            file.get("damping"),
+            file.get("lag", 0.0),
+            file.get("dead_time", 0.0),
+        )
         if self.damping is None:
             self.high, self.low = file["supply"]["high"], file["supply"]["low"]
             self.laminar, self.turbulent, self.resistance = (
@@ -101,7 +108,9 @@ class Law:
             )
         # Segments of a held command that has come to the valve; the first waits for the dead time.
         self.starts = np.arange(problem.count) * self.period + dead
-        self.held = problem.commands if problem.commands.shape[1] == 1 else problem.commands[:, pins]
+        self.held = (
+            problem.commands if problem.commands.shape[1] == 1 else problem.commands[:, pins]
+        )
         if dead:
             self.starts = np.append(0.0, self.starts)
             self.held = np.vstack([np.zeros_like(self.held[:1]), self.held])
@@ -139,12 +148,17 @@ class Law:
         """Return x, y, z of the fingertip's lowest point, m."""
         i = min(max(bisect_right(self.times, time) - 1, 0), len(self.times) - 2)
         share = (time - self.times[i]) / (self.times[i + 1] - self.times[i])
-        return [a + share * (b - a) for a, b in zip(self.points[i], self.points[i + 1], strict=True)]
+        return [
+            a + share * (b - a) for a, b in zip(self.points[i], self.points[i + 1], strict=True)
+        ]
 
     def underside(self, time: float) -> Floats:
         """Return the fingertip's underside over the pins, (n,), m."""
         at_x, at_y, at_z = self.pose(time)
-        across, along = self.across - at_x / self.tip["length"], self.along - at_y / self.tip["width"]
+        across, along = (
+            self.across - at_x / self.tip["length"],
+            self.along - at_y / self.tip["width"],
+        )
         inward = 1.0 - across * across - along * along
         inside = np.maximum(inward, 1.0 - JOIN)
         shape = np.sqrt(inside) + (inward - inside) * (0.5 / ROOT)
@@ -158,7 +172,9 @@ class Law:
     def load(self, time: float, state: Floats) -> tuple[Floats, Floats]:
         """Return the elastic force and the contact force, (n,) each, N."""
         tension = self.tension(state[0] - self.underside(time))
-        return tension, np.maximum(tension - self.shares @ state[1:], 0.0) if self.shares.size else tension
+        return tension, np.maximum(
+            tension - self.shares @ state[1:], 0.0
+        ) if self.shares.size else tension
 
     def conductance(self, opening: Floats, drop: Floats) -> Floats:
         """Return flow over pressure drop, (n,), m³/(s Pa), of valve and conduit in series."""
@@ -177,7 +193,9 @@ class Law:
             opening = self.opening(time, segment)
             drop = np.where(opening > 0.0, self.high, self.low) - force / self.area
             speed = self.conductance(opening, drop) * drop / self.area
-        stuck = ((state[0] <= 0.0) & (speed < 0.0)) | ((state[0] >= self.pin["stroke"]) & (speed > 0.0))
+        stuck = ((state[0] <= 0.0) & (speed < 0.0)) | (
+            (state[0] >= self.pin["stroke"]) & (speed > 0.0)
+        )
         out[0] = np.where(stuck, 0.0, speed)
         out[1:] = self.rates * (tension - state[1:])
         return out

@@ -17,7 +17,9 @@ METHODS = (("DOP853", 2.3e-14), ("RK45", 1e-13))
 STEPS = 20
 
 
-def solve_pin(problem: Problem, pin: int, method: str, tolerance: float) -> Iterator[tuple[float, float]]:
+def solve_pin(
+    problem: Problem, pin: int, method: str, tolerance: float
+) -> Iterator[tuple[float, float]]:
     """Give height, m, and force, N, of a pin at the ends of the judged periods."""
     from scipy.integrate import solve_ivp
 

@@ -22,11 +22,15 @@ ADAPTERS = Path(__file__).parent / "adapters"
 NAMES = ("own", "numpy_runge_kutta", "scipy_solvers", "mujoco_force")
 #: Problems and settings of a method with --quick.
 QUICK, FEW = ("damped_pins", "relaxation_alone"), 2
-#: Runs, of which the median counts; processor time from which on one is enough, and from which on the finer
-#: settings of a method are left out, s.
+#: Runs, of which the median counts; processor time from which on one is enough, and from which on
+#: the finer settings of a method are left out, s.
 REPEATS, LONG, LONGEST = 3, 1.0, 6.0
-#: Errors of height and of force at which the fastest are compared, m and N: where pins cannot move, of force.
-LEVELS = {"height_error": (1e-5, 1e-6, 1e-7, 1e-8, 1e-9), "force_error": (1e-3, 1e-4, 1e-5, 1e-6, 1e-7)}
+#: Errors of height and of force at which the fastest are compared, m and N: where pins cannot move,
+#: of force.
+LEVELS = {
+    "height_error": (1e-5, 1e-6, 1e-7, 1e-8, 1e-9),
+    "force_error": (1e-3, 1e-4, 1e-5, 1e-6, 1e-7),
+}
 RUNS = {
     "problem": "problem",
     "method": "method",
@@ -69,7 +73,9 @@ def load_adapter(path: Path) -> Adapter:
         spec.loader.exec_module(module)
         methods = {str(name): tuple(map(float, given)) for name, given in module.METHODS.items()}
         if not all(methods.values()) or not callable(module.prepare):
-            raise ValueError("METHODS must have settings for each method, and prepare must be a function")
+            raise ValueError(
+                "METHODS must have settings for each method, and prepare must be a function"
+            )
         return Adapter(path.stem, methods, module.prepare)
     except Exception as error:
         raise DigiclayError(f"peers: {path} is no adapter: {_describe(error)}") from None
@@ -78,7 +84,10 @@ def load_adapter(path: Path) -> Adapter:
 def list_adapters(others: Sequence[str] = ()) -> list[Adapter]:
     """Return all adapters, that of MuJoCo where it is installed, then those of other files."""
     names = [name for name in NAMES if name != "mujoco_force" or importlib.util.find_spec("mujoco")]
-    return [load_adapter(path) for path in (*(ADAPTERS / f"{name}.py" for name in names), *map(Path, others))]
+    return [
+        load_adapter(path)
+        for path in (*(ADAPTERS / f"{name}.py" for name in names), *map(Path, others))
+    ]
 
 
 def solve(adapter: Adapter, problem: Problem, method: str, setting: float) -> Answer | None:
@@ -171,7 +180,9 @@ def list_answers(answers: Sequence[Answer]) -> Iterator[str]:
             [
                 name,
                 *(
-                    compare([a for a in answers if a.problem == name and getattr(a, quantity) <= level])
+                    compare(
+                        [a for a in answers if a.problem == name and getattr(a, quantity) <= level]
+                    )
                     for level in LEVELS[quantity]
                 ),
             ]
@@ -185,6 +196,8 @@ def compare(fit: Sequence[Answer]) -> str:
     if not fit:
         return "-"
     best = min(fit, key=lambda answer: answer.seconds)
-    ours, others = ([a.seconds for a in fit if (a.engine == "own") is mine] for mine in (True, False))
+    ours, others = (
+        [a.seconds for a in fit if (a.engine == "own") is mine] for mine in (True, False)
+    )
     ratio = f" ({min(ours) / min(others):.2f})" if ours and others else ""
     return f"{best.method} {best.seconds * 1e6:.0f}{ratio}"

@@ -3,8 +3,8 @@
     pin_display.py ws://127.0.0.1:8765 /dev/ttyUSB0 --rate 30 --baud 1000000
 
 The token is in DIGICLAY_SERVE_TOKEN. A frame is a body and its CRC-32, framed by SLIP (RFC 1055),
-little-endian; docs/serve.md has the table. The display acknowledges each frame; at most four are on their
-way, and none is repeated.
+little-endian; docs/serve.md has the table. The display acknowledges each frame; at most four are on
+their way, and none is repeated.
 """
 
 import argparse
@@ -63,7 +63,9 @@ class Display:
     def __init__(self, path: str, baud: int, rate: float) -> None:
         speed = getattr(termios, f"B{baud}", None)
         if speed is None:
-            raise SystemExit(f"--baud must be a speed of serial lines, such as 115200 (got {baud}).")
+            raise SystemExit(
+                f"--baud must be a speed of serial lines, such as 115200 (got {baud})."
+            )
         try:
             self._line = os.open(path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
             tty.setraw(self._line)
@@ -124,12 +126,17 @@ def main() -> None:
     parser.add_argument("address", help="of the server, such as ws://127.0.0.1:8765")
     parser.add_argument("line", help="serial line of the display, such as /dev/ttyUSB0")
     parser.add_argument("--rate", type=float, default=30.0, help="frames a second; default: 30")
-    parser.add_argument("--baud", type=int, default=115200, help="speed of the line; default: 115200")
+    parser.add_argument(
+        "--baud", type=int, default=115200, help="speed of the line; default: 115200"
+    )
     arguments = parser.parse_args()
     header = {"Authorization": f"Bearer {os.environ.get('DIGICLAY_SERVE_TOKEN', '')}"}
     address = f"{arguments.address}/?format=binary&rate={arguments.rate:g}"
     display = Display(arguments.line, arguments.baud, arguments.rate)
-    with suppress(KeyboardInterrupt, ConnectionClosed), connect(address, additional_headers=header) as server:
+    with (
+        suppress(KeyboardInterrupt, ConnectionClosed),
+        connect(address, additional_headers=header) as server,
+    ):
         bed: dict[str, Any] = json.loads(server.recv())
         for message in server:
             if isinstance(message, bytes):

@@ -41,7 +41,9 @@ def read_picture(path):
 def film_strip(scene, path):
     """Put a film into the sequencer of a scene; return its strip and how many frames it has."""
     strip = strips(scene).new_movie("film", str(path), channel=1, frame_start=1)
-    return strip, int(strip.duration if hasattr(strip, "duration") else strip.frame_final_duration)  # 5.2 on
+    return strip, int(
+        strip.duration if hasattr(strip, "duration") else strip.frame_final_duration
+    )  # 5.2 on
 
 
 def in_the_view():
@@ -136,7 +138,11 @@ def inventory():
     """Name everything in the open file, but the slots Blender shows its results in."""
     slots = {"Render Result", "Viewer Node"}
     kinds = {name: getattr(bpy.data, name) for name in dir(bpy.data)}
-    found = {name: kind for name, kind in kinds.items() if isinstance(kind, bpy.types.bpy_prop_collection)}
+    found = {
+        name: kind
+        for name, kind in kinds.items()
+        if isinstance(kind, bpy.types.bpy_prop_collection)
+    }
     return {name: sorted({item.name for item in kind} - slots) for name, kind in found.items()}
 
 
@@ -144,7 +150,9 @@ def housings():
     graph = bpy.context.evaluated_depsgraph_get()
     drawn = (item.object for item in graph.object_instances if not item.is_instance)
     meshes = (thing.data for thing in drawn if thing.type == "MESH")
-    return sum(one is not None and one.get(ROLE) == "housing" for mesh in meshes for one in mesh.materials)
+    return sum(
+        one is not None and one.get(ROLE) == "housing" for mesh in meshes for one in mesh.materials
+    )
 
 
 def older(bed):

@@ -29,7 +29,10 @@ pytestmark = pytest.mark.usefixtures("extension")
 @pytest.fixture
 def preset():
     """A preset of the user's own, and the name it goes by."""
-    table = {"control": {"method": "cell_states", "force_setpoint": 0.03}, "valve": {"stroke": 41e-6}}
+    table = {
+        "control": {"method": "cell_states", "force_setpoint": 0.03},
+        "valve": {"stroke": 41e-6},
+    }
     own_presets.save("Stiff clay", resolve(table))
     yield "Stiff clay"
     own_presets.remove("Stiff clay")
@@ -53,7 +56,9 @@ def test_a_bed_is_a_scene_files_but_for_the_ground():
         wanted = resolve(table)
         if wanted.method == "virtual_master":
             wanted = resolve({**table, "control": {"ground": "cell"}})
-        made = make_scene(chosen.get("preset", "paper"), Layout(), chosen.get("method", "virtual_master"))
+        made = make_scene(
+            chosen.get("preset", "paper"), Layout(), chosen.get("method", "virtual_master")
+        )
         assert made.with_sections(name=wanted.name) == wanted, chosen
         if number in (0, 2, len(CHOICES) - 1):
             bed = add(**chosen)
@@ -62,7 +67,11 @@ def test_a_bed_is_a_scene_files_but_for_the_ground():
 
 def test_a_preset_of_the_user_s_own_is_taken_and_another_method_brings_its_own_gains(preset):
     scene = properties.scene_of(add(preset=preset, method="cell_states", rows=30))
-    assert (scene.layout.rows, scene.valve.stroke, scene.control.force_setpoint) == (30, 41e-6, 0.03)
+    assert (scene.layout.rows, scene.valve.stroke, scene.control.force_setpoint) == (
+        30,
+        41e-6,
+        0.03,
+    )
     scene = properties.scene_of(add(preset=preset, method="elastic"))
     plain = resolve({"control": {"method": "elastic"}})
     assert (scene.control, scene.blister, scene.valve.stroke) == (plain.control, None, 41e-6)
@@ -73,7 +82,10 @@ def test_a_preset_of_the_user_s_own_is_taken_and_another_method_brings_its_own_g
 def test_a_bed_smaller_than_its_blister_gets_one_that_fits(rows, columns, method):
     bed = add(rows=rows, columns=columns, method="elastic")
     bed.digiclay.chosen_method = method
-    for scene in (make_scene("paper", Layout(rows=rows, columns=columns), method), properties.scene_of(bed)):
+    for scene in (
+        make_scene("paper", Layout(rows=rows, columns=columns), method),
+        properties.scene_of(bed),
+    ):
         assert scene.blister.radius <= max(rows, columns) * 3e-3 / 2 * (1 + 1e-9)
         assert scene.blister.flat_radius < scene.blister.radius < scene.blister.edge_radius
 
@@ -86,7 +98,9 @@ def test_a_bed_of_any_scale_stands_on_the_cursor_with_its_fingertip_above(scale)
     bpy.context.view_layer.update()
     shown = bed.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
     # float32 at 3 units.
-    assert min((bed.matrix_world @ point.co).z for point in shown.vertices) == pytest.approx(3.0, abs=1e-5)
+    assert min((bed.matrix_world @ point.co).z for point in shown.vertices) == pytest.approx(
+        3.0, abs=1e-5
+    )
     assert bridge.uniform(bed) == pytest.approx(scale, rel=1e-6)
     assert bridge.pose(fingertip_of(bed))[2] > 0.040
 
@@ -101,11 +115,16 @@ def test_a_bed_has_the_plan_and_the_fingertip_of_its_kind(name):
     (tip,), (usual,) = ([finger.fingertip for finger in one.fingers] for one in (scene, paper))
     sizes = [(tip.length, usual.length), (scene.blister.radius, paper.blister.radius)]
     # Properties hold 32 bits; what was written exactly is read exactly.
-    assert [size / of_paper for size, of_paper in sizes] == pytest.approx([wanted.share] * 2, rel=1e-9)
+    assert [size / of_paper for size, of_paper in sizes] == pytest.approx(
+        [wanted.share] * 2, rel=1e-9
+    )
     assert scene.actuator.bore <= scene.layout.pitch
     assert (scene.preset, scene.method) == (wanted.preset, wanted.method)
     bed.digiclay.chosen_method = "cell_states"  # another method's blister is in proportion too
-    other, usual = properties.scene_of(bed).blister, resolve({"control": {"method": "cell_states"}}).blister
+    other, usual = (
+        properties.scene_of(bed).blister,
+        resolve({"control": {"method": "cell_states"}}).blister,
+    )
     assert other.radius == pytest.approx(wanted.share * usual.radius, rel=1e-6)  # 32 bits
 
 
@@ -163,7 +182,11 @@ def test_a_saved_preset_is_a_scene_file_of_all_parameters(bed):
 
 
 def test_applying_a_preset_sets_everything_but_the_layout(bed):
-    table = {"layout": {"rows": 30}, "preset": "viscous", "control": {"method": "elastic", "stiffness": 33.0}}
+    table = {
+        "layout": {"rows": 30},
+        "preset": "viscous",
+        "control": {"method": "elastic", "stiffness": 33.0},
+    }
     own_presets.save("Rubber", resolve(table))
     assert bpy.ops.digiclay.preset_apply(preset="Rubber") == {"FINISHED"}
     scene, wanted = properties.scene_of(bed), resolve({**table, "layout": {}}, bed.name)
@@ -174,11 +197,14 @@ def test_applying_a_preset_sets_everything_but_the_layout(bed):
 @pytest.mark.parametrize("name", PRESETS)
 def test_applying_one_of_the_core_s_presets_changes_what_a_scene_file_would(name, bed):
     assert bpy.ops.digiclay.preset_apply(preset=name) == {"FINISHED"}
-    assert properties.scene_of(bed) == resolve({"preset": name, "control": {"ground": "cell"}}, bed.name)
+    assert properties.scene_of(bed) == resolve(
+        {"preset": name, "control": {"ground": "cell"}}, bed.name
+    )
 
 
 @pytest.mark.parametrize(
-    "name", ["", "  ", "paper", "Viscous", "../up", "a/b", ".hidden", "x" * 61, "a\nb", "what?", "end."]
+    "name",
+    ["", "  ", "paper", "Viscous", "../up", "a/b", ".hidden", "x" * 61, "a\nb", "what?", "end."],
 )
 def test_a_name_that_no_preset_can_have_is_refused(name, bed):
     with pytest.raises(OutputError, match=r"^The preset's name must"):
@@ -258,10 +284,17 @@ def test_a_sample_s_session_is_a_take_that_replays_bit_for_bit(name):
     assert replayed(takes.read(bed, entry.number))
 
 
-@pytest.mark.parametrize("how", ["EXEC_DEFAULT", "INVOKE_DEFAULT"], ids=["in the dialog", "dropped"])
-def test_a_scene_file_opens_and_a_session_too_long_to_wait_for_is_left_to_the_command_line(tmp_path, how):
+@pytest.mark.parametrize(
+    "how", ["EXEC_DEFAULT", "INVOKE_DEFAULT"], ids=["in the dialog", "dropped"]
+)
+def test_a_scene_file_opens_and_a_session_too_long_to_wait_for_is_left_to_the_command_line(
+    tmp_path, how
+):
     path = tmp_path / "mein Beet äöü.toml"
-    for text, pins in (((SAMPLES / "tap.toml").read_text(), 121), ("simulation.duration = 3600", 625)):
+    for text, pins in (
+        ((SAMPLES / "tap.toml").read_text(), 121),
+        ("simulation.duration = 3600", 625),
+    ):
         path.write_text(text, encoding="utf-8")
         assert bpy.ops.digiclay.open_scene(how, filepath=str(path)) == {"FINISHED"}
         assert is_bed(bpy.context.object)

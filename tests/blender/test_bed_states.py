@@ -20,10 +20,11 @@ from digiclay.settings import own_presets, properties
 
 from tests.blender.at_hand import beds, done, in_the_view, new_bed, select
 
-#: What an operator does: it adds a bed, or reads data or pins of one, or changes its settings and parts, or
-#: forms and displays something with its pins.
+#: What an operator does: it adds a bed, or reads data or pins of one, or changes its settings and
+#: parts, or forms and displays something with its pins.
 ADDS, DATA, PINS, CHANGES, FORMS = "adds", "data", "pins", "changes", "forms"
-#: Every operator that works without a hand and without a session, how it is called, and what it does.
+#: Every operator that works without a hand and without a session, how it is called, and what it
+#: does.
 CALLS = {
     "mesh.digital_clay_add": ({"rows": 4, "columns": 4}, ADDS),
     "digiclay.add_sample": ({"sample": "session:tap", "take": False}, ADDS),
@@ -218,7 +219,9 @@ def folder(extension, files, monkeypatch):
 
 def make_files(folder):
     bed = new_bed(rows=5, columns=5)
-    (folder / "strokes.toml").write_text("[[stroke]]\ndepth = 0.001\nmoves = [[0, 0, 0], [0.1, 0.002, 0]]\n")
+    (folder / "strokes.toml").write_text(
+        "[[stroke]]\ndepth = 0.001\nmoves = [[0, 0, 0], [0.1, 0.002, 0]]\n"
+    )
     np.save(folder / "ramp.npy", np.linspace(0.0, 1.0, 25).reshape(5, 5))
     scene = properties.scene_of(bed)
     short = replace(scene, simulation=replace(scene.simulation, duration=0.1))
@@ -294,7 +297,12 @@ def observe():
         pins = read_attributes(thing.data) if is_bed(thing) and thing.mode == "OBJECT" else {}
         found[thing.name_full] = repr(values), groups, pins, thing.modifiers.keys(), thing.library
     folders = (Path(), own_presets.folder())
-    kept = {file: file.read_bytes() for one in folders for file in one.glob("*") if ".blend" not in file.name}
+    kept = {
+        file: file.read_bytes()
+        for one in folders
+        for file in one.glob("*")
+        if ".blend" not in file.name
+    }
     return {**found, "files": kept, "sessions": running.list_sessions()}
 
 
@@ -314,7 +322,9 @@ def test_an_operator_works_or_says_in_a_line_why_it_does_not(folder, state, capf
             right = result == {"FINISHED"} and changed
         else:
             one_line = 0 < len(said.strip()) <= 400 and "\n" not in said.strip()
-            right = result is None and one_line and "context is incorrect" not in said and not changed
+            right = (
+                result is None and one_line and "context is incorrect" not in said and not changed
+            )
         if not right:
             wrong.append((name, result, changed, said))
         opened = "" if changed else opened
@@ -393,10 +403,16 @@ def move_one():
     bpy.ops.transform.translate(value=(0.01, 0.0, 0.0))
 
 
-LAYOUT, ROWS = "The pins differ from the parameters of Layout: press Rebuild", "pins, in rows along x"
-NOT_PINS, SOME = "mesh is no longer that of its pins: undo that", "pins now instead of 25: undo that"
-#: What Blender's own verbs make of a bed, which are selected then, and what is said against a session and a
-#: bake of each bed, and against its export as it is drawn; nothing: they are right.
+LAYOUT, ROWS = (
+    "The pins differ from the parameters of Layout: press Rebuild",
+    "pins, in rows along x",
+)
+NOT_PINS, SOME = (
+    "mesh is no longer that of its pins: undo that",
+    "pins now instead of 25: undo that",
+)
+#: What Blender's own verbs make of a bed, which are selected then, and what is said against a
+#: session and a bake of each bed, and against its export as it is drawn; nothing: they are right.
 VERBS = {
     "joined with a cube": (join(lambda bed: bed), SOME, SOME),
     "scale applied": (apply_scale(2.0, 2.0, 2.0), LAYOUT, ""),
@@ -424,7 +440,9 @@ VERBS = {
 
 
 @pytest.mark.parametrize("verb", VERBS)
-def test_what_blenders_own_verbs_make_of_a_bed_is_formed_right_or_refused_with_its_cause(folder, verb):
+def test_what_blenders_own_verbs_make_of_a_bed_is_formed_right_or_refused_with_its_cause(
+    folder, verb
+):
     work, of_session, of_export = VERBS[verb]
     bed = prepare(SESSION, "plain")
     drawn = read_attributes(bed.data)
@@ -440,7 +458,10 @@ def test_what_blenders_own_verbs_make_of_a_bed_is_formed_right_or_refused_with_i
         if of_session == "":
             drawn_now = read_attributes(each.data)
             assert drawn_now == drawn or verb == "height applied"
-        said = {name: call_on(each, name) for name in (SESSION, "export_mesh.digital_clay", "digiclay.bake")}
+        said = {
+            name: call_on(each, name)
+            for name in (SESSION, "export_mesh.digital_clay", "digiclay.bake")
+        }
         for name, message in said.items():
             wanted = of_export if name.startswith("export") else of_session
             assert bool(message) == bool(wanted), name

@@ -102,7 +102,8 @@ def state():
     return getattr(bpy.context.object, "name", ""), bpy.context.mode, len(bpy.data.objects)
 
 
-#: What only adds another bed, which takes time: called while a session runs, in states that matter for it.
+#: What only adds another bed, which takes time: called while a session runs, in states that matter
+#: for it.
 ADDS = {"mesh.digital_clay_add", "digiclay.add_sample"}
 FOR_ADDS = {"a bed", "nothing", "edited", "another mesh edited", "joined into a cube"}
 
@@ -117,7 +118,9 @@ def calls(adds):
         how = "EXEC_DEFAULT" if hasattr(kind, "execute") else "INVOKE_DEFAULT"
         yield operator, how, quick
         for known in operator.get_rna_type().properties:
-            both = known.type == "ENUM" and len(known.enum_items) == 2 and kind.bl_idname not in ADDS
+            both = (
+                known.type == "ENUM" and len(known.enum_items) == 2 and kind.bl_idname not in ADDS
+            )
             for item in known.enum_items if both else ():
                 yield operator, how, {**quick, known.identifier: item.identifier}
 
@@ -145,7 +148,9 @@ def test_no_operator_fails(file, odd, live, capfd):
         said.append((operator.idname(), settings, call(operator, how, settings)))
         if state() != before:
             before = prepare(file, odd, live)
-    assert [words for words in said if "Traceback" in words[2] or "context is incorrect" in words[2]] == []
+    assert [
+        words for words in said if "Traceback" in words[2] or "context is incorrect" in words[2]
+    ] == []
     prepare(file, odd, live)
     handlers.end_all(handlers.STOPPED)
     assert running.list_sessions() == ()

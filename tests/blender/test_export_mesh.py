@@ -31,7 +31,9 @@ def shaped(boss=-9.0, added=0.0):
     """A boss of 5 mm at x, mm, a crease of 4 mm, ground between them and what is added; forces, all modes."""
     place, number = make_grid(LAYOUT).positions, np.arange(168)
     x, y = place.T * 1e3
-    raised = 5.0 * np.exp(-((x - boss) ** 2 + y**2) / 20.0) - 4.0 * np.exp(-((x - 9) ** 2 + y**2) / 20.0)
+    raised = 5.0 * np.exp(-((x - boss) ** 2 + y**2) / 20.0) - 4.0 * np.exp(
+        -((x - 9) ** 2 + y**2) / 20.0
+    )
     finger = np.array([0.0, 0.0, 0.09, 1.0, 0.0, 0.0, 0.0])
     return Instant(place, 0.04 + (raised + added) * 1e-3, number % 8, number / 100.0, finger)
 
@@ -88,7 +90,11 @@ def test_blenders_own_importers_read_what_was_exported(bed, tmp_path, kind, file
 
 @pytest.mark.parametrize(
     "axes",
-    [{}, {"forward_axis": "Y", "up_axis": "Z"}, {"forward_axis": "NEGATIVE_X", "up_axis": "NEGATIVE_Y"}],
+    [
+        {},
+        {"forward_axis": "Y", "up_axis": "Z"},
+        {"forward_axis": "NEGATIVE_X", "up_axis": "NEGATIVE_Y"},
+    ],
 )
 def test_an_obj_stands_upright_after_its_import_with_the_same_axes(bed, tmp_path, axes):
     path = str(tmp_path / "bed.obj")
@@ -120,7 +126,9 @@ def test_an_obj_stands_upright_after_its_import_with_the_same_axes(bed, tmp_path
 def test_a_file_has_the_ending_of_its_format_and_the_dialog_lists_it(
     bed, tmp_path, name, file_format, written
 ):
-    shown = bpy.ops.export_mesh.digital_clay.get_rna_type().properties["filter_glob"].default.split(";")
+    shown = (
+        bpy.ops.export_mesh.digital_clay.get_rna_type().properties["filter_glob"].default.split(";")
+    )
     assert any(fnmatchcase(written.lower(), pattern) for pattern in shown)
     options = {"file_format": file_format} if file_format else {}
     bpy.ops.export_mesh.digital_clay(filepath=str(tmp_path / name), kind="surface", **options)
@@ -140,10 +148,16 @@ def test_each_feature_can_have_a_file_of_its_own(bed, tmp_path):
     "name, options, message",
     [
         ("missing/bed.stl", {}, r"Cannot write .*bed\.stl: No such file or directory\."),
-        ("bed.stl", {"kind": "features", "threshold": 50.0}, "no feature of at least 3 pins more than 50 mm"),
+        (
+            "bed.stl",
+            {"kind": "features", "threshold": 50.0},
+            "no feature of at least 3 pins more than 50 mm",
+        ),
     ],
 )
-def test_an_export_that_cannot_be_written_is_refused_in_one_line(bed, tmp_path, name, options, message):
+def test_an_export_that_cannot_be_written_is_refused_in_one_line(
+    bed, tmp_path, name, options, message
+):
     with pytest.raises(RuntimeError, match=message) as caught:
         bpy.ops.export_mesh.digital_clay(filepath=str(tmp_path / name), **options)
     assert "Traceback" not in str(caught.value)
@@ -168,7 +182,11 @@ def test_the_mesh_is_the_surface_with_its_features_as_vertex_groups(bed, kind):
     assert_near(corners(made)[:168, 2] / bridge.SCALE, known["height"], exact)
     assert [group.name for group in made.vertex_groups] == ["boss_1", "crease_1"]
     for index, x in ((0, -9e-3), (1, 9e-3)):
-        mine = [v.co.x / bridge.SCALE for v in made.data.vertices if any(g.group == index for g in v.groups)]
+        mine = [
+            v.co.x / bridge.SCALE
+            for v in made.data.vertices
+            if any(g.group == index for g in v.groups)
+        ]
         assert len(mine) > 8
         assert np.mean(mine) == pytest.approx(x, abs=1.5e-3)
     assert (open_edges(made) == 0) == (kind != "surface")
@@ -208,7 +226,9 @@ def test_a_mesh_stands_where_its_surface_is_or_beside_the_one_before_in_a_place_
         bpy.ops.mesh.digital_clay_make(kind="solid")
         made.append(bpy.context.object)
         made[-1].name = "Bowl"  # its place stays taken
-    away = np.array([(one.matrix_world.translation - bed.matrix_world.translation).length for one in made])
+    away = np.array(
+        [(one.matrix_world.translation - bed.matrix_world.translation).length for one in made]
+    )
     np.testing.assert_allclose(away / away[0], [1, 3, 2], rtol=1e-5)
     assert away[0] > 14 * 3e-3 * bridge.SCALE
 
@@ -225,14 +245,18 @@ def test_features_can_be_measured_from_a_surface_that_was_kept(bed):
     assert "mm deep" in crease
 
 
-def test_the_heights_are_measured_from_the_rest_height_and_a_bed_without_attributes_or_rows_is_refused(bed):
+def test_the_heights_are_measured_from_the_rest_height_and_a_bed_without_attributes_or_rows_is_refused(
+    bed,
+):
     bed.digiclay.actuator.rest_height = 35.0
     assert_near(formed_bed.read_formed(bed).former, 0.035, 1e-12)
     bed.data.attributes.remove(bed.data.attributes["force"])
     with pytest.raises(RuntimeError, match=r"no longer that of its pins: .* press Rebuild"):
         bpy.ops.mesh.digital_clay_make()
     bpy.ops.mesh.digital_clay_add(rows=1, columns=9)
-    with pytest.raises(RuntimeError, match=r"must have at least 2 x 2 pins, in rows along x \(got 1 x 9\)"):
+    with pytest.raises(
+        RuntimeError, match=r"must have at least 2 x 2 pins, in rows along x \(got 1 x 9\)"
+    ):
         bpy.ops.mesh.digital_clay_make()
 
 

@@ -37,10 +37,21 @@ def footprint():
     """Return what of the extension is to be found in Blender: types, properties, entries, handlers."""
     types = {name: getattr(bpy.types, name) for name in dir(bpy.types)}
     found = {name for name in types if "digi" in name.lower()}
-    drawn = {name: getattr(getattr(kind, "draw", None), "_draw_funcs", ()) for name, kind in types.items()}
-    found |= {f"{ours(functions)} in {name}" for name, functions in drawn.items() if ours(functions)}
-    owners = {"Object": bpy.types.Object, "Scene": bpy.types.Scene, "WindowManager": bpy.types.WindowManager}
-    found |= {f"{name}.{key}" for name, kind in owners.items() for key in dir(kind) if "digi" in key}
+    drawn = {
+        name: getattr(getattr(kind, "draw", None), "_draw_funcs", ())
+        for name, kind in types.items()
+    }
+    found |= {
+        f"{ours(functions)} in {name}" for name, functions in drawn.items() if ours(functions)
+    }
+    owners = {
+        "Object": bpy.types.Object,
+        "Scene": bpy.types.Scene,
+        "WindowManager": bpy.types.WindowManager,
+    }
+    found |= {
+        f"{name}.{key}" for name, kind in owners.items() for key in dir(kind) if "digi" in key
+    }
     lists = {name: getattr(bpy.app.handlers, name) for name in dir(bpy.app.handlers)}
     handlers = {name: each for name, each in lists.items() if isinstance(each, list)}
     return found | {f"{ours(each)} in {name}" for name, each in handlers.items() if ours(each)}
@@ -50,7 +61,11 @@ def test_the_extension_registers_unregisters_and_registers_again_without_a_trace
     assert footprint() == set()
     digiclay.register()
     first, command = footprint(), command_line.COMMAND.handle
-    assert {"MESH_OT_digital_clay_add", "IMPORT_SCENE_OT_digital_clay_run", "Object.digiclay"} <= first
+    assert {
+        "MESH_OT_digital_clay_add",
+        "IMPORT_SCENE_OT_digital_clay_run",
+        "Object.digiclay",
+    } <= first
     digiclay.unregister()
     assert (footprint(), command_line.COMMAND.handle) == (set(), None)
     with pytest.raises(ValueError, match="already been removed"):
@@ -106,22 +121,39 @@ def test_a_file_that_is_no_run_is_refused_in_one_line(tmp_path, content):
     assert len(bpy.data.objects) == before
 
 
-#: What is left of linear light to people without one kind of cone (Machado, Oliveira and Fernandes 2009).
+#: What is left of linear light to people without one kind of cone (Machado, Oliveira and Fernandes
+#: 2009).
 VISION = {
     "all cones": np.eye(3),
     "no red cones": np.array(
-        [[0.152286, 1.052583, -0.204868], [0.114503, 0.786281, 0.099216], [-0.003882, -0.048116, 1.051998]]
+        [
+            [0.152286, 1.052583, -0.204868],
+            [0.114503, 0.786281, 0.099216],
+            [-0.003882, -0.048116, 1.051998],
+        ]
     ),
     "no green cones": np.array(
-        [[0.367322, 0.860646, -0.227968], [0.280085, 0.672501, 0.047413], [-0.011820, 0.042940, 0.968881]]
+        [
+            [0.367322, 0.860646, -0.227968],
+            [0.280085, 0.672501, 0.047413],
+            [-0.011820, 0.042940, 0.968881],
+        ]
     ),
     "no blue cones": np.array(
-        [[1.255528, -0.076749, -0.178779], [-0.078411, 0.930809, 0.147602], [0.004733, 0.691367, 0.303900]]
+        [
+            [1.255528, -0.076749, -0.178779],
+            [-0.078411, 0.930809, 0.147602],
+            [0.004733, 0.691367, 0.303900],
+        ]
     ),
 }
 #: From linear light to CIE XYZ, white at 1.
 XYZ = np.array(
-    [[0.4124564, 0.3575761, 0.1804375], [0.2126729, 0.7151522, 0.0721750], [0.0193339, 0.1191920, 0.9503041]]
+    [
+        [0.4124564, 0.3575761, 0.1804375],
+        [0.2126729, 0.7151522, 0.0721750],
+        [0.0193339, 0.1191920, 0.9503041],
+    ]
 ) / np.array([[0.95047], [1.0], [1.08883]])
 
 
@@ -136,10 +168,13 @@ def mode_color(mode):
     return tuple(material.diffuse_color)
 
 
-#: Colors that are seen together, and how far apart in Lab each two are at least: a difference of 2.3 is just
-#: noticeable side by side, 10 is told apart at a glance.
+#: Colors that are seen together, and how far apart in Lab each two are at least: a difference of
+#: 2.3 is just noticeable side by side, 10 is told apart at a glance.
 SETS = {
-    **{name: (tuple(palette.values()), len(Mode), 10.0) for name, palette in palettes.PALETTES.items()},
+    **{
+        name: (tuple(palette.values()), len(Mode), 10.0)
+        for name, palette in palettes.PALETTES.items()
+    },
     "fingertips": (palettes.FINGERS, 10, 15.5),
 }
 
@@ -211,7 +246,8 @@ def seen(archive, tmp_path_factory):
     """What a Blender of its own, with settings of its own, saw of the installed extension."""
     folder = tmp_path_factory.mktemp("used")
     environment = os.environ | {"BLENDER_USER_RESOURCES": str(folder / "settings")}
-    # Started elsewhere and without the checkout's path: it has the zip and nothing else of digiclay.
+    # Started elsewhere and without the checkout's path: it has the zip and nothing else of
+    # digiclay.
     environment.pop("PYTHONPATH", None)
     command = [sys.executable, "-P", str(HERE / "use_the_zip.py"), str(archive), str(folder)]
     done = subprocess.run(
@@ -257,11 +293,17 @@ def test_the_tool_refuses_a_tag_blender_does_not_know(tmp_path):
         ({"bundled": 1, "imported at once": []}, "trimesh comes along and is not imported at once"),
         ({"added": ["FINISHED"], "scene": 36}, "the operator adds a bed with its settings"),
         ({"redraw rate": 24}, "the preferences are those Blender shows"),
-        ({"own presets": [str(Path("presets", "Mine.toml"))]}, "presets stand in the extension's own folder"),
+        (
+            {"own presets": [str(Path("presets", "Mine.toml"))]},
+            "presets stand in the extension's own folder",
+        ),
         ({"describe": 0, "run": 0, "export": 0, "render": 0}, "the command carries out"),
         ({"own method": "mine", "own run": 0}, "a method of one's own is offered and runs"),
         ({"own methods": [[], ["mine"]]}, "it goes and comes back with the extension"),
-        ({"left behind": [], "added again": ["FINISHED"]}, "disabled it leaves nothing; it is enabled again"),
+        (
+            {"left behind": [], "added again": ["FINISHED"]},
+            "disabled it leaves nothing; it is enabled again",
+        ),
     ],
 )
 def test_in_a_blender_of_its_own(seen, wanted, words):

@@ -75,7 +75,9 @@ def frames_of(path, folder):
 def render(shown, out, looks, set_point=None, **known):
     """Draw a film of a history, or a turntable of an instant."""
     if isinstance(looks, Film):
-        stage = film.stage_film(shown, looks, ("total force", shown["total_force"]), set_point=set_point)
+        stage = film.stage_film(
+            shown, looks, ("total force", shown["total_force"]), set_point=set_point
+        )
     else:
         stage = film.stage_turntable(shown, looks)
     return film.render_film(stage, out, looks, **known)
@@ -123,7 +125,9 @@ def test_arrows_are_red_and_only_there_when_asked_for(tmp_path, history):
     counts = []
     for arrows in (False, True):
         looks = Film(**SMALL, start=0.4, stop=0.45, arrows=arrows, strip=False)
-        red, green, blue = np.moveaxis(filmed(history, tmp_path / f"{arrows}.mp4", looks)[-1], -1, 0)
+        red, green, blue = np.moveaxis(
+            filmed(history, tmp_path / f"{arrows}.mp4", looks)[-1], -1, 0
+        )
         counts.append(int(((red > 0.4) & (green < 0.5 * red) & (blue < 0.5 * red)).sum()))
         assert not (blue[6] - red[6] > 0.25).any(), "without a strip there is none"
     assert counts[0] < 5 < counts[1]
@@ -153,7 +157,9 @@ def test_a_turntable_turns_once_and_shows_no_fingertip(tmp_path, history):
     assert np.all(np.sum(turns[:2] * turns[2:], axis=1) < 0.0)
 
 
-def test_a_film_that_is_stopped_leaves_nothing_and_a_folder_that_cannot_be_written_is_told(tmp_path, history):
+def test_a_film_that_is_stopped_leaves_nothing_and_a_folder_that_cannot_be_written_is_told(
+    tmp_path, history
+):
     asked = iter([False, True])
     path = tmp_path / "film.mp4"
     assert render(history, path, Film(**SMALL), stopped=lambda: next(asked)) is None
@@ -168,24 +174,34 @@ def test_a_film_or_frame_that_lost_its_end_is_known(tmp_path, history):
     path = render(history, tmp_path / "film.mp4", Film(**SMALL, stop=0.3))
     data = path.read_bytes()
     assert film.is_whole_film(data)
-    assert not any(film.is_whole_film(data[:count]) for count in (0, 8, 100, len(data) // 2, len(data) - 1))
+    assert not any(
+        film.is_whole_film(data[:count]) for count in (0, 8, 100, len(data) // 2, len(data) - 1)
+    )
     path = still.render_still(
         Instant.of(history), tmp_path / "still.png", Still(width=32, height=20, samples=1)
     )
     picture = path.read_bytes()
     assert is_whole_picture(picture)
-    assert not any(is_whole_picture(picture[:count]) for count in (0, 8, len(picture) // 2, len(picture) - 1))
+    assert not any(
+        is_whole_picture(picture[:count]) for count in (0, 8, len(picture) // 2, len(picture) - 1)
+    )
 
 
-@pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() != 0, reason="only root can make a small disk")
+@pytest.mark.skipif(
+    not hasattr(os, "geteuid") or os.geteuid() != 0, reason="only root can make a small disk"
+)
 def test_on_a_full_disk_nothing_half_written_stays(tmp_path, history):
     disk = tmp_path / "disk"
     disk.mkdir()
-    made = subprocess.run(["mount", "-t", "tmpfs", "-o", "size=4k", "tmpfs", str(disk)], capture_output=True)
+    made = subprocess.run(
+        ["mount", "-t", "tmpfs", "-o", "size=4k", "tmpfs", str(disk)], capture_output=True
+    )
     if made.returncode:
         pytest.skip("this machine does not let root mount a disk")
     try:
-        with pytest.raises(OutputError, match=r"film\.mp4 cannot be written: [Nn]o space") as caught:
+        with pytest.raises(
+            OutputError, match=r"film\.mp4 cannot be written: [Nn]o space"
+        ) as caught:
             render(history, disk / "film.mp4", Film(**SMALL, stop=0.3))
         assert "\n" not in str(caught.value)
         assert list(disk.iterdir()) == []
@@ -229,14 +245,18 @@ def test_fingertips_stay_in_the_frame_and_the_bed_is_not_made_small_for_one_that
     for name, place in PLACES.items():
         history["fingertip"][:, :, :3], history["fingertip"][-1, 1, :3] = (-0.01, 0.0, 0.04), place
         sizes = {"finger": (Fingertip(), Fingertip())}
-        with stage_film(history, Film(**SMALL), ("forces", history["finger_force"]), **sizes) as shots:
+        with stage_film(
+            history, Film(**SMALL), ("forces", history["finger_force"]), **sizes
+        ) as shots:
             shots.show(shots.count - 1)
             bed = next(thing for thing in shots.scene.objects if thing.get(ROLE) == BED)
             shots.scene.view_layers[0].update()
             parts, seen = (bed, ellipsoid(fingertips_of(bed)[2])), []
             for part in parts:
                 corners = [part.matrix_world @ vertex.co for vertex in part.data.vertices]
-                look = [world_to_camera_view(shots.scene, shots.scene.camera, at)[:2] for at in corners]
+                look = [
+                    world_to_camera_view(shots.scene, shots.scene.camera, at)[:2] for at in corners
+                ]
                 seen.append(np.array(look))
         assert ((seen[1] > 0.0) & (seen[1] < 1.0)).all() == (name != "parked"), name
         widths[name] = np.ptp(seen[0][:, 0])
@@ -296,7 +316,9 @@ def test_a_batch_draws_what_is_asked_for_and_shows_it_on_its_page(capfd):
     drawn = {"still.png", "thumbnail.jpg", "turntable.mp4", "film.mp4"}
     assert drawn <= {path.name for path in folder.iterdir()}
     # An MP4 file says so at its start.
-    assert all((folder / film).read_bytes()[4:8] == b"ftyp" for film in ("turntable.mp4", "film.mp4"))
+    assert all(
+        (folder / film).read_bytes()[4:8] == b"ftyp" for film in ("turntable.mp4", "film.mp4")
+    )
     assert f'href="runs/{folder.name}/film.mp4"' in page
     timing = json.loads((folder / "timing.json").read_text(encoding="utf-8"))
     # Blender's module needs some tenths of a second to come up, on any machine.
@@ -354,16 +376,23 @@ def test_frames_drawn_in_ranges_are_those_of_the_film(here, capsys):
         np.testing.assert_array_equal(
             read_picture(name_frame(folder, frame)), read_picture(name_frame(whole, frame))
         )
-        assert (read_picture(name_frame(whole, frame)) != read_picture(name_frame(whole, frame - 1))).any()
-    # Another range draws no frame that is there, and again one that a copy cut off; a stop keeps those drawn.
+        assert (
+            read_picture(name_frame(whole, frame)) != read_picture(name_frame(whole, frame - 1))
+        ).any()
+    # Another range draws no frame that is there, and again one that a copy cut off; a stop keeps
+    # those drawn.
     kept = name_frame(folder, 3).stat().st_mtime_ns
     name_frame(folder, 2).write_bytes(name_frame(folder, 3).read_bytes()[:-4])
     asked = iter([False, True])
     with pytest.raises(KeyboardInterrupt):
-        Work(JOB, RUN, outputs, lambda: next(asked), lambda step, share: None).make_frames("film", "2-4")
+        Work(JOB, RUN, outputs, lambda: next(asked), lambda step, share: None).make_frames(
+            "film", "2-4"
+        )
     assert list_missing(folder, range(COUNT)) == [0, 1, 4]
     assert name_frame(folder, 3).stat().st_mtime_ns == kept
-    np.testing.assert_array_equal(read_picture(name_frame(folder, 2)), read_picture(name_frame(whole, 2)))
+    np.testing.assert_array_equal(
+        read_picture(name_frame(folder, 2)), read_picture(name_frame(whole, 2))
+    )
     # A second process on the same frames is refused, and frames that the film does not have.
     with lock_name(folder / "3-4"):
         assert main(["job", str(JOB), "--only", "film", "--frames", "3-4", "--quiet"]) == 2

@@ -45,7 +45,9 @@ def sound(bed, *numbers):
     balls = {ellipsoid(tip) for tip in tips.values()}
     scene = set(bpy.context.scene.objects)
     whole = len(balls) == len(tips) and None not in balls and {*tips.values(), *balls} <= scene
-    return whole and tuple(tips) == numbers and len(properties.read_scene(bed).fingers) == len(numbers)
+    return (
+        whole and tuple(tips) == numbers and len(properties.read_scene(bed).fingers) == len(numbers)
+    )
 
 
 def test_fingertips_are_apart_above_the_pins_and_sized_each_for_itself():
@@ -61,8 +63,12 @@ def test_fingertips_are_apart_above_the_pins_and_sized_each_for_itself():
     second.digiclay.fingertip.width *= 1.5
     looked()
     after = properties.read_scene(bed)
-    assert after.fingers[1].fingertip.width == pytest.approx(1.5 * before.fingers[0].fingertip.width)
-    assert [one for number, one in enumerate(after.fingers) if number != 1] == [before.fingers[0]] * 6
+    assert after.fingers[1].fingertip.width == pytest.approx(
+        1.5 * before.fingers[0].fingertip.width
+    )
+    assert [one for number, one in enumerate(after.fingers) if number != 1] == [
+        before.fingers[0]
+    ] * 6
     assert (after.blister, bridge.finger_of(second)) == (before.blister, after.fingers[1].fingertip)
     bed.digiclay.fingertip.whole_width *= 0.5  # the first one's, which the blister follows
     last = properties.read_scene(bed)
@@ -86,14 +92,22 @@ def test_a_left_hand_is_the_image_of_a_right_one_and_stands_so_on_a_bed_that_is_
     assert_near(hands["LEFT"], hands["RIGHT"] * [-1.0, 1.0, -1.0, 1.0], 1e-6)
     assert (hands["RIGHT"][:, 3] > 0.0).all()  # all of them point away from the wrist
     bed = added()
-    bed.location, bed.rotation_euler, bed.scale = (3.0, -2.0, 1.0), (0.2, -0.4, 0.9), (2.5, 2.5, 2.5)
+    bed.location, bed.rotation_euler, bed.scale = (
+        (3.0, -2.0, 1.0),
+        (0.2, -0.4, 0.9),
+        (2.5, 2.5, 2.5),
+    )
     looked()
     bpy.ops.digiclay.add_hand()
     done("Add Hand")
     poses, palm = bridge.poses(bed)[1:], palms()[0]
-    assert_near(poses[:, :2] - np.array(palm.location)[:2] / bridge.SCALE, hands["RIGHT"][:, :2], 2e-6)
+    assert_near(
+        poses[:, :2] - np.array(palm.location)[:2] / bridge.SCALE, hands["RIGHT"][:, :2], 2e-6
+    )
     wanted = bridge.poses(bed) + np.array([0.01, 0.02, 0.003, 0.0, 0.0, 0.0, 0.0])
-    bridge.move_fingertips(bed, wanted, [bridge.finger_of(tip) for tip in fingertips_of(bed).values()])
+    bridge.move_fingertips(
+        bed, wanted, [bridge.finger_of(tip) for tip in fingertips_of(bed).values()]
+    )
     looked()
     assert_near(bridge.poses(bed), wanted, 2e-6)
 
@@ -154,7 +168,11 @@ def test_the_size_of_the_press_tool_is_that_of_the_first_fingertip_left_and_the_
     assert bed.digiclay.size == pytest.approx(10.0)
     bed.digiclay.size = 12.0
     (finger,) = properties.read_scene(bed).fingers
-    assert finger.fingertip.width == pytest.approx(6e-3) == bridge.finger_of(fingertips_of(bed)[2]).width
+    assert (
+        finger.fingertip.width
+        == pytest.approx(6e-3)
+        == bridge.finger_of(fingertips_of(bed)[2]).width
+    )
     assert bed.digiclay.blister.radius == pytest.approx(1.2 * radius)
     assert bed.digiclay.fingertip.width == pytest.approx(8.0)
 
@@ -368,16 +386,25 @@ def test_a_scene_of_several_fingers_opens_with_them_and_a_preset_of_it_has_the_f
     (bed,) = beds()
     assert sound(bed, 1, 2)
     scene, made = load(path), properties.read_scene(bed)
-    parts = [[(one.fingertip, one.contact, one.relaxation) for one in each.fingers] for each in (scene, made)]
+    parts = [
+        [(one.fingertip, one.contact, one.relaxation) for one in each.fingers]
+        for each in (scene, made)
+    ]
     assert parts[0] == parts[1]
     # 32 bits of a few tenths of a Blender unit.
     start = [[-8e-3, 0.0, 45e-3], [8e-3, 2e-3, 47e-3]]
     assert_near(bridge.poses(bed)[:, :3], start, 1e-7)
-    assert [bridge.finger_of(tip) for tip in fingertips_of(bed).values()] == [one for one, *_ in parts[0]]
+    assert [bridge.finger_of(tip) for tip in fingertips_of(bed).values()] == [
+        one for one, *_ in parts[0]
+    ]
     assert takes.read(bed).poses.shape[1:] == (2, 7)
-    bed.digiclay.layout.arrangement = "hexagonal"  # each finger's law has the share that goes with it
+    bed.digiclay.layout.arrangement = (
+        "hexagonal"  # each finger's law has the share that goes with it
+    )
     shares = [one.contact.share for one in properties.read_scene(bed).fingers]
-    assert shares == [resolve({"layout": {"arrangement": "hexagonal"}}).fingers[0].contact.share] * 2
+    assert (
+        shares == [resolve({"layout": {"arrangement": "hexagonal"}}).fingers[0].contact.share] * 2
+    )
     assert shares[0] != scene.fingers[0].contact.share
     bpy.ops.digiclay.preset_save(name="two")
     try:

@@ -53,7 +53,9 @@ def test_the_panels_are_about_the_bed_that_the_active_object_belongs_to(bed):
 def test_without_a_bed_there_is_only_the_panel_that_offers_one(active, bed):
     bpy.context.view_layer.objects.active = bpy.data.objects[active] if active else None
     shown = [
-        kind.bl_idname for kind in panels.CLASSES if hasattr(kind, "bl_category") and kind.poll(bpy.context)
+        kind.bl_idname
+        for kind in panels.CLASSES
+        if hasattr(kind, "bl_category") and kind.poll(bpy.context)
     ]
     assert shown == ["DIGICLAY_PT_start"]
 
@@ -66,7 +68,9 @@ def test_every_part_of_a_scene_has_a_panel():
 
 def test_the_tab_shows_what_a_sculptor_needs_and_keeps_what_a_researcher_needs_closed():
     drawn = [kind for kind in panels.CLASSES if issubclass(kind, bpy.types.Panel)]
-    drawn = [kind for kind in drawn if kind.bl_region_type != "HEADER"]  # opens from the header of the tool
+    drawn = [
+        kind for kind in drawn if kind.bl_region_type != "HEADER"
+    ]  # opens from the header of the tool
     places = {(kind.bl_space_type, kind.bl_region_type, kind.bl_category) for kind in drawn}
     assert places == {("VIEW_3D", "UI", CATEGORY)}
     orders = [(kind.bl_parent_id, kind.bl_order) for kind in drawn]
@@ -121,7 +125,11 @@ def operators():
 def settings():
     """Return the properties of the extension's groups as Blender looks them up."""
     kinds = (*CLASSES, Display)
-    pairs = [(kind.bl_rna.identifier, known.identifier) for kind in kinds for known in kind.bl_rna.properties]
+    pairs = [
+        (kind.bl_rna.identifier, known.identifier)
+        for kind in kinds
+        for known in kind.bl_rna.properties
+    ]
     return [f"bpy.types.{kind}.{name}" for kind, name in pairs if name not in ("rna_type", "name")]
 
 
@@ -144,11 +152,21 @@ def test_every_operator_and_setting_leads_to_a_section_that_exists():
     names = [*operators(), *settings()]
     assert (len(operators()) > 40, len(settings()) > 150) == (True, True)
     found = {name: look_up(name) for name in names}
-    first = {next(p for p, _ in manual_map.ENTRIES if fnmatchcase(name.lower(), p)) for name in names}
-    assert [pattern for pattern, _ in manual_map.ENTRIES if pattern not in first] == [], "without use"
-    assert {name: url for name, url in found.items() if url.removeprefix(address) not in anchors} == {}
+    first = {
+        next(p for p, _ in manual_map.ENTRIES if fnmatchcase(name.lower(), p)) for name in names
+    }
+    assert [pattern for pattern, _ in manual_map.ENTRIES if pattern not in first] == [], (
+        "without use"
+    )
+    assert {
+        name: url for name, url in found.items() if url.removeprefix(address) not in anchors
+    } == {}
     # The rest of Blender keeps its own manual.
-    for name in ("ops.mesh.primitive_cube_add", "types.Object.location", "types.DisplaySafeAreas.title"):
+    for name in (
+        "ops.mesh.primitive_cube_add",
+        "types.Object.location",
+        "types.DisplaySafeAreas.title",
+    ):
         assert not (look_up(f"bpy.{name}") or "").startswith("file:")
 
 
@@ -181,7 +199,10 @@ def test_the_entries_come_with_the_extension_and_go_with_it():
 @pytest.mark.parametrize(
     "page, address",
     [
-        (PureWindowsPath("D:/Eigene Dateien/Ton#1/g.html"), "file:///D:/Eigene%20Dateien/Ton%231/g.html"),
+        (
+            PureWindowsPath("D:/Eigene Dateien/Ton#1/g.html"),
+            "file:///D:/Eigene%20Dateien/Ton%231/g.html",
+        ),
         (PureWindowsPath("//server/share/guide.html"), "file://server/share/guide.html"),
         (PurePosixPath("/opt/é?/guide.html"), "file:///opt/%C3%A9%3F/guide.html"),
     ],
@@ -220,7 +241,10 @@ def test_methods_laws_sections_and_parameters_have_german_labels():
 def test_a_label_is_found_among_operators_and_elsewhere_and_a_brush_has_the_name_of_what_it_does():
     entries = translations.make_entries({"Take Back a Gesture", "Nobody has written this"}, "de")
     wanted = "Geste zurücknehmen"
-    assert entries == {("*", "Take Back a Gesture"): wanted, ("Operator", "Take Back a Gesture"): wanted}
+    assert entries == {
+        ("*", "Take Back a Gesture"): wanted,
+        ("Operator", "Take Back a Gesture"): wanted,
+    }
     entries = translations.make_entries({"Smooth"}, "de")
     assert (entries["*", "Smooth"], entries["Brush", "Smooth"]) == ("Glatt", "Glätten")
 

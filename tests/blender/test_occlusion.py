@@ -13,7 +13,8 @@ from mathutils import Vector
 
 from tests.blender.at_hand import beds, in_the_view, new_bed
 
-#: How much larger the bed is than it is added: it then fills a good part of the factory file's view.
+#: How much larger the bed is than it is added: it then fills a good part of the factory file's
+#: view.
 LARGER = 8.0
 #: Places of the bed, m, one under the object and one beside it.
 COVERED, BARE = np.array([[0.0, 0.0, 0.04]]), np.array([[0.03, 0.03, 0.04]])
@@ -87,7 +88,9 @@ def add_flat_things(context):
     bpy.ops.object.light_add(location=where)
     bpy.ops.mesh.primitive_cube_add(location=where)
     bpy.context.object.scale = (0.0, 1.0, 1.0)
-    context.scene.collection.objects.link(bpy.data.objects.new("Nothing", bpy.data.meshes.new("Nothing")))
+    context.scene.collection.objects.link(
+        bpy.data.objects.new("Nothing", bpy.data.meshes.new("Nothing"))
+    )
     return curve
 
 
@@ -177,7 +180,9 @@ def test_a_clipping_region_takes_away_what_is_outside_it(context):
     cover(context)
     (xy,) = bridge.project(context, beds()[0], BARE)
     x, y = int(xy[0]), int(xy[1])
-    bpy.ops.view3d.clip_border(xmin=x - 20, xmax=x + 20, ymin=y - 20, ymax=y + 20, wait_for_input=False)
+    bpy.ops.view3d.clip_border(
+        xmin=x - 20, xmax=x + 20, ymin=y - 20, ymax=y + 20, wait_for_input=False
+    )
     assert looking.use_clip_planes
     assert points_at(context, BARE)
     bpy.data.objects.remove(bpy.data.objects["Cube"])
@@ -195,7 +200,8 @@ def test_a_clipping_region_takes_away_what_is_outside_it(context):
 
 
 ON_TOP, BESIDE, CURSOR = "on top of it", "beside it", ""
-#: The factory file's cube, changed, or what is added in place of it; where and how high a bed stands then.
+#: The factory file's cube, changed, or what is added in place of it; where and how high a bed
+#: stands then.
 PLACES = {
     "the cube swallows it": ({}, ON_TOP, 1.0),
     "the cube is mirrored and scaled": ({"scale": (-1.0, 1.5, 1.2)}, ON_TOP, 1.2),
@@ -208,7 +214,11 @@ PLACES = {
     "the cube is a column": ({"scale": (0.4, 0.4, 9.0)}, BESIDE, 0.0),
     "a monkey": ({"add": bpy.ops.mesh.primitive_monkey_add, "size": 3.0}, ON_TOP, 1.477),
     "a text that lies flat": ({"add": bpy.ops.object.text_add, "radius": 3.0}, CURSOR, 0.0),
-    "another bed": ({"add": bpy.ops.mesh.digital_clay_add, "location": (0.1, 0.1, 0.0)}, BESIDE, 0.0),
+    "another bed": (
+        {"add": bpy.ops.mesh.digital_clay_add, "location": (0.1, 0.1, 0.0)},
+        BESIDE,
+        0.0,
+    ),
 }
 
 
@@ -235,7 +245,9 @@ def test_a_new_bed_stands_at_the_cursor_unless_what_is_there_hides_it(factory_vi
 def test_a_bed_with_a_location_is_put_there_and_a_sample_where_it_is_seen(factory_view):
     bpy.ops.mesh.digital_clay_add(location=(0.0, 0.2, 0.1))
     new = bpy.context.object
-    assert [*new.location.xy, new.location.z + view.underside(new)] == pytest.approx([0.0, 0.2, 0.1])
+    assert [*new.location.xy, new.location.z + view.underside(new)] == pytest.approx(
+        [0.0, 0.2, 0.1]
+    )
     bpy.data.objects.remove(new)
     bpy.ops.digiclay.add_sample(sample="session:tap", take=False)
     assert bpy.context.object.location.z > 1.0

@@ -23,7 +23,8 @@ from tests.blender.session.live import FLOAT32, Clock, exact, press, shown
 
 pytestmark = pytest.mark.usefixtures("extension")
 SAMPLES = Path(__file__).parents[1] / "samples" / "blend"
-#: A sum in another order, or another numpy, moves a pin by a few units of the last place of 40 mm; m.
+#: A sum in another order, or another numpy, moves a pin by a few units of the last place of 40 mm;
+#: m.
 ROUNDING = 1e-12
 HEIGHTS = dict(np.load(SAMPLES / "heights.npz"))
 
@@ -76,7 +77,10 @@ def test_an_older_bed_is_colored_by_force_under_the_former_names():
 def test_the_take_replays_to_the_stored_heights():
     found = bed("Session")
     first, second = takes.list_takes(found)
-    assert (first.name, second.name) == ("A press", "Take 2")  # the second was recorded when it was saved
+    assert (first.name, second.name) == (
+        "A press",
+        "Take 2",
+    )  # the second was recorded when it was saved
     take = takes.read(found, first.number)
     system = assemble(take.scene)
     np.testing.assert_array_equal(snapshot.load(system, take.start).row(0), HEIGHTS["take_start"])

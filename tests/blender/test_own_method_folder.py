@@ -79,7 +79,9 @@ def test_a_folder_beside_the_file_is_stored_as_a_full_path_or_refused(chosen, tm
     (tmp_path / "own").mkdir()
     write_method(tmp_path / "own")
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "a.blend"))
-    chosen.run_own_methods = True  # as older preferences do when Blender starts: not of whatever file is open
+    chosen.run_own_methods = (
+        True  # as older preferences do when Blender starts: not of whatever file is open
+    )
     assert (list_added(), own_folder.read_present().refused) == ({}, (line,))
     chosen.methods_folder = "//own"
     assert (chosen.methods_folder, chosen.run_own_methods) == (str(tmp_path / "own"), False)
@@ -122,7 +124,10 @@ def test_a_session_forms_with_it_and_one_mistake_pauses_the_session(chosen):
     tick.start(bpy.context, bed)
     (note,) = move(bed, Clock(), [(0.0, z) for z in (46.0, 45.0, 41.0, 38.0, 37.0, 37.0)])
     assert note.level == "ERROR"
-    assert "paused: faulty.py:Faulty: command must return height as finite numbers (got nan)" in note.message
+    assert (
+        "paused: faulty.py:Faulty: command must return height as finite numbers (got nan)"
+        in note.message
+    )
     assert running.find(bed).paused
     tick.stop(bed.session_uid)
 

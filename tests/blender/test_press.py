@@ -24,7 +24,8 @@ from digiclay.strokes.stroke import Brush
 from tests.assemble import assert_near
 from tests.blender.at_hand import in_the_view, new_bed
 
-#: How much larger the bed is than it is added: it then fills a good part of the factory file's view.
+#: How much larger the bed is than it is added: it then fills a good part of the factory file's
+#: view.
 LARGER = 8.0
 
 
@@ -83,8 +84,11 @@ def test_a_pixel_on_the_top_of_a_pin_points_at_that_pin(bed, context):
     met = [aim.find_target(context, tuple(xy)) for xy in pixels]
     assert all(found is not None and found.bed == bed for found in met)
     near = np.array([found.point for found in met])
-    # A pin may hide another; whatever is met lies in front of the top that was asked for, on the same ray.
-    eye = np.array(bed.matrix_world.inverted() @ context.region_data.view_matrix.inverted().translation)
+    # A pin may hide another; whatever is met lies in front of the top that was asked for, on the
+    # same ray.
+    eye = np.array(
+        bed.matrix_world.inverted() @ context.region_data.view_matrix.inverted().translation
+    )
     eye /= bridge.SCALE
     visible = np.array([found.pin for found in met]) == np.arange(cells.count)
     assert visible.sum() > 0.9 * cells.count
@@ -104,7 +108,9 @@ def test_a_place_in_the_view_agrees_with_blenders_own_projection(bed, context):
     # A thousandth of a pixel: theirs is reckoned in float32.
     assert_near(bridge.project(context, bed, place)[0], theirs, 1e-2)
     # What lies behind the eye is nowhere on the screen.
-    eye = np.array(bed.matrix_world.inverted() @ context.region_data.view_matrix.inverted().translation)
+    eye = np.array(
+        bed.matrix_world.inverted() @ context.region_data.view_matrix.inverted().translation
+    )
     assert np.isnan(bridge.project(context, bed, 1.5 * eye[None] / bridge.SCALE)).all()
 
 
@@ -139,19 +145,27 @@ def test_the_patch_lies_on_the_pins_about_the_mouse_as_wide_as_the_finger_presse
     finger = bridge.finger_of(fingertip_of(bed))
     # Pressed in by half its height of 8 mm, an ellipsoid is cut at sqrt(3)/2 of its width.
     across = np.ptp(rim, axis=0) / 2
-    np.testing.assert_allclose(across, np.sqrt(0.75) * np.array([finger.length, finger.width]), rtol=1e-6)
+    np.testing.assert_allclose(
+        across, np.sqrt(0.75) * np.array([finger.length, finger.width]), rtol=1e-6
+    )
     assert_near(rim.mean(axis=0), [0.002, 0.001], 1e-9)
 
 
 def test_the_text_beside_the_cursor_names_brush_and_height_or_depth_with_its_unit():
     finger = Fingertip()
     assert brush.describe_brush(finger, Brush.RAISE, 15e-3) == "Size 16 mm   Raise, height 15 mm"
-    assert brush.describe_brush(finger, Brush.LOWER, 4e-3, 0.5) == "Size 16 mm   Lower, depth 4 mm × 50 %"
+    assert (
+        brush.describe_brush(finger, Brush.LOWER, 4e-3, 0.5)
+        == "Size 16 mm   Lower, depth 4 mm × 50 %"
+    )
     assert brush.describe_brush(finger, Brush.LEVEL, 4e-3) == "Size 16 mm   Level 100 %"
     assert brush.describe_brush(finger, Brush.SMOOTH, 4e-3, 0.8) == "Size 16 mm   Smooth 80 %"
     assert brush.describe_brush(finger, Brush.UNLOCK, 4e-3) == "Size 16 mm   Unlock"
     assert brush.describe_brush(finger, Brush.STAMP, 4e-3) == "Size 16 mm   Stamp, height 4 mm"
-    assert [one for one in Brush if brush.amount_name(one) == "height"] == [Brush.RAISE, Brush.STAMP]
+    assert [one for one in Brush if brush.amount_name(one) == "height"] == [
+        Brush.RAISE,
+        Brush.STAMP,
+    ]
 
 
 @pytest.fixture
@@ -186,7 +200,9 @@ def test_the_ellipsoid_follows_the_size_and_the_blister_unless_it_is_set_by_itse
     assert lengths(paper) == wanted
     bpy.context.view_layer.update()
     finger, half = bridge.finger_of(fingertip_of(paper)), size * 0.5e-3
-    assert (finger.length, finger.width, finger.height) == pytest.approx((1.25 * half, half, half), rel=1e-6)
+    assert (finger.length, finger.width, finger.height) == pytest.approx(
+        (1.25 * half, half, half), rel=1e-6
+    )
     # The lowest point stays: a larger finger does not press.
     assert_near(bridge.pose(fingertip_of(paper)), before, 1e-7)
 
@@ -206,7 +222,15 @@ def test_the_panel_shows_whole_widths_and_stores_semi_axes(paper, name, usual):
 
 @pytest.mark.parametrize(
     "typed, share",
-    [("0.5", 0.5), (".25", 0.25), ("1", 1.0), ("50", 0.5), ("50 %", 0.5), ("0.5%", 5e-3), ("2*0.3", 0.6)],
+    [
+        ("0.5", 0.5),
+        (".25", 0.25),
+        ("1", 1.0),
+        ("50", 0.5),
+        ("50 %", 0.5),
+        ("0.5%", 5e-3),
+        ("2*0.3", 0.6),
+    ],
 )
 def test_a_strength_is_typed_as_a_share_or_in_per_cent(typed, share):
     assert AdjustStrength.parse(None, typed) == pytest.approx(share, rel=1e-9)
@@ -228,7 +252,9 @@ def test_a_size_stays_within_what_a_finger_can_have(paper, asked, got):
     assert lengths(paper)[0] == pytest.approx(got, rel=1e-6)
 
 
-def test_the_bracket_keys_scale_it_and_undo_brings_it_back_and_without_a_fingertip_they_do_nothing(paper):
+def test_the_bracket_keys_scale_it_and_undo_brings_it_back_and_without_a_fingertip_they_do_nothing(
+    paper,
+):
     bpy.ops.ed.undo_push(message="Add")
     bpy.ops.digiclay.press_scale("EXEC_DEFAULT", True, scalar=1.5)
     assert lengths(bpy.context.object)[0] == pytest.approx(24.0)
@@ -246,7 +272,9 @@ def test_each_preset_finger_can_be_simulated_and_is_undone_in_one_step(paper, ki
     bpy.ops.digiclay.press_finger("EXEC_DEFAULT", True, kind=kind)
     scene = properties.scene_of(bpy.context.object)
     assert find_kind(scene.fingers[0].fingertip) is FINGERS[kind]
-    assert scene.blister.radius == pytest.approx(min(37.5e-3, 15 / 8 * FINGERS[kind].finger.width), rel=1e-5)
+    assert scene.blister.radius == pytest.approx(
+        min(37.5e-3, 15 / 8 * FINGERS[kind].finger.width), rel=1e-5
+    )
     assemble(scene)
     bpy.ops.ed.undo()
     assert lengths(bpy.context.object)[0] == pytest.approx(30.0)
@@ -276,10 +304,17 @@ def apply(name):
 def test_each_preset_sets_a_known_finger_and_every_setting(settings, file):
     shown = settings.bl_rna.properties
     wanted = {name: shown[name].default for name in brush.list_settings(settings)}
-    lines = [line.split(" = ") for line in file.read_text().splitlines() if line.startswith("settings.")]
+    lines = [
+        line.split(" = ") for line in file.read_text().splitlines() if line.startswith("settings.")
+    ]
     wanted |= {name.removeprefix("settings."): ast.literal_eval(value) for name, value in lines}
     settings.brush, settings.depth, settings.height, settings.strength = "LEVEL", 9.0, 9.0, 0.5
-    settings.symmetry, settings.path, settings.stabilizer, settings.pressure_curve = "XY", "LINE", 9.0, "SOFT"
+    settings.symmetry, settings.path, settings.stabilizer, settings.pressure_curve = (
+        "XY",
+        "LINE",
+        9.0,
+        "SOFT",
+    )
     settings.use_pressure = settings.use_tilt = False
     assert str(SHIPPED) in bpy.utils.preset_paths(brush.SUBFOLDER)
     bpy.context.object.digiclay.size = 40.0
@@ -302,7 +337,9 @@ def test_a_saved_preset_brings_back_what_was_set_and_is_removed(settings, tmp_pa
     bpy.context.object.digiclay.size = 11.0
     bpy.ops.digiclay.press_brush_save(name="Of my own")
     (saved,) = [
-        file for path in bpy.utils.preset_paths(brush.SUBFOLDER) for file in Path(path).glob("Of_my_own.py")
+        file
+        for path in bpy.utils.preset_paths(brush.SUBFOLDER)
+        for file in Path(path).glob("Of_my_own.py")
     ]
     assert saved.is_relative_to(tmp_path)
     settings.depth, settings.symmetry, settings.path = 2.0, "NONE", "FREE"

@@ -94,7 +94,9 @@ def test_values_blender_cannot_keep_come_back_bit_for_bit():
 
 
 @pytest.mark.parametrize("section", OPTIONAL)
-def test_a_part_that_is_switched_off_is_left_out_and_each_method_keeps_parameters_of_its_own(section):
+def test_a_part_that_is_switched_off_is_left_out_and_each_method_keeps_parameters_of_its_own(
+    section,
+):
     bed = thing()
     assert properties.scene_of(bed) == resolve({}, bed.name)
     setattr(bed.digiclay, f"use_{section}", False)
@@ -130,7 +132,10 @@ def test_a_choice_gives_the_scene_of_a_file(section, name, before, value, table)
     "typed, rule",
     [
         *((typed, "be numbers separated by commas") for typed in ("", "4; 70", "4, , 70", "four")),
-        *((typed, "be (a finite number|at least)") for typed in ("nan, 70", "4, inf, 5", "-4, 70", "0, 70")),
+        *(
+            (typed, "be (a finite number|at least)")
+            for typed in ("nan, 70", "4, inf, 5", "-4, 70", "0, 70")
+        ),
     ],
 )
 def test_a_list_without_sense_is_refused(typed, rule):

@@ -50,7 +50,8 @@ def test_a_still_has_the_size_asked_for_and_its_pins_the_color_of_their_mode(mod
     assert out.read_bytes().startswith(b"\x89PNG")
     pixels = read_picture(out)
     assert pixels.shape == (HEIGHT, WIDTH, 3)
-    # The pins stand in the middle of what the legend leaves free; 8 x 8 of them cover far more than this.
+    # The pins stand in the middle of what the legend leaves free; 8 x 8 of them cover far more than
+    # this.
     pins = pixels[:, int(stage.MARGINS[0] * WIDTH) :]
     other = Mode.FROZEN if mode is Mode.HOLD else Mode.HOLD
     assert of_the_hue(pins, COLORS[mode]) > 500
@@ -76,7 +77,9 @@ def test_a_still_leaves_the_users_file_as_it_was_and_a_failed_one_no_file(tmp_pa
     still.render_still(formed, tmp_path / "pins.png", Still(width=40, height=25, samples=1))
     (tmp_path / "taken" / "pins.png").mkdir(parents=True)
     with pytest.raises(OutputError, match=r"pins\.png cannot be written"):
-        still.render_still(formed, tmp_path / "taken/pins.png", Still(width=40, height=25, samples=1))
+        still.render_still(
+            formed, tmp_path / "taken/pins.png", Still(width=40, height=25, samples=1)
+        )
     assert inventory() == before
     assert (bpy.context.scene, bpy.context.view_layer.objects.active) == (scene, active)
     assert [path.name for path in (tmp_path / "taken").iterdir()] == ["pins.png"]
@@ -103,7 +106,8 @@ def test_every_bed_is_inside_the_frame_and_at_its_margins(rows, columns, arrange
             1 - above - placed[:, 1].max(),
         ]
     )
-    # Camera matrices are float32. One direction fills its share of the frame, the other is centered.
+    # Camera matrices are float32. One direction fills its share of the frame, the other is
+    # centered.
     assert gaps.min() == pytest.approx(0.0, abs=1e-4)
     assert gaps.min() > -1e-4
 
@@ -136,7 +140,9 @@ def session(plane):
 
 def test_several_fingertips_have_a_line_each_in_their_colors_up_to_the_instant():
     plane, time = front(960, 600), np.linspace(0.0, 10.0, 51)
-    plot = draw_force_plot(plane, time, np.column_stack([0.4 + 0.0 * time, 0.1 + 0.02 * time]), 0.4, "forces")
+    plot = draw_force_plot(
+        plane, time, np.column_stack([0.4 + 0.0 * time, 0.1 + 0.02 * time]), 0.4, "forces"
+    )
     plot.show(5.0, np.array([0.4, 0.2]))
     assert "forces 0.20 to 0.40 N" in texts(plane)
     one, two = (np.array([at.co for at in part.data.vertices])[1::2, 1] for part in plot.been)
@@ -150,7 +156,9 @@ def test_several_fingertips_have_a_line_each_in_their_colors_up_to_the_instant()
 def extent(plane, part):
     """Return left, right, lower and upper edge of something on the plane, pixels from the middle."""
     plane.scene.view_layers[0].update()
-    corners = np.array(part.bound_box)[:, :2] * np.array(part.scale)[:2] + np.array(part.location)[:2]
+    corners = (
+        np.array(part.bound_box)[:, :2] * np.array(part.scale)[:2] + np.array(part.location)[:2]
+    )
     # What hangs on a layer behind is farther away by a thousandth: a part of a pixel.
     low, high = corners.min(axis=0) / plane.pixel, corners.max(axis=0) / plane.pixel
     return float(low[0]), float(high[0]), float(low[1]), float(high[1])
@@ -168,7 +176,9 @@ def test_letters_have_a_size_that_can_be_read_and_modes_are_explained_where_it_c
 
 
 @pytest.mark.parametrize("size", [*SIZES, (200, 320), (64, 40), (1000, 200)])
-@pytest.mark.parametrize("legend", [lambda plane: write_mode_legend(plane, list(Mode)), write_force_legend])
+@pytest.mark.parametrize(
+    "legend", [lambda plane: write_mode_legend(plane, list(Mode)), write_force_legend]
+)
 def test_nothing_that_is_written_covers_anything_else(size, legend):
     plane = front(*size)
     legend(plane)

@@ -39,7 +39,9 @@ def still(bed):
     """Return a bake of two frames in which nothing moves."""
     cells = bridge.read_cells(bed.data)
     twice = {name: np.array([cells[name]] * 2) for name in ("height", "mode", "force")}
-    return bake.BakedFrames(cells["position"], **twice, pose=np.array([bridge.pose(fingertip_of(bed))] * 2))
+    return bake.BakedFrames(
+        cells["position"], **twice, pose=np.array([bridge.pose(fingertip_of(bed))] * 2)
+    )
 
 
 def reset_to_empty():
@@ -104,7 +106,9 @@ def test_a_bed_is_deleted_with_its_fingertip_and_undo_brings_both_back(everythin
 
 
 @pytest.mark.parametrize("what", ["cube", "bed", "cube, with a hand"])
-def test_a_bed_joined_into_another_object_takes_its_fingertips_along_and_undo_brings_them_back(what):
+def test_a_bed_joined_into_another_object_takes_its_fingertips_along_and_undo_brings_them_back(
+    what,
+):
     if what == "bed":
         into = added(1.0)
     else:
@@ -133,7 +137,10 @@ def test_a_bed_joined_into_another_object_takes_its_fingertips_along_and_undo_br
 def test_a_click_on_the_ball_takes_hold_of_its_fingertip_alone():
     bed, other = added(), added(1.0)
     tip = fingertip_of(bed)
-    tip[BALL].hide_select, tip[BALL].lock_location = True, (False, False, False)  # as in older files
+    tip[BALL].hide_select, tip[BALL].lock_location = (
+        True,
+        (False, False, False),
+    )  # as in older files
     done("Older")
     assert (tip[BALL].hide_select, all(tip[BALL].lock_location)) == (False, True)
     select(tip[BALL])
@@ -176,7 +183,9 @@ def test_a_copy_of_a_bed_has_a_fingertip_of_its_own(linked, along):
 def test_what_is_done_right_after_undo_is_not_undone_with_it():
     duplicate(added())
     bpy.ops.ed.undo()  # to the copy as Blender made it, without a fingertip
-    bpy.ops.transform.translate("EXEC_DEFAULT", True, value=(1.0, 0.0, 0.0))  # listed, with an undo step
+    bpy.ops.transform.translate(
+        "EXEC_DEFAULT", True, value=(1.0, 0.0, 0.0)
+    )  # listed, with an undo step
     looked()
     assert (sorted(bed.location.x for bed in beds()), whole(*beds())) == ([0.0, 1.0], True)
     undone()
@@ -234,7 +243,9 @@ def test_a_bed_deleted_in_mid_session_ends_it_and_a_copy_goes_on_from_its_state(
 
 def test_what_the_user_has_hung_on_the_fingertip_stays_where_it_is():
     bed = added()
-    bed.location.z = 0.0  # what hangs on something that is deleted goes to the origin: that is Blender's way
+    bed.location.z = (
+        0.0  # what hangs on something that is deleted goes to the origin: that is Blender's way
+    )
     camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
     bpy.context.collection.objects.link(camera)
     camera.parent, camera.location = fingertip_of(bed), (0.0, 0.0, 0.3)
@@ -264,7 +275,11 @@ def test_a_bed_is_hidden_and_shown_with_its_fingertip(name):
 
     steps = [(bed, True, [True] * 3), (bed, False, [False] * 3)] * 2
     # What was hidden for itself is not shown along.
-    steps += [(tip, True, [False, True, True]), (bed, True, [True] * 3), (bed, False, [False, True, True])]
+    steps += [
+        (tip, True, [False, True, True]),
+        (bed, True, [True] * 3),
+        (bed, False, [False, True, True]),
+    ]
     for thing, on, wanted in [*steps, (tip, False, [False] * 3), (bed, True, [True] * 3)]:
         assert hide(thing, on) == wanted
     undone()
@@ -277,7 +292,9 @@ def test_a_bed_whose_settings_do_not_go_together_is_exported_as_it_is_drawn_and_
     with pytest.raises(ParameterError, match="Pitch must be"):
         properties.read_scene(bed)
     assert bpy.ops.digiclay.find_features() == {"FINISHED"}
-    np.testing.assert_array_equal(formed_bed.read_formed(bed).height, bridge.read_cells(bed.data)["height"])
+    np.testing.assert_array_equal(
+        formed_bed.read_formed(bed).height, bridge.read_cells(bed.data)["height"]
+    )
     copy = duplicate(bed)
     assert whole(bed, copy)
     # Not by an operator: what the outliner and scripts do is looked after as well.

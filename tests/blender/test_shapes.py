@@ -169,7 +169,11 @@ def test_without_an_object_over_the_bed_the_button_says_what_to_do():
     [
         ([], [], "must hold a surface made of faces"),
         ([(0, 0, 0), (1, 0, 0), (0, 1, 0)], [], "must hold a surface made of faces"),
-        ([(0, 0, 0), (1, float("nan"), 0), (0, 1, 0)], [(0, 1, 2)], "vertices that are finite numbers"),
+        (
+            [(0, 0, 0), (1, float("nan"), 0), (0, 1, 0)],
+            [(0, 1, 2)],
+            "vertices that are finite numbers",
+        ),
         ([(0, 0, 0), (1, 0, 0), (1, 0, 1)], [(0, 1, 2)], "must be wider than a line"),
     ],
 )
@@ -191,7 +195,9 @@ def image(path, values, kind, depth):
     rows, columns = values.shape
     made = bpy.data.images.new("x", columns, rows, float_buffer=depth != "8")
     made.colorspace_settings.is_data = True
-    made.pixels.foreach_set(np.dstack([values] * 3 + [np.ones_like(values)]).astype(np.float32).ravel())
+    made.pixels.foreach_set(
+        np.dstack([values] * 3 + [np.ones_like(values)]).astype(np.float32).ravel()
+    )
     settings = bpy.context.scene.render.image_settings
     settings.file_format, settings.color_depth = kind, depth
     if kind == "PNG" and depth == "16":

@@ -59,7 +59,9 @@ def drawn(bed):
 def drawn_tints(bed):
     """Return the role of the material of every face of the skin that is drawn, and its middle in plan, m."""
     named = (item.object.data for item in instances(bed))
-    mesh = next(one for one in named if any(each and each.get(ROLE) == "skin" for each in one.materials))
+    mesh = next(
+        one for one in named if any(each and each.get(ROLE) == "skin" for each in one.materials)
+    )
     middles = np.array([face.center[:2] for face in mesh.polygons]) / bridge.SCALE
     return [mesh.materials[face.material_index][ROLE] for face in mesh.polygons], middles
 
@@ -119,7 +121,9 @@ def test_the_tint_is_by_the_nearest_pin_of_the_nearest_row_and_can_be_off(bed):
     bridge.write_cells(bed.data, cells["position"], cells["height"], mode=modes)
     display.form = "skin"
     worn, middles = drawn_tints(bed)
-    ours = [("skin" if Mode(mode) in PLAIN else f"skin_{Mode(mode).name.lower()}") for mode in modes]
+    ours = [
+        ("skin" if Mode(mode) in PLAIN else f"skin_{Mode(mode).name.lower()}") for mode in modes
+    ]
     assert set(worn) == set(ours)
     across, along = np.moveaxis(np.abs(middles[:, None] - cells["position"][:, :2]), -1, 0)
     for face, role in enumerate(worn):
@@ -186,7 +190,8 @@ def test_the_key_changes_what_is_seen_and_comes_back_to_what_was_chosen(bed, cho
         seen.append(view.is_skin_shown(bed))
     assert seen == [seen[0], not seen[0]] * 2 + [seen[0]]
     assert bed.digiclay_display.form == chosen
-    # Where the view has come to show the same by the form that was chosen, the key goes on to the other.
+    # Where the view has come to show the same by the form that was chosen, the key goes on to the
+    # other.
     bpy.ops.digiclay.skin_toggle()
     bed.scale /= scale
     bpy.context.view_layer.update()
@@ -247,7 +252,9 @@ def test_a_bake_plays_with_the_skin(bed):
     for frame in (1, 5):
         bpy.context.scene.frame_set(frame)
         assert_skin(bed, expected(bed, "smooth", baked_heights(bed)))
-        depths.append(drawn(bed)[0][:, 2].max() - expected(bed, "smooth", baked_heights(bed))[:, 2].min())
+        depths.append(
+            drawn(bed)[0][:, 2].max() - expected(bed, "smooth", baked_heights(bed))[:, 2].min()
+        )
     assert depths[1] > depths[0] + 1e-4
 
 

@@ -103,7 +103,8 @@ def test_a_replay_in_another_state_ends_bit_for_bit_as_the_take_did(clay):
 
 
 @pytest.mark.parametrize(
-    "layout", [{"pitch": 4.0}, {"rows": 9, "columns": 16}, {"arrangement": "staggered"}, {"rows": 11}]
+    "layout",
+    [{"pitch": 4.0}, {"rows": 9, "columns": 16}, {"arrangement": "staggered"}, {"rows": 11}],
 )
 def test_a_take_of_another_layout_is_refused_though_it_may_have_as_many_pins(clay, layout):
     number = record(clay)
@@ -111,7 +112,10 @@ def test_a_take_of_another_layout_is_refused_though_it_may_have_as_many_pins(cla
         setattr(clay.digiclay.layout, name, value)
     assert bpy.ops.digiclay.rebuild() == {"FINISHED"}
     places = bridge.read_cells(clay.data)["position"].tolist()
-    for use in (bpy.ops.digiclay.take_replay, functools.partial(bpy.ops.digiclay.bake, source="TAKE")):
+    for use in (
+        bpy.ops.digiclay.take_replay,
+        functools.partial(bpy.ops.digiclay.bake, source="TAKE"),
+    ):
         with pytest.raises(RuntimeError, match="must have the layout of the bed"):
             use(take=number)
     assert not bake.is_baked(clay)
@@ -315,7 +319,9 @@ def same_action(bed):
     return other
 
 
-@pytest.mark.parametrize("made", [same_action, lambda bed: bed.copy()], ids=["an action", "its curves"])
+@pytest.mark.parametrize(
+    "made", [same_action, lambda bed: bed.copy()], ids=["an action", "its curves"]
+)
 @pytest.mark.parametrize("freed", [0, 1])
 def test_freeing_one_of_two_bakes_that_share_leaves_the_other(bed, made, freed):
     take, heights = taken()
@@ -335,7 +341,9 @@ def test_a_bake_is_keyframed_in_the_beds_own_curves_where_it_shares_them(bed):
     other = bed.copy()
     bpy.context.collection.objects.link(other)
     baked(bed, taken()[0])
-    paths = [[curve.data_path for group in bake.curves(one) for curve in group] for one in (other, bed)]
+    paths = [
+        [curve.data_path for group in bake.curves(one) for curve in group] for one in (other, bed)
+    ]
     assert [len(one) for one in paths] == [3, 4]
 
 
@@ -381,4 +389,18 @@ def test_a_scene_whose_time_is_stretched_is_not_baked(bed, monkeypatch):
 
 def test_each_frame_shows_the_nearest_period():
     take, _ = taken()
-    assert bake.frame_periods(take, 24.0).tolist() == [0, 8, 17, 25, 33, 42, 50, 58, 67, 75, 83, 92, 100]
+    assert bake.frame_periods(take, 24.0).tolist() == [
+        0,
+        8,
+        17,
+        25,
+        33,
+        42,
+        50,
+        58,
+        67,
+        75,
+        83,
+        92,
+        100,
+    ]

@@ -44,35 +44,45 @@ def test_the_finger_presses_while_ticks_are_timed(monkeypatch):
         return session
 
     monkeypatch.setattr(sculpting, "advance", watched)
-    monkeypatch.setattr(live_session, "SHARE", 0.0)  # a machine too slow for more than one period a tick
+    monkeypatch.setattr(
+        live_session, "SHARE", 0.0
+    )  # a machine too slow for more than one period a tick
     draw_circles(*BED, ticks=6)
     assert live_session.SHARE == 0.0
     assert min(lowest[-6:]) < 40e-3 - DEPTH / 2
     assert periods[-1] > periods[-7]
 
 
-@pytest.mark.usefixtures("extension")  # as where a user has enabled it: everything is registered already
+@pytest.mark.usefixtures(
+    "extension"
+)  # as where a user has enabled it: everything is registered already
 def test_a_session_does_not_gather_memory_as_it_goes_on():
-    # What fits into the rings of trace and gestures is kept, and filled arrays of known widths: up to
-    # 77 kB in ten runs. A leak of a state a tick were 25 times 13 kB.
+    # What fits into the rings of trace and gestures is kept, and filled arrays of known widths: up
+    # to 77 kB in ten runs. A leak of a state a tick were 25 times 13 kB.
     assert measure_bed(12, 12, 25)["growth_bytes"] < 200e3
     assert hasattr(bpy.types.Object, "digiclay")
 
 
-def test_the_commands_print_tables_write_figures_and_draw_the_histogram(monkeypatch, capsys, tmp_path):
+def test_the_commands_print_tables_write_figures_and_draw_the_histogram(
+    monkeypatch, capsys, tmp_path
+):
     pytest.importorskip("matplotlib", reason="the histogram needs it; `make test` has it")
     monkeypatch.setattr(tick_times, "BEDS", (Bed(*BED, 8e-3), Bed(20, 21, 1.5e-3, 1e-3, 16e-3)))
     monkeypatch.setattr(tick_times, "VIEWPORT", ((12, 12, 5e-3), (12, 14, 5e-3)))
     for name, count in (("WARM_UP", 5), ("QUICK", 5), ("FEW", 2)):
         monkeypatch.setattr(tick_times, name, count)
-    monkeypatch.setattr(tick_times, "keep_to_one_core", lambda: None)  # other tests go on in this process
+    monkeypatch.setattr(
+        tick_times, "keep_to_one_core", lambda: None
+    )  # other tests go on in this process
     for kind in ("ticks", "viewport"):
         assert main([kind, "--quick", "--quiet", "--out", str(tmp_path)]) == 0
     told = capsys.readouterr().out
     assert "11 x 11 at 3 mm, 5 ticks" in told
     assert "20 x 21 at 1.5 mm, 5 ticks" in told
     assert [line.split()[0] for line in told.splitlines()[-2:]] == ["144", "168"]
-    texts = ((tmp_path / f"{kind}.csv").read_text(encoding="utf-8") for kind in ("ticks", "viewport"))
+    texts = (
+        (tmp_path / f"{kind}.csv").read_text(encoding="utf-8") for kind in ("ticks", "viewport")
+    )
     ticks, viewport = (list(csv.DictReader(text.splitlines())) for text in texts)
     assert [row["pins"] for row in viewport] == ["144", "168"]
     assert len(ticks) == 2 * (3 + len(PARTS))
@@ -82,7 +92,9 @@ def test_the_commands_print_tables_write_figures_and_draw_the_histogram(monkeypa
     assert (tmp_path / "ticks.png").stat().st_size > 10_000
 
 
-@pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="the system keeps no thread to a core")
+@pytest.mark.skipif(
+    not hasattr(os, "sched_setaffinity"), reason="the system keeps no thread to a core"
+)
 def test_threads_that_were_started_before_are_kept_to_the_core_too():
     script = (
         "import os, threading\n"
@@ -95,5 +107,7 @@ def test_threads_that_were_started_before_are_kept_to_the_core_too():
         "over.set()\n"
     )
     command = [sys.executable, "-c", script]
-    told = subprocess.run(command, capture_output=True, text=True, timeout=TIMEOUT, check=True, cwd=ROOT)
+    told = subprocess.run(
+        command, capture_output=True, text=True, timeout=TIMEOUT, check=True, cwd=ROOT
+    )
     assert told.stdout.splitlines()[-1].split() == ["1", "1"]  # Blender may log before

@@ -50,14 +50,20 @@ def bed(formed):
 
 
 def test_the_pins_stand_where_the_arrays_say_in_the_material_of_their_mode(bed, formed):
-    later = replace(formed, height=formed.height[::-1], mode=formed.mode[::-1], force=formed.force[::-1])
+    later = replace(
+        formed, height=formed.height[::-1], mode=formed.mode[::-1], force=formed.force[::-1]
+    )
     for instant in (formed, later):
         view.show(bed, instant)
         tops, materials = drawn_pins(bed)
         wanted = np.column_stack([instant.position, instant.height])
         assert_near(tops, wanted, FLOAT32)
-        assert not view.wants_force(bed)  # an instant's forces are there though nothing drawn tells them
-        assert np.array_equal(bridge.read_cells(bed.data)["force"], instant.force.astype(np.float32))
+        assert not view.wants_force(
+            bed
+        )  # an instant's forces are there though nothing drawn tells them
+        assert np.array_equal(
+            bridge.read_cells(bed.data)["force"], instant.force.astype(np.float32)
+        )
         assert materials == [Mode(int(code)).name.lower() for code in instant.mode]
 
 
@@ -100,7 +106,9 @@ def test_every_rod_reaches_down_to_the_deck_of_the_housing(bed, formed):
     ]
     assert len(feet) == 48
     housing = bed.evaluated_get(bpy.context.evaluated_depsgraph_get())
-    deck = housing.data.vertices[-1].co.z  # the housing is drawn from its underside to the deck inside
+    deck = housing.data.vertices[
+        -1
+    ].co.z  # the housing is drawn from its underside to the deck inside
     # float32 on lengths below one unit.
     assert_near(feet, deck, 1e-6)
     assert deck / bridge.SCALE < formed.height.min()
@@ -110,7 +118,11 @@ def test_the_pose_of_a_fingertip_is_read_back_however_things_are_scaled(bed, for
     fingertip = fingertip_of(bed)
     turn = np.array([0.8, 0.3, -0.4, 0.33])
     at = np.array([0.004, -0.002, 0.055, *(turn / np.linalg.norm(turn))])
-    bed.location, bed.rotation_euler, bed.scale = (3.0, -2.0, 1.0), (0.2, -0.4, 0.9), (2.5, 2.5, 2.5)
+    bed.location, bed.rotation_euler, bed.scale = (
+        (3.0, -2.0, 1.0),
+        (0.2, -0.4, 0.9),
+        (2.5, 2.5, 2.5),
+    )
     for pose, finger in ((formed.fingertip, formed.finger), (at, Fingertip(length=0.012))):
         bridge.place_fingertips(bed, pose[None], [finger])
         bpy.context.view_layer.update()
@@ -277,7 +289,9 @@ def test_heat_map_or_arrows_turned_on_show_the_forces_of_now_or_those_the_sessio
     np.testing.assert_allclose(forces(clay), felt, rtol=2.0**-23)
 
 
-def test_the_overlay_and_its_timer_are_there_only_while_wanted_and_go_with_the_extension(clay, session):
+def test_the_overlay_and_its_timer_are_there_only_while_wanted_and_go_with_the_extension(
+    clay, session
+):
     def is_there():
         assert bpy.app.timers.is_registered(views._again) is views.shown()
         return views.shown()
@@ -307,7 +321,9 @@ def test_the_overlay_tells_what_the_session_is(clay, session):
     assert np.count_nonzero(told.modes) > 1
     total = session.state.row(session.system.rows.force).sum()
     assert told.force[-1] == pytest.approx(total, rel=1e-12)
-    stopped = views.read_session(clay, replace(session, paused=True), palettes.PALETTES["okabe_ito"])
+    stopped = views.read_session(
+        clay, replace(session, paused=True), palettes.PALETTES["okabe_ito"]
+    )
     assert stopped.paused
     assert told.colors[Mode.HOLD] == palettes.PALETTES["okabe_ito"][Mode.HOLD]
 
@@ -332,7 +348,12 @@ def test_picked_pins_are_kept_with_the_bed_in_the_order_they_were_picked(clay):
 
 @pytest.mark.parametrize(
     "pins, said",
-    [((1, 1), "6 different pins"), (range(7), "6 different pins"), ((400,), "0 to 399"), ((-1,), "0 to 399")],
+    [
+        ((1, 1), "6 different pins"),
+        (range(7), "6 different pins"),
+        ((400,), "0 to 399"),
+        ((-1,), "0 to 399"),
+    ],
 )
 def test_pins_that_cannot_be_picked_are_refused(clay, pins, said):
     assert view.picked_pins(clay) == ()
@@ -366,7 +387,10 @@ def test_nothing_of_a_bed_is_seen_behind_the_overlay(corner, parallel):
     size, room = np.array([1050.0, 700.0]), (50.0, 0.0, 780.0, 650.0)
     box = find_covered(room, 2.0, corner)
     assert (box[0] == 50.0, box[2] == 780.0) == (corner.endswith("left"), corner.endswith("right"))
-    assert (box[1] == 0.0, box[3] == 650.0) == (corner.startswith("bottom"), corner.startswith("top"))
+    assert (box[1] == 0.0, box[3] == 650.0) == (
+        corner.startswith("bottom"),
+        corner.startswith("top"),
+    )
     free, taken = (2.0 * np.reshape(part, (2, 2)) / size - 1.0 for part in (room, box))
     points = np.random.default_rng(4).uniform(-1.0, 1.0, (2000, 3)) * [0.8, 0.7, 0.2]
     corners = np.stack(np.meshgrid([-0.8, 0.8], [-0.7, 0.7], [-0.2, 0.2]), axis=-1).reshape(-1, 3)

@@ -30,7 +30,9 @@ def test_every_broken_invariant_is_seen(height, force, message):
     "error, estimate, silent",
     [(2.0, 0.2, True), (2.0, 1.1, False), (2.0, math.nan, True), (1e-5, math.nan, False)],
 )
-def test_a_run_is_silent_when_it_is_wrong_and_its_estimate_does_not_show_it(error, estimate, *, silent):
+def test_a_run_is_silent_when_it_is_wrong_and_its_estimate_does_not_show_it(
+    error, estimate, *, silent
+):
     assert stiff.Outcome(error * stiff.WRONG, estimate * stiff.WRONG).silent is silent
 
 

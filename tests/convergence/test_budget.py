@@ -56,7 +56,8 @@ def test_no_height_is_further_from_the_full_model_than_the_budget(name):
 
 
 def test_the_error_told_is_the_one_against_a_tenfold_finer_integration_within_its_estimate():
-    # A press that no switch cuts short: here a finer step changes no mode, so the two can be compared.
+    # A press that no switch cuts short: here a finer step changes no mode, so the two can be
+    # compared.
     one = found("elastic_press", 50e-6)
     full = cut("elastic_press")
     fine = replace(full.simulation, physics_step=full.simulation.physics_step / 10)

@@ -51,14 +51,18 @@ CASES = [
 def judged(name, stepper, step):
     """Return the estimated errors of a run, and the true ones.
 
-    The true ones are those against Richardson's form at a tenth of the step, a quarter of those of 1 ms. That
-    is a fifth, or half, of the step of the judge itself. Its error is some 1e-11 m, where the best of the
-    cases has 4e-11 m.
+    The true ones are those against Richardson's form at a tenth of the step, a quarter of those of
+    1 ms. That is a fifth, or half, of the step of the judge itself. Its error is some 1e-11 m,
+    where the best of the cases has 4e-11 m.
     """
     scene = beginning(name, LASTS, stepper, step)
     history = run(scene).history
-    finer = replace(scene.simulation, stepper="richardson", physics_step=1e-3 if step > 1e-3 else 5e-4)
-    estimate, true = (estimate_errors(one, history) for one in (scene, replace(scene, simulation=finer)))
+    finer = replace(
+        scene.simulation, stepper="richardson", physics_step=1e-3 if step > 1e-3 else 5e-4
+    )
+    estimate, true = (
+        estimate_errors(one, history) for one in (scene, replace(scene, simulation=finer))
+    )
     # `estimate_errors` makes an estimate of the difference; here the difference is wanted.
     return estimate, Errors(true.height / SHARE, true.force / SHARE, true.total_force / SHARE)
 
@@ -88,7 +92,9 @@ def test_the_true_error_is_at_most_twice_the_estimate_and_that_no_more_than_twen
     ],
 )
 def test_a_reference_has_shorter_steps(stepper, period, step, by, finer):
-    judge = reference_settings(Simulation(control_period=period, physics_step=step, stepper=stepper))
+    judge = reference_settings(
+        Simulation(control_period=period, physics_step=step, stepper=stepper)
+    )
     assert (judge.stepper, judge.physics_step) == (by, pytest.approx(finer))
 
 
@@ -104,7 +110,10 @@ def test_no_estimate_is_made_of_a_thinned_run_or_once_it_is_stopped_and_a_summar
 #: Scenes of each stepper, and how long they last, s: a press and a drag or two.
 MANY, DRAWN = 100, 0.1
 #: A conduit that is not turbulent, and one that is, in a share of the scenes.
-TURBULENT = {"valve": {"orifice_diameter": 0.8e-3}, "fluid": {"density": 760.0, "viscosity": 0.65e-6}}
+TURBULENT = {
+    "valve": {"orifice_diameter": 0.8e-3},
+    "fluid": {"density": 760.0, "viscosity": 0.65e-6},
+}
 
 
 def draw_path(random):
@@ -141,7 +150,12 @@ def draw_scene(random, stepper):
             "finger": fingers,
             "recorder": {},
             "control": {"method": str(random.choice(FORMING))},
-            "simulation": {"physics_step": step, "duration": DRAWN, "stepper": stepper, **tolerance},
+            "simulation": {
+                "physics_step": step,
+                "duration": DRAWN,
+                "stepper": stepper,
+                **tolerance,
+            },
             **(TURBULENT if random.random() < 0.1 else {}),
         }
     )
@@ -164,13 +178,18 @@ def test_an_estimate_covers_the_truth_in_95_of_100_scenes(stepper):
             continue
         # Its reference has a quarter of the step: 0.125 ms, or 0.5 ms where errors are much larger.
         exact = replace(
-            scene.simulation, stepper="richardson", physics_step=0.5e-3 if stepper in FINER else 2e-3
+            scene.simulation,
+            stepper="richardson",
+            physics_step=0.5e-3 if stepper in FINER else 2e-3,
         )
-        found, true = (estimate_errors(one, history) for one in (scene, replace(scene, simulation=exact)))
+        found, true = (
+            estimate_errors(one, history) for one in (scene, replace(scene, simulation=exact))
+        )
         truth = (error / SHARE for error in true)
         missed += list_uncovered(number, found, truth, NOTHING)
     assert len({number for number, *_ in missed}) <= 0.05 * (MANY - refused), missed
-    # An explicit method that has left its region of stability says so, and has no result to be judged.
+    # An explicit method that has left its region of stability says so, and has no result to be
+    # judged.
     assert refused <= (0.1 * MANY if stepper in EXPLICIT else 0)
 
 
@@ -226,7 +245,8 @@ def test_an_estimate_covers_the_errors_that_scipy_finds(stepper):
     assert missed == []
 
 
-#: Heights of the fingertip above the bed's floor, mm, and their times, s, in a run with steps of 20 ms.
+#: Heights of the fingertip above the bed's floor, mm, and their times, s, in a run with steps of 20
+#: ms.
 WAYS = {
     "presses and stays": ([(0.0, 41.0), (0.1, 38.5), (0.4, 38.5)], False),
     "taps within steps": (
@@ -251,13 +271,17 @@ def test_an_estimate_that_cannot_see_a_contact_within_a_step_says_so(name):
 @pytest.mark.parametrize("name", [*SCENES, "slow_press"])
 def test_the_adaptive_stepper_keeps_the_heights_within_its_tolerance(name, tolerance):
     scene = beginning(name, LASTS, "adaptive", 5e-3, f"simulation.tolerance={tolerance}")
-    # The reference is Richardson's extrapolation at half of 1 ms. Another half changes the errors by 2e-11 m.
-    exact = replace(scene, simulation=replace(scene.simulation, stepper="richardson", physics_step=1e-3))
+    # The reference is Richardson's extrapolation at half of 1 ms. Another half changes the errors
+    # by 2e-11 m.
+    exact = replace(
+        scene, simulation=replace(scene.simulation, stepper="richardson", physics_step=1e-3)
+    )
     assert estimate_errors(exact, run(scene).history).height <= tolerance
 
 
 def test_a_free_pin_keeps_within_the_tolerance_over_many_commands():
-    # The errors of a pin that nothing presses add up: 60 reversals of a valve that is turbulent in between.
+    # The errors of a pin that nothing presses add up: 60 reversals of a valve that is turbulent in
+    # between.
     script = scripted(lambda t, x, y: (1.0, -0.6, 0.8, -1.0, 0.3, -0.2)[round(t / 20e-3) % 6])
     parts = {"valve": Valve(orifice_diameter=0.8e-3), "fluid": Fluid(760.0, 0.65e-6)}
     known = {"control": script, "period": 20e-3, "dead_time": 0.0, **parts}

@@ -24,16 +24,23 @@ def test_a_figure_of_a_page_is_what_the_command_gives(figure):
 
 @pytest.mark.parametrize("page, stored", STORED)
 def test_a_figure_of_a_page_is_that_of_its_stored_result(page, stored):
-    judged = [figures.judge(one) for one in FIGURES if (one["page"], one["stored"]) == (page, stored)]
+    judged = [
+        figures.judge(one) for one in FIGURES if (one["page"], one["stored"]) == (page, stored)
+    ]
     assert [one for one in judged if one["stale"]] == []
     assert len(judged) > 7
 
 
 def test_each_page_with_a_table_of_figures_has_rows_or_says_why_not():
-    told = {row["page"] for row in figures.read_plan()["figure"]}, set(figures.read_plan()["without"])
+    told = (
+        {row["page"] for row in figures.read_plan()["figure"]},
+        set(figures.read_plan()["without"]),
+    )
     assert told[0] & told[1] == set()
     pages = [figures.ROOT / "README.md", *sorted((figures.ROOT / "docs").glob("*.md"))]
-    counts = {str(page.relative_to(figures.ROOT)): page.read_text(encoding="utf-8") for page in pages}
+    counts = {
+        str(page.relative_to(figures.ROOT)): page.read_text(encoding="utf-8") for page in pages
+    }
     measured = {
         page
         for page, text in counts.items()
@@ -59,8 +66,18 @@ def test_each_stored_result_has_a_row_with_its_command_date_and_commit():
         ("docs/paper.md", "", 2, "docs/paper.md has no number 1 behind"),
         ("docs/stability.md", STABILITY, 0, "\n0 of "),
         ("docs/stability.md", STABILITY.replace("| 7.64 |", "| 7.63 |"), 1, "\n1 of "),
-        ("docs/stability.md", f"{STABILITY}\n| a new row | 7.6 |", 0, "rows not compared: case; a new row\n"),
-        ("docs/stability.md", STABILITY.replace("| c0 = 0 |", "| c0 = 1 |"), 2, "behind '| c0 = 0 |'"),
+        (
+            "docs/stability.md",
+            f"{STABILITY}\n| a new row | 7.6 |",
+            0,
+            "rows not compared: case; a new row\n",
+        ),
+        (
+            "docs/stability.md",
+            STABILITY.replace("| c0 = 0 |", "| c0 = 1 |"),
+            2,
+            "behind '| c0 = 0 |'",
+        ),
         ("docs/stability.md", "", 2, "docs/stability.md has no number 1 behind"),
     ],
 )

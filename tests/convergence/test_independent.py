@@ -52,7 +52,9 @@ def flow(p, opening, drop):
 
 def spline(trajectory):
     """Return the smooth path of the lowest point: monotone cubics that start and end at rest."""
-    slopes = PchipInterpolator(trajectory.times, trajectory.positions).derivative()(trajectory.times)
+    slopes = PchipInterpolator(trajectory.times, trajectory.positions).derivative()(
+        trajectory.times
+    )
     slopes[[0, -1]] = 0.0
     return CubicHermiteSpline(trajectory.times, trajectory.positions, slopes)
 
@@ -60,7 +62,9 @@ def spline(trajectory):
 def underside(p, position, x, y):
     """Return the height of a level finger's underside, continued with its slope beyond r² = 0.96."""
     square = ((x - position[0]) / p.axes[0]) ** 2 + ((y - position[1]) / p.axes[1]) ** 2
-    root = np.sqrt(1.0 - np.minimum(square, 0.96)) - np.maximum(square - 0.96, 0.0) / (2.0 * math.sqrt(0.04))
+    root = np.sqrt(1.0 - np.minimum(square, 0.96)) - np.maximum(square - 0.96, 0.0) / (
+        2.0 * math.sqrt(0.04)
+    )
     return position[2] + p.axes[2] * (1.0 - root)
 
 
@@ -78,7 +82,10 @@ def integrate(p, curve, system, run):
     commands = np.concatenate([np.zeros((1, n)), run.command[:-1]])
     for row, start in enumerate(run.time[:-1]):
         end = run.time[row + 1]
-        for first, last, seen in ((start, start + p.dead_time, row), (start + p.dead_time, end, row + 1)):
+        for first, last, seen in (
+            (start, start + p.dead_time, row),
+            (start + p.dead_time, end, row + 1),
+        ):
             advance(p, curve, x, y, full, commands[seen], first, last)
         heights[row + 1] = full[0]
         depth = full[0] - underside(p, curve(end), x, y)
@@ -113,9 +120,12 @@ def advance(p, curve, x, y, full, command, start, end):
         d_opening[:] = (own - opening) / p.lag
         return change
 
-    # The absolute tolerances are some 1e-7 of what each row reaches: 0.1 m, 1, and a newton. A hundredth of
-    # both changes the departures below by 4e-13 m and 1e-9 N in the first 4.5 s, of 5 µm and 1 mN.
-    tolerance = np.concatenate([np.full(cells.size, 1e-8), np.full(cells.size, 1e-7), np.full(3 * k, 1e-7)])
+    # The absolute tolerances are some 1e-7 of what each row reaches: 0.1 m, 1, and a newton. A
+    # hundredth of both changes the departures below by 4e-13 m and 1e-9 N in the first 4.5 s, of 5
+    # µm and 1 mN.
+    tolerance = np.concatenate(
+        [np.full(cells.size, 1e-8), np.full(cells.size, 1e-7), np.full(3 * k, 1e-7)]
+    )
     flat = np.concatenate([full[:2, cells].ravel(), full[2:, cells[:k]].ravel()])
     solver = DOP853(rhs, start, flat, end, rtol=1e-6, atol=tolerance, first_step=end - start)
     while solver.status == "running":
@@ -138,7 +148,7 @@ def test_heights_and_forces_agree_with_scipy_over_the_whole_session():
     assert run.height[-1].min() < 35e-3
     assert (run.force > 0.0).any(axis=0).sum() > 50
     heights, forces = integrate(numbers(), spline(trajectory), system, run)
-    # What the project promises at the default step: 5 µm, for a pin's own play is larger, and 1 mN, 1/400
-    # of the force that is asked for.
+    # What the project promises at the default step: 5 µm, for a pin's own play is larger, and 1 mN,
+    # 1/400 of the force that is asked for.
     assert np.abs(heights - run.height).max() < 5e-6
     assert np.abs(forces - run.force).max() < 1e-3

@@ -20,8 +20,8 @@ from tests.assemble import Motion, one_cell, record, scripted
 PERIOD, COUNT = 20e-3, 5
 FIXED = ("bernoulli", "richardson", "euler", "heun", "runge_kutta_4")
 STEPPERS = {name: one_cell(stepper=name).stepper for name in FIXED}
-#: Physics steps of a period, each half of the one before: where the error falls as a power of the step, and
-#: is still far above rounding.
+#: Physics steps of a period, each half of the one before: where the error falls as a power of the
+#: step, and is still far above rounding.
 REFINED = (32, 64, 128)
 
 STILL = Motion(lambda t: np.full(t.shape, 38.5e-3))
@@ -104,7 +104,8 @@ def order(found):
     "stepper, problem",
     [
         *product(STEPPERS, ("a moving finger", "no valve lag", "a turbulent valve")),
-        # Near equilibrium, the two steppers that a session is likely to use: the others' errors change sign.
+        # Near equilibrium, the two steppers that a session is likely to use: the others' errors
+        # change sign.
         *product(("bernoulli", "runge_kutta_4"), ("a still finger", "an elastic pulp")),
         ("runge_kutta_4", "a free pin"),
     ],
@@ -115,14 +116,15 @@ def test_where_all_is_smooth_the_measured_order_is_the_declared_one(stepper, pro
 
 
 def test_the_closed_form_step_moves_a_free_pin_as_exactly_as_the_reference():
-    # It takes the exact opening at four Gauss points, order 8: what is left is the reference's error.
+    # It takes the exact opening at four Gauss points, order 8: what is left is the reference's
+    # error.
     assert errors("bernoulli", "a free pin").max() < 1e-11
 
 
 @pytest.mark.parametrize("problem", KINKED)
 @pytest.mark.parametrize("stepper", STEPPERS)
 def test_across_a_kink_the_order_stays_near_two_or_the_declared_one_below(stepper, problem):
-    # Where in a step the kink falls differs from run to run, and scatters the errors: 0.4. Below 2 nm
-    # Richardson's are mixed with the reference's own across a valve's reversal.
+    # Where in a step the kink falls differs from run to run, and scatters the errors: 0.4. Below 2
+    # nm Richardson's are mixed with the reference's own across a valve's reversal.
     found = errors(stepper, problem)
     assert found.max() < 2e-9 or order(found) > min(STEPPERS[stepper].order, 2) - 0.4

@@ -52,7 +52,9 @@ def compare_ten_fingers(method):
     depth, calls = several_fingers.PRESSED if method else 39.0, []
     for fingers in (1, 10):
         places = several_fingers.PLACES[:fingers]
-        ways = [[(0.0, x, y, 41.0), (0.3, x, y, depth), (3.0, x + 10, y + 3, depth)] for x, y in places]
+        ways = [
+            [(0.0, x, y, 41.0), (0.3, x, y, depth), (3.0, x + 10, y + 3, depth)] for x, y in places
+        ]
         scene = several_fingers.make_scene(method, ways, 25)
         system = assemble(scene)
         calls.append(count_calls(periods(system, scene.trajectories(), begin(system), COUNT)))
@@ -81,7 +83,9 @@ def count_bytes_of_history():
     """Return the bytes of a pin in a row of a history."""
     history = run(sample("tap", "simulation.duration=0.1")).history
     rows, pins = history["height"].shape
-    return sum(table.nbytes for table in history.values() if table.shape == (rows, pins)) / (rows * pins)
+    return sum(table.nbytes for table in history.values() if table.shape == (rows, pins)) / (
+        rows * pins
+    )
 
 
 def count_bytes_of_pin(*settings):
@@ -89,12 +93,16 @@ def count_bytes_of_pin(*settings):
     return 8.0 * assemble(sample(PAPER, *settings)).rows.count
 
 
-#: What is counted, the figure of the page or one on which it depends, and the share that it may be off: exact
-#: without one; else a call more or less is no other figure.
+#: What is counted, the figure of the page or one on which it depends, and the share that it may be
+#: off: exact without one; else a call more or less is no other figure.
 FIGURES = {
     "README: control periods": (lambda: sample(PAPER).periods, 5300, 0.0),
     "performance: cells": (lambda: sample(PAPER).cells, 625, 0.0),
-    "performance: numpy calls without control": (partial(count_numpy_calls, "control=absent"), 74, 0.05),
+    "performance: numpy calls without control": (
+        partial(count_numpy_calls, "control=absent"),
+        74,
+        0.05,
+    ),
     "with force noise": (partial(count_numpy_calls, "sensors.force_noise=2 mN"), 126, 0.05),
     "of Method II": (partial(count_numpy_calls, "control.method=cell_states"), 181, 0.05),
     "without valve lag": (partial(count_numpy_calls, ABSENT[1]), 154, 0.05),

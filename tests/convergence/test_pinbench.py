@@ -11,7 +11,8 @@ from benchmarks.pinbench import reference, run
 from benchmarks.pinbench.problem import Law, read_problems
 
 PROBLEMS = read_problems()
-#: By method: a setting, the largest errors of height on damped_pins, m, and of force on relaxation_alone, N.
+#: By method: a setting, the largest errors of height on damped_pins, m, and of force on
+#: relaxation_alone, N.
 ANSWERS = {
     "digiclay": (5e-3, 0.2e-9, 50e-6),
     "digiclay richardson": (2.5e-3, 5e-12, 1.5e-6),
@@ -45,11 +46,17 @@ def test_an_adapter_answers_the_small_problems_within_its_tolerance(method):
 
 def test_every_method_has_a_row_and_every_adapter_at_most_60_lines_of_code():
     adapters = run.list_adapters()
-    missing = {method for method in ANSWERS if method.startswith("MuJoCo") and find_spec("mujoco") is None}
-    assert {method for adapter in adapters for method in adapter.methods} == ANSWERS.keys() - missing
+    missing = {
+        method for method in ANSWERS if method.startswith("MuJoCo") and find_spec("mujoco") is None
+    }
+    assert {
+        method for adapter in adapters for method in adapter.methods
+    } == ANSWERS.keys() - missing
     for path in run.ADAPTERS.glob("*.py"):
         lines = path.read_text(encoding="utf-8").splitlines()
-        code = [line for line in lines if line.strip() and not line.lstrip().startswith(('"""', "#"))]
+        code = [
+            line for line in lines if line.strip() and not line.lstrip().startswith(('"""', "#"))
+        ]
         assert len(code) <= 60, path.name
 
 
@@ -62,18 +69,21 @@ def test_a_finer_step_of_another_method_comes_to_the_reference(name):
     shape = len(problem.judged), problem.pins.size
     assert np.shape(exact["heights"]) == np.shape(exact["forces"]) == shape
     assert (np.max(exact["forces"], axis=0) > 0.0).sum() > 3
-    # Digiclay's own law, and that in numpy, which all other adapters use. A step of 1 ms does not resolve the
-    # steep contact and turbulence.
+    # Digiclay's own law, and that in numpy, which all other adapters use. A step of 1 ms does not
+    # resolve the steep contact and turbulence.
     for method in ("digiclay richardson", "Runge-Kutta 4, numpy"):
         step = 0.25e-3 if name == "stiff" else 1e-3
         answer = run.solve(find_adapter(method), problem, method, step)
-        height, force = {"stiff": (0.3e-6, 0.2e-3), "turbulent_valve": (6e-6, 0.6e-3)}.get(name, (5e-8, 1e-5))
+        height, force = {"stiff": (0.3e-6, 0.2e-3), "turbulent_valve": (6e-6, 0.6e-3)}.get(
+            name, (5e-8, 1e-5)
+        )
         assert answer.height_error < height, method
         assert answer.force_error < force, method
 
 
 def test_references_that_are_made_again_are_those_of_the_file():
-    # The files' are of another implementation of the law, good to 1 pm and 0.1 nN as the README says.
+    # The files' are of another implementation of the law, good to 1 pm and 0.1 nN as the README
+    # says.
     problem, some = PROBLEMS["turbulent_valve"], slice(0, 1)
     again = reference.solve_pins(problem, problem.pins[some], *reference.METHODS[0])
     for key, values, most in zip(("heights", "forces"), again, (1e-12, 1e-10), strict=True):
@@ -85,8 +95,11 @@ def test_references_that_are_made_again_are_those_of_the_file():
 @pytest.mark.parametrize(
     "method, setting, height", [("digiclay", 1e-3, 12e-6), ("digiclay adaptive", 1e-6, 0.3e-6)]
 )
-def test_turbulent_flow_under_a_load_is_on_its_chord_and_not_taken_for_a_free_one(method, setting, height):
-    # With the conductance of mid step alone: 28 and 3.5 µm; two levels alone agree by accident, 0.6 µm off.
+def test_turbulent_flow_under_a_load_is_on_its_chord_and_not_taken_for_a_free_one(
+    method, setting, height
+):
+    # With the conductance of mid step alone: 28 and 3.5 µm; two levels alone agree by accident, 0.6
+    # µm off.
     answer = run.solve(find_adapter(method), PROBLEMS["turbulent_valve"], method, setting)
     assert answer.height_error < height
 
@@ -127,7 +140,10 @@ def test_a_broken_adapter_is_one_line_and_exit_code_2(word, tmp_path, monkeypatc
     monkeypatch.setattr(run, "NAMES", ())
     if BROKEN[word]:
         (tmp_path / "mine.py").write_text(BROKEN[word], encoding="utf-8")
-    code, told = main(["peers", "--quick", "--quiet", str(tmp_path / "mine.py")]), capsys.readouterr()
+    code, told = (
+        main(["peers", "--quick", "--quiet", str(tmp_path / "mine.py")]),
+        capsys.readouterr(),
+    )
     assert (code, told.out, told.err.count("\n"), word in told.err) == (2, "", 1, True)
 
 
@@ -141,7 +157,9 @@ def test_a_strangers_adapter_is_a_file_on_the_command_line(tmp_path, monkeypatch
     assert "Runge-Kutta 4, numpy" in printed
     files = sorted(path.name for path in Path(tmp_path / "results").iterdir())
     assert files == ["peers.csv", "peers.md", "peers.png"]
-    assert ',mine,"Runge-Kutta 4, numpy",' in (tmp_path / "results" / "peers.csv").read_text(encoding="utf-8")
+    assert ',mine,"Runge-Kutta 4, numpy",' in (tmp_path / "results" / "peers.csv").read_text(
+        encoding="utf-8"
+    )
 
 
 def test_the_fastest_is_compared_with_digiclay():
@@ -160,7 +178,9 @@ def test_an_engine_that_diverges_has_infinite_errors_and_is_never_the_fastest():
     problem = PROBLEMS["stiff"]
     answer = run.solve(find_adapter("digiclay"), problem, "digiclay runge_kutta_4", 5e-3)
     assert (answer.height_error, answer.force_error) == (np.inf, np.inf)
-    assert answer.method not in "".join(run.list_answers([answer])).partition("The fastest method")[2]
+    assert (
+        answer.method not in "".join(run.list_answers([answer])).partition("The fastest method")[2]
+    )
 
 
 def test_a_method_stops_at_settings_that_take_too_long(monkeypatch):

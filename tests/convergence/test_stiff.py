@@ -23,10 +23,10 @@ MOST = 8.0
 EXPLICIT = ("euler", "heun", "runge_kutta_4")
 WELL = [name for name, case in CASES.items() if not case.why]
 
-#: Cases whose error at 50 ms happens to be below that at 20 ms. A single pin's goes from -34 µm at 25 ms to
-#: +5 µm at 50 ms: it changes its sign. At the lower end stop it is 0.29 mm at 25 ms, 0.10 mm at 50 ms and
-#: 0.29 mm at 100 ms.
-#: Three fingers at a bore of 0.2 mm: 3.18 and 3.12 mm, the way of the fingers.
+#: Cases whose error at 50 ms happens to be below that at 20 ms. A single pin's goes from -34 µm at
+#: 25 ms to +5 µm at 50 ms: it changes its sign. At the lower end stop it is 0.29 mm at 25 ms, 0.10
+#: mm at 50 ms and 0.29 mm at 100 ms. Three fingers at a bore of 0.2 mm: 3.18 and 3.12 mm, the way
+#: of the fingers.
 SWINGS = ("one pin", "all at the lower end stop", "three fingers, bore 0.2 mm")
 
 
@@ -50,7 +50,8 @@ def replayed(name, step):
 @pytest.mark.parametrize("step", stiff.STEPS)
 @pytest.mark.parametrize("name", CASES)
 def test_the_default_stepper_does_not_blow_up(name, step):
-    # No warning, all finite, heights within the stroke, no negative force: `stiff.replayed` asserts it.
+    # No warning, all finite, heights within the stroke, no negative force: `stiff.replayed` asserts
+    # it.
     assert np.isfinite(replayed(name, step)).all()
     with stiff.strict():
         heights = stiff.live(name, "bernoulli", step)  # under its own controller
@@ -60,7 +61,9 @@ def test_the_default_stepper_does_not_blow_up(name, step):
 @pytest.mark.parametrize("name", WELL)
 def test_the_error_falls_with_the_step_where_the_case_is_well_conditioned(name):
     exact, off = reference(name)
-    errors = [at_shared_ends(replayed(name, step), exact, stiff.period_of(step)) for step in stiff.STEPS]
+    errors = [
+        at_shared_ends(replayed(name, step), exact, stiff.period_of(step)) for step in stiff.STEPS
+    ]
     floor = max(off, 1e-12)
     known = errors[:-1] if name in SWINGS else errors
     assert all(finer <= max(coarser, floor) for finer, coarser in pairwise(known)), errors
@@ -87,7 +90,9 @@ def calls(name):
 
 @pytest.mark.parametrize("threaded", [1, 10_000], ids=["a large bed", "a small one"])
 @pytest.mark.parametrize("stepper", EXPLICIT)
-def test_an_explicit_stepper_that_blows_up_names_time_cell_value_and_remedy(stepper, threaded, monkeypatch):
+def test_an_explicit_stepper_that_blows_up_names_time_cell_value_and_remedy(
+    stepper, threaded, monkeypatch
+):
     monkeypatch.setattr(simulation, "THREADED", threaded)
     said = r"At 0\.\d+ s the height of cell \d+ became inf\. Use a shorter"
     with pytest.raises(DivergenceError, match=said):
@@ -109,7 +114,8 @@ def test_the_cases_reach_what_they_are_for_and_a_pin_on_an_end_stop_is_as_exact_
 
 @pytest.mark.parametrize("state", ["no_control", "sensors", "shape_display"])
 def test_the_force_on_a_pin_behind_a_shut_valve_is_that_of_a_finer_step(state):
-    # 1.2 to 1.7 mN of up to 30 N; 30 to 61 mN where such pins are taken for pins that a turbulent flow moves.
+    # 1.2 to 1.7 mN of up to 30 N; 30 to 61 mN where such pins are taken for pins that a turbulent
+    # flow moves.
     coarse, fine = (forces_after(state, parts) for parts in (1, 16))
     assert np.abs(coarse - fine).max() < 3e-3
 

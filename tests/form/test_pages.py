@@ -65,7 +65,9 @@ def _headings(text: str) -> list[str]:
 
 
 def _anchors(text: str) -> set[str]:
-    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in _headings(text)}
+    return {
+        re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in _headings(text)
+    }
 
 
 def find_commands(text: str) -> list[tuple[str, str]]:
@@ -128,7 +130,9 @@ def find_dead_links(page: Path, text: str) -> list[str]:
     for target in re.findall(r"\]\((?!\w+://|(?:\.\./)?reference/)([^)\s]+)\)", text):
         name, _, anchor = target.partition("#")
         file = page.parent / name if name else page
-        if not file.exists() or (anchor and anchor not in _anchors(file.read_text(encoding="utf-8"))):
+        if not file.exists() or (
+            anchor and anchor not in _anchors(file.read_text(encoding="utf-8"))
+        ):
             dead.append(target)
     return dead
 
@@ -200,7 +204,9 @@ def test_all_fourteen_equations_have_a_row_and_places_that_exist() -> None:
 
 def test_every_parameter_says_where_it_comes_from() -> None:
     page = (ROOT / "docs" / "nomenclature.md").read_text(encoding="utf-8")
-    sources = {source for quantity in _parameters().values() for source in quantity.source.split(", ")}
+    sources = {
+        source for quantity in _parameters().values() for source in quantity.source.split(", ")
+    }
     # The paper, derived, chosen; or a reference of the page, and none without a value.
     assert sources - {"P", "D", "C"} == set(re.findall(r"^- \*\*(.+?)\*\*:", page, re.MULTILINE))
 
@@ -213,7 +219,8 @@ def test_the_page_of_the_package_lists_every_extra_that_is_for_its_users() -> No
     )
 
 
-#: Section of a page that names all entries of a table of the code: page, heading, entries, their form there.
+#: Section of a page that names all entries of a table of the code: page, heading, entries, their
+#: form there.
 NAMED = {
     "mesh formats that are written": ("docs/export.md", "## Formats", FORMATS, "`{}`"),
     "mesh formats that are read": (
@@ -233,11 +240,15 @@ def test_a_page_names_each_entry_of_a_table(
     before, _, rest = (ROOT / page).read_text(encoding="utf-8").partition(f"\n{heading}\n")
     section = rest.partition("\n#")[0]
     lacking = [name for name in entries if form.format(name) not in section.replace("glTF", "GLTF")]
-    assert lacking == [], f"{page}, line {before.count(chr(10)) + 2}, '{heading}', needs {', '.join(lacking)}"
+    assert lacking == [], (
+        f"{page}, line {before.count(chr(10)) + 2}, '{heading}', needs {', '.join(lacking)}"
+    )
 
 
 #: A symbol with an index, in the text of a page or in a formula of a plot.
-SYMBOL = re.compile(r"(?<![\w`./])(?:Δ?[A-Za-zα-ω]|Re)_\{?[A-Za-z]{1,8}\}?(?:\^[A-Za-z]+)?(?![\w(.])")
+SYMBOL = re.compile(
+    r"(?<![\w`./])(?:Δ?[A-Za-zα-ω]|Re)_\{?[A-Za-z]{1,8}\}?(?:\^[A-Za-z]+)?(?![\w(.])"
+)
 #: Those that pages define themselves, each for what stands around it.
 LOCAL = """
 F_a F_com F_j F_max F_n F_set F_trig H_VM H_j H_own H_rest K_v T_a U_f a_i d_j e_j f_di g_down g_up h_p r_j
@@ -270,7 +281,9 @@ def test_every_symbol_of_pages_and_of_the_paper_is_declared() -> None:
         for method in METHODS
         for quantity in list_quantities(import_parameters(section, method)).values()
     }
-    variables = set(re.findall(r"[^\s|,]+", " ".join(re.findall(r"^\| ([^|]+) \|", page, re.MULTILINE))))
+    variables = set(
+        re.findall(r"[^\s|,]+", " ".join(re.findall(r"^\| ([^|]+) \|", page, re.MULTILINE)))
+    )
     files = [*PAGES, *(ROOT / "digiclay_paper").glob("*.py"), ROOT / "digiclay_paper" / "paper.md"]
     unknown = [
         f"{path.relative_to(ROOT)}:{number}: {symbol}"
@@ -287,12 +300,16 @@ def test_every_symbol_of_pages_and_of_the_paper_is_declared() -> None:
 def _targets(entry: Any) -> Iterator[str]:
     if isinstance(entry, str):
         yield entry
-    for inner in entry.values() if isinstance(entry, dict) else entry if isinstance(entry, list) else ():
+    for inner in (
+        entry.values() if isinstance(entry, dict) else entry if isinstance(entry, list) else ()
+    ):
         yield from _targets(inner)
 
 
 def test_the_navigation_names_each_page_once_and_none_that_is_missing() -> None:
-    listed = list(_targets(yaml.safe_load((ROOT / "mkdocs.yml").read_text(encoding="utf-8"))["nav"]))
+    listed = list(
+        _targets(yaml.safe_load((ROOT / "mkdocs.yml").read_text(encoding="utf-8"))["nav"])
+    )
     written = [name for name in listed if name not in MADE and not name.startswith("reference/")]
     pages = {path.relative_to(ROOT / "docs").as_posix() for path in (ROOT / "docs").rglob("*.md")}
     assert sorted(written) == sorted(pages), "each page needs one line under nav in mkdocs.yml"
@@ -301,7 +318,9 @@ def test_the_navigation_names_each_page_once_and_none_that_is_missing() -> None:
 
 def test_every_picture_is_shown_and_has_a_row_of_the_table() -> None:
     folder = ROOT / "docs" / "pictures"
-    targets = [(page, found) for page in PAGES for found in SHOWN.findall(page.read_text(encoding="utf-8"))]
+    targets = [
+        (page, found) for page in PAGES for found in SHOWN.findall(page.read_text(encoding="utf-8"))
+    ]
     shown = {(page.parent / target).resolve() for page, target in targets}
     # The page of the sample scenes is made at the build.
     shown |= {folder / "samples" / f"{name}.jpg" for name in list_samples()}
@@ -310,7 +329,10 @@ def test_every_picture_is_shown_and_has_a_row_of_the_table() -> None:
     # The table in CONTRIBUTING.md has the command of each.
     table = ROW.findall((ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8"))
     patterns = [name for names, _ in table for name in re.findall(r"`([^`]+)`", names)]
-    inside = (path.relative_to(folder).as_posix() if folder in path.parents else path.name for path in shown)
+    inside = (
+        path.relative_to(folder).as_posix() if folder in path.parents else path.name
+        for path in shown
+    )
     rows = {name: [row for row in patterns if fnmatch(name, row)] for name in inside}
     assert {name: found for name, found in rows.items() if len(found) != 1} == {}
     assert set(patterns) == {row for found in rows.values() for row in found}

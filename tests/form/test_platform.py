@@ -13,12 +13,29 @@ from typing import Any
 
 ROOT = Path(__file__).parents[2]
 PACKAGE = ROOT / "addon" / "digiclay"
-MANIFEST: dict[str, Any] = tomllib.loads((PACKAGE / "blender_manifest.toml").read_text(encoding="utf-8"))
+MANIFEST: dict[str, Any] = tomllib.loads(
+    (PACKAGE / "blender_manifest.toml").read_text(encoding="utf-8")
+)
 LONGEST = 64
 #: Tags that the platform has for add-ons, of those that could ever fit.
-TAGS = {"3D View", "Add Mesh", "Animation", "Import-Export", "Mesh", "Modeling", "Physics", "Sculpt"}
+TAGS = {
+    "3D View",
+    "Add Mesh",
+    "Animation",
+    "Import-Export",
+    "Mesh",
+    "Modeling",
+    "Physics",
+    "Sculpt",
+}
 #: Licenses that the platform accepts for code and, CC0, for assets.
-LICENSES = {"GPL-2.0-or-later", "GPL-3.0-or-later", "LGPL-2.1-or-later", "LGPL-3.0-or-later", "CC0-1.0"} | {
+LICENSES = {
+    "GPL-2.0-or-later",
+    "GPL-3.0-or-later",
+    "LGPL-2.1-or-later",
+    "LGPL-3.0-or-later",
+    "CC0-1.0",
+} | {
     "BSD-1-Clause",
     "BSD-2-Clause",
     "BSD-3-Clause",
@@ -29,11 +46,21 @@ LICENSES = {"GPL-2.0-or-later", "GPL-3.0-or-later", "LGPL-2.1-or-later", "LGPL-3
     "Pixar",
     "Zlib",
 }
-#: What the platform's reviewers refuse: threads, beside which Blender crashes, and text that is executed.
+#: What the platform's reviewers refuse: threads, beside which Blender crashes, and text that is
+#: executed.
 THREADS = {"threading", "_thread", "concurrent", "multiprocessing", "asyncio"}
 EXECUTED = {"exec", "eval"}
 #: What reaches other machines needs the permission `network`.
-NETWORK = {"asyncio", "distributed", "ftplib", "http", "pythonosc", "requests", "socket", "socketserver"} | {
+NETWORK = {
+    "asyncio",
+    "distributed",
+    "ftplib",
+    "http",
+    "pythonosc",
+    "requests",
+    "socket",
+    "socketserver",
+} | {
     "ssl",
     "telnetlib",
     "urllib.request",
@@ -65,11 +92,18 @@ def imported(text: str) -> frozenset[str]:
         elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
             found |= {node.module, *(f"{node.module}.{alias.name}" for alias in node.names)}
     # urllib.parse reads text, urllib.request reaches others.
-    return frozenset(found | {name.split(".")[0] for name in found if not name.startswith("urllib")})
+    return frozenset(
+        found | {name.split(".")[0] for name in found if not name.startswith("urllib")}
+    )
 
 
 def is_short(text: str) -> bool:
-    return 0 < len(text) <= LONGEST and text == text.strip() and text[-1].isalnum() and text.isprintable()
+    return (
+        0 < len(text) <= LONGEST
+        and text == text.strip()
+        and text[-1].isalnum()
+        and text.isprintable()
+    )
 
 
 def test_what_the_zip_leaves_out_exists_and_no_module_of_it_imports_that_at_once() -> None:
@@ -100,11 +134,19 @@ def test_every_license_has_its_text_and_manifest_package_and_samples_name_the_sa
     named = [license.removeprefix("SPDX:") for license in MANIFEST["license"]]
     assert named[0] == "GPL-3.0-or-later"
     assert set(named) <= LICENSES
-    assert "Creative Commons Legal Code\n\nCC0 1.0 Universal" in (ROOT / "LICENSES/CC0-1.0.txt").read_text()
-    assert "GNU GENERAL PUBLIC LICENSE\n                       Version 3" in (ROOT / "LICENSE").read_text()
+    assert (
+        "Creative Commons Legal Code\n\nCC0 1.0 Universal"
+        in (ROOT / "LICENSES/CC0-1.0.txt").read_text()
+    )
+    assert (
+        "GNU GENERAL PUBLIC LICENSE\n                       Version 3"
+        in (ROOT / "LICENSE").read_text()
+    )
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     # The wheel on a package index has no trimesh in it, the extension has.
-    assert project["license"].split(" AND ") == [one.removeprefix("SPDX:") for one in MANIFEST["license"][:2]]
+    assert project["license"].split(" AND ") == [
+        one.removeprefix("SPDX:") for one in MANIFEST["license"][:2]
+    ]
     pages = [PACKAGE / "sample_shapes" / name / "README.md" for name in ("", "shapes", "sessions")]
     assert all("CC0-1.0" in page.read_text(encoding="utf-8") for page in pages)
     assert not any("License:\nGPL" in page.read_text(encoding="utf-8") for page in pages)
@@ -128,7 +170,9 @@ def test_the_zip_has_no_threads_executes_no_text_and_installs_or_patches_nothing
     assert [text for text in REFUSED if not find_refused(text)] == []
     assert find_refused("import subprocess\nmodule.exec_module(it)\nbed.eval(3)") == set()
     assert {path: found for path, text in modules() if (found := find_refused(text))} == {}
-    found = [(path, match.group()) for path, text in modules() for match in FORBIDDEN.finditer(text)]
+    found = [
+        (path, match.group()) for path, text in modules() for match in FORBIDDEN.finditer(text)
+    ]
     assert found == []
 
 

@@ -13,7 +13,8 @@ BRITISH = re.compile(
     r"|character|synchron|emphas|util|stabil|serial)is(e|es|ed|ing|ation)\b|analys(e|ed|ing)\b",
     re.IGNORECASE,
 )
-#: German, what former releases wrote (the samples too), and this file, which has the words themselves.
+#: German, what former releases wrote (the samples too), and this file, which has the words
+#: themselves.
 UNREAD = ("de.toml", "CHANGELOG.md", "test_spelling.py")
 #: Names in files, which stay what they are.
 READ = re.compile(r'\bcentring_time\b|"(--)?colour"|"Colour by Force"|"Top Colour at \(N\)"')
@@ -25,7 +26,10 @@ ALLOWED = {
     "scene_source": "what reads a scene, from whatever source",
 }
 #: Packages whose modules are named after what others contain, and why.
-NAMED_AFTER_OTHERS = {"commands": "each module is the command of its name", "plots": "what a plot shows"}
+NAMED_AFTER_OTHERS = {
+    "commands": "each module is the command of its name",
+    "plots": "what a plot shows",
+}
 
 
 def test_no_word_is_spelled_the_british_way() -> None:
@@ -34,8 +38,13 @@ def test_no_word_is_spelled_the_british_way() -> None:
         for path in tracked("*.py", "*.md", "*.toml", "*.txt")
         if ROOT / "tests" / "samples" not in path.parents and path.name not in UNREAD
     ]
-    texts = {str(path.relative_to(ROOT)): READ.sub("", path.read_text(encoding="utf-8")) for path in files}
-    found = {name: [match.group() for match in BRITISH.finditer(text)] for name, text in texts.items()}
+    texts = {
+        str(path.relative_to(ROOT)): READ.sub("", path.read_text(encoding="utf-8"))
+        for path in files
+    }
+    found = {
+        name: [match.group() for match in BRITISH.finditer(text)] for name, text in texts.items()
+    }
     assert {name: words for name, words in found.items() if words} == {}
 
 
@@ -47,5 +56,9 @@ def test_no_module_has_the_name_of_its_package_or_of_another_module() -> None:
         if path.stem not in ALLOWED and path.parent.name not in NAMED_AFTER_OTHERS
     ]
     counts = Counter(path.stem for path in modules)
-    wrong = [path for path in modules if counts[path.stem] > 1 or path.parent.name in path.stem.split("_")]
+    wrong = [
+        path
+        for path in modules
+        if counts[path.stem] > 1 or path.parent.name in path.stem.split("_")
+    ]
     assert sorted(str(path.relative_to(ROOT)) for path in wrong) == []

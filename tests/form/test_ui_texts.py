@@ -12,7 +12,8 @@ from digiclay import translations
 ROOT = Path(digiclay.__file__).parent
 FOLDERS = ("operators", "panels", "press", "overlay", "live")
 WORD = re.compile(r"[A-Za-z]{3,}")
-#: Beginnings of what is no language: names of Blender, lines of a preset, features as files name them.
+#: Beginnings of what is no language: names of Blender, lines of a preset, features as files name
+#: them.
 NAMES = (
     "3D View",
     "Object Mode",
@@ -61,7 +62,9 @@ def test_every_report_goes_through_the_one_function() -> None:
         f"{name}:{node.lineno}"
         for name, tree in source()
         for node in ast.walk(tree)
-        if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr == "report"
+        if isinstance(node, ast.Call)
+        and isinstance(node.func, ast.Attribute)
+        and node.func.attr == "report"
         if isinstance(node.args[1], ast.Constant | ast.JoinedStr)
     ]
     assert plain == []

@@ -8,7 +8,9 @@ import pytest
 from digiclay import __version__
 
 ROOT = Path(__file__).parents[2]
-DEPENDENCIES = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["dependencies"]
+DEPENDENCIES = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"][
+    "dependencies"
+]
 #: Of each library the lowest version and the major version that is too high.
 BOUNDS = {
     name: (low, int(above))

@@ -34,7 +34,10 @@ def meshes(paper):
     out = paper.parent
     every = ["--format", "stl,stl_ascii,obj,ply,glb,3mf", "--quiet"]
     for kind in ("solid", "surface", "pins", "features"):
-        assert main(["export", str(paper), "--kind", kind, "--out", str(out / "bilinear"), *every]) == 0
+        assert (
+            main(["export", str(paper), "--kind", kind, "--out", str(out / "bilinear"), *every])
+            == 0
+        )
     for skin in ("smooth", "membrane"):
         for kind in (["solid"], ["features", "--separate"]):
             words = ["--kind", *kind, "--skin", skin, "--out", str(out / skin), *every]

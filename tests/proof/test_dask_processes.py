@@ -59,7 +59,15 @@ def start(here):
 def start_scheduler(start, folder, port="0", **settings):
     file = folder / "scheduler.json"
     file.unlink(missing_ok=True)
-    arguments = ["--host", "127.0.0.1", "--port", port, "--no-dashboard", "--scheduler-file", str(file)]
+    arguments = [
+        "--host",
+        "127.0.0.1",
+        "--port",
+        port,
+        "--no-dashboard",
+        "--scheduler-file",
+        str(file),
+    ]
     process = start("distributed.cli.dask_scheduler", *arguments, **settings)
     wait_until(lambda: read_json(file) is not None)
     return process, read_json(file)["address"]
@@ -67,7 +75,13 @@ def start_scheduler(start, folder, port="0", **settings):
 
 def start_worker(start, address, *arguments, **settings):
     return start(
-        "distributed.cli.dask_worker", address, "--nthreads", "1", "--no-dashboard", *arguments, **settings
+        "distributed.cli.dask_worker",
+        address,
+        "--nthreads",
+        "1",
+        "--no-dashboard",
+        *arguments,
+        **settings,
     )
 
 
@@ -85,9 +99,21 @@ def test_a_point_that_no_process_of_this_machine_survives_fails_alone(here):
     resource = pytest.importorskip("resource", reason="Windows does not limit processor time")
     axes = ["layout.rows=3,4", "simulation.duration=0.1,1e5", "control.dead_band=1e-5"]
     varied = [word for axis in axes for word in ("--vary", axis)]
-    # The system kills a process that has run for so many seconds: a point of hours, each time it is begun.
+    # The system kills a process that has run for so many seconds: a point of hours, each time it is
+    # begun.
     done = subprocess.run(
-        [sys.executable, "-m", "digiclay", "sweep", "my.toml", *varied, "--workers", "2", "--out", "o"],
+        [
+            sys.executable,
+            "-m",
+            "digiclay",
+            "sweep",
+            "my.toml",
+            *varied,
+            "--workers",
+            "2",
+            "--out",
+            "o",
+        ],
         capture_output=True,
         text=True,
         check=False,
@@ -143,7 +169,9 @@ def test_a_piece_that_no_worker_survives_fails_alone(here, start):
     done = {}
     with open_cluster(address, lambda: False, lambda note: None) as cluster:
         pieces = ["1 + 1", "__import__('os')._exit(1)", "2 + 2"]
-        finish(submit(cluster, eval, pieces, stopped=lambda: False), done.__setitem__, done.__setitem__)
+        finish(
+            submit(cluster, eval, pieces, stopped=lambda: False), done.__setitem__, done.__setitem__
+        )
     assert [done[piece] for piece in pieces[::2]] == [2, 4]
     assert done[pieces[1]].startswith("2 workers died of this, the last one tcp://127.0.0.1:")
 

@@ -41,7 +41,10 @@ def test_openjd_checks_a_template_and_runs_its_steps_in_order(tmp_path, monkeypa
     said = openjd("run", template, "-p", f"Python={sys.executable}")
     steps = re.findall(r"Running step '(.*)'", said)
     assert steps == ["tap-short: run", "tap-short: frames of film", "tap-short: film", "page"]
-    assert re.findall(r"frames (\S+) of .*film.mp4 (.*)", said) == [("0+3", "drawn"), ("3+3", "drawn")]
+    assert re.findall(r"frames (\S+) of .*film.mp4 (.*)", said) == [
+        ("0+3", "drawn"),
+        ("3+3", "drawn"),
+    ]
     run = out / "runs" / "tap-short"
     files = json.loads((run / "timing.json").read_text(encoding="utf-8"))["files"]
     assert (run / "film.mp4").stat().st_size == files["film.mp4"] > 1000
@@ -56,8 +59,13 @@ def test_openjd_checks_a_template_and_runs_its_steps_in_order(tmp_path, monkeypa
 def test_a_step_whose_task_fails_stops_those_that_need_it(tmp_path):
     jobs = tmp_path / "two.toml"
     jobs.write_text(JOBS.replace("0.3", "0.05"), encoding="utf-8")
-    assert main(["batch", str(jobs), "--out", str(tmp_path / "out"), "--submit", "openjd", "--quiet"]) == 0
-    (tmp_path / "out" / "jobs" / "tap-short" / "scene.toml").write_text("name = 3\n", encoding="utf-8")
+    assert (
+        main(["batch", str(jobs), "--out", str(tmp_path / "out"), "--submit", "openjd", "--quiet"])
+        == 0
+    )
+    (tmp_path / "out" / "jobs" / "tap-short" / "scene.toml").write_text(
+        "name = 3\n", encoding="utf-8"
+    )
     template, program = tmp_path / "out" / "openjd.json", f"Python={sys.executable}"
     done = subprocess.run(
         [sys.executable, "-m", "openjd", "run", template, "-p", program],
@@ -85,7 +93,9 @@ def test_the_program_of_a_template_is_named_by_its_kind(program, name, tmp_path)
     jobs, out = tmp_path / "two.toml", tmp_path / "out"
     jobs.write_text(QUICK, encoding="utf-8")
     words = ["--program", program] if program else []
-    assert main(["batch", str(jobs), "--out", str(out), "--submit", "openjd", *words, "--quiet"]) == 0
+    assert (
+        main(["batch", str(jobs), "--out", str(out), "--submit", "openjd", *words, "--quiet"]) == 0
+    )
     openjd("run", out / "openjd.json", "-p", name)
     assert "1 of 1 jobs done." in (out / "index.html").read_text(encoding="utf-8")
 
@@ -96,6 +106,8 @@ def test_a_shell_executes_each_line_of_the_lists_of_cuecmd(tmp_path):
     assert main(["batch", str(jobs), "--out", str(out), "--submit", "cuecmd", "--quiet"]) == 0
     for path in sorted((out / "cuecmd").iterdir()):
         for line in path.read_text(encoding="utf-8").splitlines():
-            subprocess.run(line, shell=True, check=True, timeout=TIMEOUT, capture_output=True, cwd="/")
+            subprocess.run(
+                line, shell=True, check=True, timeout=TIMEOUT, capture_output=True, cwd="/"
+            )
     assert [path.name for path in (out / "runs").iterdir()] == ["tap-a"]
     assert "1 of 1 jobs done." in (out / "index.html").read_text(encoding="utf-8")

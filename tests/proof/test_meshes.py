@@ -110,13 +110,16 @@ def test_the_slicer_repairs_nothing(meshes, name):
     assert COMPLAINTS.findall(said) == []
 
 
-@pytest.mark.parametrize("name", ["bilinear/surface.stl", "smooth/surface.3mf", "bilinear/pins.stl"])
+@pytest.mark.parametrize(
+    "name", ["bilinear/surface.stl", "smooth/surface.3mf", "bilinear/pins.stl"]
+)
 def test_the_slicer_makes_g_code_without_a_warning(meshes, tmp_path, name):
     code = tmp_path / "surface.gcode"
     said = told("prusa-slicer", "--export-gcode", "--output", code, meshes / name)
     assert COMPLAINTS.findall(said) == []
     layers = [float(z) for z in re.findall(r"^;Z:([\d.]+)$", code.read_text(), re.MULTILINE)]
-    # 37.7 mm high, the spline a little more, in layers of 0.3 mm: the highest is within one of the top.
+    # 37.7 mm high, the spline a little more, in layers of 0.3 mm: the highest is within one of the
+    # top.
     assert layers == sorted(layers)
     assert max(layers) == pytest.approx(37.7, abs=1.0)
     assert len(layers) == pytest.approx(37.7 / 0.3, abs=4)

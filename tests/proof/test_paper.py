@@ -39,7 +39,9 @@ def claims(text):
 def test_every_file_the_page_names_is_there_and_nothing_else(folder, text):
     named = re.findall(r"\]\(([^)]+)\)", text)
     assert len(named) >= 16
-    assert sorted(path.name for path in folder.iterdir()) == sorted([*named, "paper.md", "metrics.json"])
+    assert sorted(path.name for path in folder.iterdir()) == sorted(
+        [*named, "paper.md", "metrics.json"]
+    )
 
 
 def test_every_figure_is_a_vector_file_with_lettered_panels_and_its_data_beside_it(folder):
@@ -78,14 +80,18 @@ def test_method_one_leaves_the_sections_asked_for_and_method_two_a_cross_with_a_
     assert [mound["rim"], mound["rim_by_pins"]] == pytest.approx([4.5e-3, 6.2e-3], abs=0.1e-3)
 
 
-def test_every_claim_has_numbers_those_of_the_metrics_a_verdict_and_a_reason_if_it_fails(text, numbers):
+def test_every_claim_has_numbers_those_of_the_metrics_a_verdict_and_a_reason_if_it_fails(
+    text, numbers
+):
     rows = claims(text)
     assert len(rows) == len(TEXTS["claim"])
     assert [row for row in rows if len(row) != 4 or not all(row[:3])] == []
     assert [row[0] for row in rows if not re.search(r"\d|never lost", row[1])] == []
     assert [row[0] for row in rows if row[2] != "**holds**" and not row[3]] == []
     assert re.findall(r"\b(?:nan|inf|None)\b", text) == []
-    one, two = (numbers["session"][method]["rfd_shaping"] for method in ("virtual_master", "cell_states"))
+    one, two = (
+        numbers["session"][method]["rfd_shaping"] for method in ("virtual_master", "cell_states")
+    )
     assert f"{one:.3g} and {two:.3g} N, ratio {two / one:.1f}" in text
 
 
@@ -93,7 +99,9 @@ def test_in_the_papers_own_windows_method_two_deviates_four_to_nine_times_as_muc
     # RFD, total force, height. Both windows together: the level of Method II differs between them.
     known = numbers["windows_of_the_paper"]
     for window, ratios in (("both", (4.5, 8.5, 5.5)), ("valley alone", (4.3, 1.5, 1.4))):
-        one, two = (list(known[method][window].values()) for method in ("virtual_master", "cell_states"))
+        one, two = (
+            list(known[method][window].values()) for method in ("virtual_master", "cell_states")
+        )
         assert np.array(two) / one == pytest.approx(ratios, abs=0.1)  # two digits are claimed
 
 
@@ -109,6 +117,8 @@ def test_the_page_sets_method_three_beside_the_others(text, numbers):
     table = text.split("## Method III")[1]
     row = next(line for line in table.splitlines() if line.startswith("| RFD in the session (N)"))
     shown = [float(cell) for cell in row.strip("|").split("|")[1:]]
-    assert shown == pytest.approx([known[method]["rfd"] for method in COMPARED], rel=5e-3)  # three digits
+    assert shown == pytest.approx(
+        [known[method]["rfd"] for method in COMPARED], rel=5e-3
+    )  # three digits
     # The goal of Method III on the session: at most half of Method I's.
     assert shown[2] < 0.5 * shown[0]

@@ -72,11 +72,14 @@ def test_the_indices_are_those_of_the_double_loop(scene, grid, tmp_path):
     for row in found:
         values = grid[..., NAMES.index(row["output"])]
         axis = [said.partition("=")[0] for said in VARIED].index(row["parameter"])
-        # First order: variance of the mean over the other one; total: what the other one alone leaves.
+        # First order: variance of the mean over the other one; total: what the other one alone
+        # leaves.
         alone = [np.var(values.mean(axis=1 - one)) / np.var(values) for one in (0, 1)]
         known = alone[axis] if row["order"] == "first" else 1.0 - alone[1 - axis]
         # A grid of 12 values misses about 1/144 of the variance along an axis.
-        assert float(row["index"]) == pytest.approx(known, abs=float(row["interval (95%, +-)"]) + 0.01), row
+        assert float(row["index"]) == pytest.approx(
+            known, abs=float(row["interval (95%, +-)"]) + 0.01
+        ), row
 
 
 def measure_hypervolume(front, worst):
@@ -91,11 +94,14 @@ def test_no_run_of_the_grid_is_beyond_the_front(scene, grid, tmp_path):
     every = grid.reshape(-1, 2)
     extent, worst = np.ptp(every, axis=0), every.max(axis=0)
     known = every[find_front(every)]
-    # As many runs as the grid has: none of these is better in both by more than 2 % of the grid's extent.
+    # As many runs as the grid has: none of these is better in both by more than 2 % of the grid's
+    # extent.
     gaps = [np.min(np.max((front - one) / extent, axis=1)) for one in known]
     assert max(gaps) < 0.02
     assert measure_hypervolume(front, worst) > 0.99 * measure_hypervolume(known, worst)
     # The search comes nearer: 0.003 instead of 0.08; told of other runs' outcomes it stays at 0.08.
     trials = read_values(tmp_path / "out" / "points.csv")[1:]
-    off = np.array([np.min(np.max((one - front) / extent, axis=1)) for one in trials]).reshape(5, 24)
+    off = np.array([np.min(np.max((one - front) / extent, axis=1)) for one in trials]).reshape(
+        5, 24
+    )
     assert np.median(off[-1]) < np.median(off[0]) / 3.0

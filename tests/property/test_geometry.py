@@ -21,7 +21,9 @@ AROUND = np.linspace(0, 2 * np.pi, 12, endpoint=False)
 def random_poses(count):
     turns = RANDOM.normal(size=(count, 4))
     turns /= np.linalg.norm(turns, axis=1, keepdims=True)
-    return np.column_stack([RANDOM.uniform(-20e-3, 20e-3, (count, 2)), RANDOM.uniform(0, 0.1, count), turns])
+    return np.column_stack(
+        [RANDOM.uniform(-20e-3, 20e-3, (count, 2)), RANDOM.uniform(0, 0.1, count), turns]
+    )
 
 
 def cut(pose, axes, x, y):
@@ -53,10 +55,14 @@ def test_the_underside_is_where_a_vertical_ray_meets_the_ellipsoid(axes):
         for square in (0.0, 0.3, 0.8, 0.95):
             x, y = within(outline, square, RANDOM.uniform(0, 2 * np.pi, 3))
             rays = [cut(pose, axes, *point) for point in zip(x, y, strict=True)]
-            assert under(outline[None], x, y)[0] == pytest.approx(rays, abs=1e-14)  # rounding of 0.1 m
+            assert under(outline[None], x, y)[0] == pytest.approx(
+                rays, abs=1e-14
+            )  # rounding of 0.1 m
     # Opposite quaternions are the same finger.
     assert np.array_equal(finger.outline(poses), finger.outline(poses * [1, 1, 1, -1, -1, -1, -1]))
-    assert np.isfinite(under(finger.outline(poses), np.array([1.0, -100.0]), np.array([0.0, 100.0]))).all()
+    assert np.isfinite(
+        under(finger.outline(poses), np.array([1.0, -100.0]), np.array([0.0, 100.0]))
+    ).all()
 
 
 def test_height_and_slope_are_continuous_at_the_join_and_beyond_it_the_underside_rises_on():
@@ -71,7 +77,10 @@ def test_height_and_slope_are_continuous_at_the_join_and_beyond_it_the_underside
         # Curvature near the rim, some 1e5 1/m, times 1 nm; rounding 1e-17/1e-9.
         assert np.abs(after - at - (at - before)).max() < 1e-3 * np.abs(at - before).max()
         dx, dy = x - outline[0], y - outline[1]
-        rays = [under(outline[None], outline[0] + s * dx, outline[1] + s * dy)[0] for s in (1.5, 2, 3, 5)]
+        rays = [
+            under(outline[None], outline[0] + s * dx, outline[1] + s * dy)[0]
+            for s in (1.5, 2, 3, 5)
+        ]
         assert np.diff(rays, axis=0).min() > 0.0
 
 
@@ -101,7 +110,8 @@ def test_beyond_its_reach_the_underside_is_above_the_peak(finger, spot, turn, pe
 @given(fingers, spots, turns, st.floats(0.0, 6.3), st.floats(0.0, 0.1))
 def test_no_point_of_the_underside_is_below_the_position(finger, spot, turn, angle, radius):
     outline = finger.outline(pose(spot, turn)[None])
-    # A disc-like finger tilted so far that it stands on its rim: there the paraboloid has taken over.
+    # A disc-like finger tilted so far that it stands on its rim: there the paraboloid has taken
+    # over.
     dx, dy = spot[0] - outline[0, 0], spot[1] - outline[0, 1]
     assume(outline[0, 3] * dx * dx + 2 * outline[0, 4] * dx * dy + outline[0, 5] * dy * dy < JOIN)
     x, y = spot[0] + radius * np.cos(angle), spot[1] + radius * np.sin(angle)
@@ -110,7 +120,9 @@ def test_no_point_of_the_underside_is_below_the_position(finger, spot, turn, ang
 
 
 @given(fingers, spots, turns, spots, spots)
-def test_the_window_has_every_cell_the_finger_could_touch_within_a_period(finger, start, turn, middle, end):
+def test_the_window_has_every_cell_the_finger_could_touch_within_a_period(
+    finger, start, turn, middle, end
+):
     poses = np.array([pose(spot, turn) for spot in (start, middle, end)])
     outline, peak = finger.outline(poses), 40e-3
     disc = compute_reach(trace_finger(finger, poses[None]).at(0).window, peak)
@@ -120,7 +132,11 @@ def test_the_window_has_every_cell_the_finger_could_touch_within_a_period(finger
 
 
 #: Distance of rows and shift of odd ones, in pitches.
-ARRANGEMENTS = {"aligned": (1.0, 0.0), "staggered": (1.0, 0.5), "hexagonal": (math.sqrt(3) / 2, 0.5)}
+ARRANGEMENTS = {
+    "aligned": (1.0, 0.0),
+    "staggered": (1.0, 0.5),
+    "hexagonal": (math.sqrt(3) / 2, 0.5),
+}
 
 
 @pytest.mark.parametrize("arrangement", ARRANGEMENTS)
@@ -130,7 +146,9 @@ def test_the_cells_stand_row_by_row_a_pitch_apart(arrangement):
     assert np.diff(table[:, :, 0], axis=1) == pytest.approx(3e-3, abs=1e-17)
     assert np.ptp(table[:, :, 1], axis=1).max() == 0.0
     assert np.diff(table[:, 0, 1]) == pytest.approx(spacing, abs=1e-17)
-    assert table[:, 0, 0] - table[0, 0, 0] == pytest.approx([0.0, shift, 0.0, shift, 0.0], abs=1e-17)
+    assert table[:, 0, 0] - table[0, 0, 0] == pytest.approx(
+        [0.0, shift, 0.0, shift, 0.0], abs=1e-17
+    )
 
 
 @pytest.mark.parametrize("arrangement", ARRANGEMENTS)
@@ -142,7 +160,12 @@ def test_the_bed_is_centered_on_the_origin(arrangement, shape):
 
 @pytest.mark.parametrize(
     "arrangement, corners, farthest",
-    [("aligned", True, 1.5), ("aligned", False, 1.1), ("staggered", True, 1.2), ("hexagonal", False, 1.1)],
+    [
+        ("aligned", True, 1.5),
+        ("aligned", False, 1.1),
+        ("staggered", True, 1.2),
+        ("hexagonal", False, 1.1),
+    ],
 )
 def test_neighbors_are_the_nearest_cells_counter_clockwise(arrangement, corners, farthest):
     layout = Layout(5, 6, 3e-3, arrangement)
@@ -151,7 +174,9 @@ def test_neighbors_are_the_nearest_cells_counter_clockwise(arrangement, corners,
         near = [other for other in beside if other >= 0]
         away = np.hypot(x - x[cell], y - y[cell])
         assert sorted([cell, *near]) == np.flatnonzero(away < farthest * 3e-3).tolist()
-        assert np.all(np.diff(np.arctan2(y[near] - y[cell], x[near] - x[cell]) % (2.0 * np.pi)) > 0.0)
+        assert np.all(
+            np.diff(np.arctan2(y[near] - y[cell], x[near] - x[cell]) % (2.0 * np.pi)) > 0.0
+        )
 
 
 SMALL, LARGE, ASIDE = (1e-3, 0.0, 2e-3), (0.0, 0.0, 3e-3), (2e-3, 0.0, 2e-3)
@@ -209,7 +234,9 @@ def test_a_disc_has_all_cells_within_its_radius_and_bounds_hold_it_closely(layou
 
 
 @given(layouts)
-def test_no_two_cells_are_closer_than_a_pitch_and_the_basis_has_the_powers_of_their_positions(layout):
+def test_no_two_cells_are_closer_than_a_pitch_and_the_basis_has_the_powers_of_their_positions(
+    layout,
+):
     bed = make_grid(layout)
     gaps = np.hypot(bed.x - bed.x[:, None], bed.y - bed.y[:, None])
     np.fill_diagonal(gaps, 1.0)

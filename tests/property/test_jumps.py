@@ -18,13 +18,27 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from benchmarks.stiff import strict
-from tests.assemble import Motion, assert_near, make_system, one_cell, path, record, sample, scripted, under
+from tests.assemble import (
+    Motion,
+    assert_near,
+    make_system,
+    one_cell,
+    path,
+    record,
+    sample,
+    scripted,
+    under,
+)
 
 PERIODS = (1e-3, 5e-3, 20e-3, 50e-3)
 STEPPERS = st.sampled_from(["bernoulli", "richardson"])
 #: Millimeters from where the finger stood: a little, the width of the bed, far beyond it.
-far = st.one_of(st.integers(-5, 5), st.integers(-100, 100), st.sampled_from([-1000, 0, 1000])).map(float)
-deep = st.one_of(st.integers(-8, 4), st.integers(-100, 100), st.sampled_from([-1000, 1000])).map(float)
+far = st.one_of(st.integers(-5, 5), st.integers(-100, 100), st.sampled_from([-1000, 0, 1000])).map(
+    float
+)
+deep = st.one_of(st.integers(-8, 4), st.integers(-100, 100), st.sampled_from([-1000, 1000])).map(
+    float
+)
 straight = st.just(0.0)
 #: Milliseconds until the next place, and the place.
 jumps = st.lists(st.tuples(st.sampled_from([1, 5, 20, 50]), far, far, deep), min_size=3, max_size=6)
@@ -59,7 +73,11 @@ def waypoints(spots, turn=LEVEL):
     """Return the places of a finger over pins 40 mm high; at every other one it has turned."""
     times = np.cumsum([0, *(after for after, *_ in spots[1:])]) * 1e-3
     return tuple(
-        Waypoint(float(time), (x * 1e-3, y * 1e-3, 40e-3 + z * 1e-3), (1.0, *(i % 2 * one for one in turn)))
+        Waypoint(
+            float(time),
+            (x * 1e-3, y * 1e-3, 40e-3 + z * 1e-3),
+            (1.0, *(i % 2 * one for one in turn)),
+        )
         for i, (time, (_, x, y, z)) in enumerate(zip(times, spots, strict=True))
     )
 
@@ -96,8 +114,12 @@ def assert_within_reach(system, height, *fingers):
     assert height.max() <= system.cell.actuator.stroke
     for period, (before, after) in enumerate(pairwise(height)):
         poses = [finger.poses(period * system.period + system.instants) for finger in fingers]
-        outlines = [touch.fingertip.outline(each) for touch, each in zip(touches, poses, strict=True)]
-        unders = np.min([under(outline, system.grid.x, system.grid.y) for outline in outlines], axis=0)
+        outlines = [
+            touch.fingertip.outline(each) for touch, each in zip(touches, poses, strict=True)
+        ]
+        unders = np.min(
+            [under(outline, system.grid.x, system.grid.y) for outline in outlines], axis=0
+        )
         lowest, highest = find_speeds(system.cell).reach(before, unders, system.period)
         # Rounding: the undersides are taken over another sum here.
         assert (after >= lowest - 1e-12).all()
@@ -128,19 +150,34 @@ def test_no_jump_moves_what_is_shut_or_takes_a_pin_where_none_can_be(
 
 
 #: Of fingers: all alike, or one with a law of its own.
-contacts = st.sampled_from([{}, {"contact": Contact(exponent=2e4)}, {"contact": Contact(1e3, 700.0)}])
+contacts = st.sampled_from(
+    [{}, {"contact": Contact(exponent=2e4)}, {"contact": Contact(1e3, 700.0)}]
+)
 PRESSED = [(5, 1.0, 0.0, 1.0), (50, 1.0, 0.0, -3.0), (50, 1.0, 0.0, -2.0), (50, 1.0, 0.0, -2.0)]
-#: Millimeters of the place, and milliseconds: 47 mm sideways in 2 ms of a step, to pins that another presses.
+#: Millimeters of the place, and milliseconds: 47 mm sideways in 2 ms of a step, to pins that
+#: another presses.
 BESIDE = [(1, -46.0, 1.0, -3.5), (75, -46.0, 1.0, -3.5), (2, 1.0, 1.0, -3.5), (50, 1.0, 1.0, -3.5)]
 
 
 @settings(max_examples=15)
 @given(
-    st.lists(jumps, min_size=2, max_size=3), turns, beds, parts, contacts, st.sampled_from(PERIODS), STEPPERS
+    st.lists(jumps, min_size=2, max_size=3),
+    turns,
+    beds,
+    parts,
+    contacts,
+    st.sampled_from(PERIODS),
+    STEPPERS,
 )
 @example([PRESSED, BESIDE], LEVEL, Layout(5, 5), {}, {}, 5e-3, "bernoulli")
 @example(
-    [PRESSED, BESIDE, DOWN], LEVEL, Layout(5, 5), {}, {"contact": Contact(exponent=2e4)}, 5e-3, "bernoulli"
+    [PRESSED, BESIDE, DOWN],
+    LEVEL,
+    Layout(5, 5),
+    {},
+    {"contact": Contact(exponent=2e4)},
+    5e-3,
+    "bernoulli",
 )
 def test_no_jump_of_several_fingers_takes_a_pin_where_none_can_be(
     hand, turn, bed, changes, own, period, stepper
@@ -161,11 +198,14 @@ def test_the_adaptive_stepper_withstands_jumps(spots, turn, period):
 def test_a_stack_withstands_jumps(several, stepper):
     # Each run with a pulp of its own; all valves of the last one shut.
     stiff = (
-        sample("tap", f"simulation.stepper={stepper}", f"contact.stiffness={250 + 50 * i}") for i in range(3)
+        sample("tap", f"simulation.stepper={stepper}", f"contact.stiffness={250 + 50 * i}")
+        for i in range(3)
     )
     scenes = [taken(one, waypoints(spots)) for one, spots in zip(stiff, several, strict=False)]
     shut = [replace(one, control=None, blister=None) for one in scenes]
-    for scene, height, still in zip(scenes, stacked(scenes, "height"), stacked(shut, "height"), strict=True):
+    for scene, height, still in zip(
+        scenes, stacked(scenes, "height"), stacked(shut, "height"), strict=True
+    ):
         assert_within_reach(assemble(scene), height, scene.section("trajectory").trajectory())
         assert np.all(still == 40e-3)
 
@@ -178,7 +218,8 @@ def test_a_stack_withstands_jumps(several, stepper):
 def test_no_pin_goes_farther_than_its_own_valve_lets_it_under_the_largest_load(
     spots, opening, smaller, viscosity
 ):
-    # A valve that does not lag, and one opening all along: what flows under the largest load is known.
+    # A valve that does not lag, and one opening all along: what flows under the largest load is
+    # known.
     opening *= 10.0**-smaller
     system = one_cell(
         dead_time=0.0,
@@ -195,11 +236,15 @@ def test_no_pin_goes_farther_than_its_own_valve_lets_it_under_the_largest_load(
         k = np.array([opening])
         free = cell.flow.flow(k, cell.supply.pressure(k))[0] * 5e-3 / cell.actuator.area
         deepest = run.height[i] + max(free, 0.0) - low.min()
-        load = cell.actuator.pressure(cell.touch.contact.share * cell.touch.contact.tension(deepest))
+        load = cell.actuator.pressure(
+            cell.touch.contact.share * cell.touch.contact.tension(deepest)
+        )
         loaded = cell.flow.flow(k, cell.supply.pressure(k) - load)[0] * 5e-3 / cell.actuator.area
         gone = run.height[i + 1, 0] - run.height[i, 0]
         # A turbulent valve: its opening law is taken at mid load; 1e-15 is rounding.
-        assert min(loaded, 0.0) * (1.0 + 1e-9) - 1e-15 <= gone <= max(free, 0.0) * (1.0 + 1e-9) + 1e-15
+        assert (
+            min(loaded, 0.0) * (1.0 + 1e-9) - 1e-15 <= gone <= max(free, 0.0) * (1.0 + 1e-9) + 1e-15
+        )
 
 
 #: Places well above the pins, at any distance.
@@ -223,7 +268,9 @@ def test_a_finger_that_passed_above_all_pins_presses_as_one_that_begins_there(x)
     press = [(50, 0.0, 0.0, 20.0), (50, 0.0, 0.0, 0.5), (50, 0.0, 0.0, -3.0), (50, 0.0, 0.0, -3.0)]
     soft, stiff = (sample("tap", f"contact.stiffness={stiffness}") for stiffness in (250, 300))
     known = [replace(one, control=None, blister=None) for one in (soft, stiff)]
-    passed, began = ([taken(one, waypoints(places)) for one in known] for places in (spots + press, press))
+    passed, began = (
+        [taken(one, waypoints(places)) for one in known] for places in (spots + press, press)
+    )
     for after, force in zip(stacked(passed, "force"), stacked(began, "force"), strict=True):
         assert force[-1].max() > 0.1
         # The times at which they press are rounded otherwise.
@@ -232,7 +279,8 @@ def test_a_finger_that_passed_above_all_pins_presses_as_one_that_begins_there(x)
 
 @pytest.mark.parametrize("opening, swing", [(-0.5, 0.2), (0.5, 0.2), (1.0, 0.2), (1.0, 1.0)])
 def test_a_pin_moves_beside_one_near_overflow_as_beside_one_that_is_not(opening, swing):
-    # A step is a quarter of the finger's swing: its way bends. It meets and leaves the pin in each swing.
+    # A step is a quarter of the finger's swing: its way bends. It meets and leaves the pin in each
+    # swing.
     contact, control = Contact(exponent=2e4), scripted(lambda t, x, y: opening)
     system = make_system(Layout(1, 2), step=5e-3, contact=contact, control=control)
     finger = Motion(lambda t: 39.95e-3 + 1e-3 * swing * np.sin(2.0 * np.pi * t / 20e-3))

@@ -39,23 +39,30 @@ from tests.assemble import path
 
 #: Numbers, those at the ends of what there is and beyond among them; and what is no number.
 NUMBERS = st.one_of(
-    st.floats(), st.integers(), st.sampled_from([1e-9, 1e-6, 1e-3, 0.5, 1e3, 10**309, -(10**400), True])
+    st.floats(),
+    st.integers(),
+    st.sampled_from([1e-9, 1e-6, 1e-3, 0.5, 1e3, 10**309, -(10**400), True]),
 )
 OTHERS = st.one_of(
     st.text(max_size=3),
     st.lists(NUMBERS, max_size=4),
     st.dictionaries(st.just("a"), NUMBERS),
     st.none(),
-    st.sampled_from(["1e400 mm", "5e-324 mm", "-1 mm", "nan s", "inf Pa", "1 parsec", "absent", "é" * 50]),
+    st.sampled_from(
+        ["1e400 mm", "5e-324 mm", "-1 mm", "nan s", "inf Pa", "1 parsec", "absent", "é" * 50]
+    ),
 )
 #: Types of arrays that no file of ours has.
 TYPES = st.sampled_from(
     ["M8[s]", "m8[s]", "c16", "U3", "S2", "?", "i8", "u1", "f4", "f2", "f16", ">f8", "V8", "f4,i4"]
 )
-#: Most cells and control periods of a session that is begun, and numbers of a row that it announces.
+#: Most cells and control periods of a session that is begun, and numbers of a row that it
+#: announces.
 CELLS, PERIODS, RECORDED = 200, 3, 1_000_000
 #: One of so many is true.
-OFTEN, SELDOM, RARELY = (st.integers(0, last).map(lambda number: number == 0) for last in (1, 3, 19))
+OFTEN, SELDOM, RARELY = (
+    st.integers(0, last).map(lambda number: number == 0) for last in (1, 3, 19)
+)
 POSE = [0.0, 0.0, 37e-3, 1.0, 0.0, 0.0, 0.0]
 
 
@@ -105,7 +112,9 @@ def make_tables(draw):
     if draw(SELDOM):
         # The same finger none, one or two times in a list.
         finger = {section: tables.pop(section) for section in FINGER_SECTIONS if section in tables}
-        tables[FINGERS] = make_odd(draw, [finger]) if draw(OFTEN) else [finger] * draw(st.integers(0, 2))
+        tables[FINGERS] = (
+            make_odd(draw, [finger]) if draw(OFTEN) else [finger] * draw(st.integers(0, 2))
+        )
     return tables
 
 
@@ -144,7 +153,9 @@ def begin_scene(draw):
 @cache
 def press_half(method):
     """Return a small bed under a method, and its state in the middle of a press."""
-    system = assemble(resolve({"layout": {"rows": 6, "columns": 10}, "control": {"method": method}}))
+    system = assemble(
+        resolve({"layout": {"rows": 6, "columns": 10}, "control": {"method": method}})
+    )
     *_, last = periods(system, [path((0, 0, 0, 42), (0.2, 0, 0, 37))], begin(system), 50)
     return system, snapshot.dump(system, last)
 
@@ -184,7 +195,9 @@ def go_on(draw):
     for take_up in (snapshot.load, snapshot.transfer_heights):
         state = take_up(system, spoil_state(draw, data))
         for _ in range(PERIODS):
-            (trace,) = trace_fingers(system, interpolate_poses(finger, system.instants / system.period))
+            (trace,) = trace_fingers(
+                system, interpolate_poses(finger, system.instants / system.period)
+            )
             state = advance(system, state, trace)
         snapshot.dump(system, state)
 
@@ -209,7 +222,9 @@ def spoil_array(draw, usual):
 
 def pack(draw, arrays):
     """Return arrays as a file .npz, some of them odd, or their heads."""
-    for name in draw(st.lists(st.sampled_from(sorted(arrays)), min_size=1, max_size=2, unique=True)):
+    for name in draw(
+        st.lists(st.sampled_from(sorted(arrays)), min_size=1, max_size=2, unique=True)
+    ):
         arrays = arrays | {name: spoil_array(draw, arrays[name])}
     heads = ((b"False", b"True "), (b"), }", b"L),}"), (b"descr", b"descx"), (b"<f8", b"<M8"))
     file = io.BytesIO()
@@ -273,7 +288,8 @@ def test_what_is_odd_is_taken_or_refused_in_one_line(use, count):
         refusals.append(refusal)
 
     check()
-    # Neither is everything refused, nor is everything taken: the cases reach beyond the first check.
+    # Neither is everything refused, nor is everything taken: the cases reach beyond the first
+    # check.
     assert 0.02 < refusals.count("") / len(refusals) < 0.98
 
 
@@ -306,7 +322,9 @@ def test_a_number_beyond_all_devices_is_refused_with_its_bound(key, value, said)
         ("", "must increase from waypoint to waypoint by at least 1e-09 s"),
     ],
 )  # fmt: skip
-def test_steps_whose_plan_would_fill_the_memory_and_waypoints_at_one_time_are_refused(settings, said):
+def test_steps_whose_plan_would_fill_the_memory_and_waypoints_at_one_time_are_refused(
+    settings, said
+):
     points = [{"time": time, "position": [0, 0, 0.046]} for time in (0.0, 5e-324, 1.0)]
     stepper, _, step = settings.partition(" ")
     simulation = {"simulation": {"stepper": stepper, "physics_step": float(step or 1.0)}}

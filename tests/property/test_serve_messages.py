@@ -17,14 +17,18 @@ from digiclay_serve.websocket_door import read_wishes
 from tests.served import load_example
 
 numbers = st.floats(allow_nan=False, allow_infinity=False)
-poses = st.lists(numbers, min_size=7, max_size=7).filter(lambda one: 1e-6 < math.hypot(*one[3:]) < math.inf)
+poses = st.lists(numbers, min_size=7, max_size=7).filter(
+    lambda one: 1e-6 < math.hypot(*one[3:]) < math.inf
+)
 whole = st.integers(0, 2**32 - 1)
 heights = st.lists(st.floats(0.0, 0.09375, width=32), min_size=1, max_size=30)
 
 
 def frame_of(pose, values, flags, who):
     pins, fingers = np.array(values, np.float32), tuple((one, 0.25, tuple(pose)) for one in who)
-    return protocol.Frame(2**40, 2**32 - 1, 12.5, 0.75, np.array(pose), pins, 2 * pins, flags, fingers)
+    return protocol.Frame(
+        2**40, 2**32 - 1, 12.5, 0.75, np.array(pose), pins, 2 * pins, flags, fingers
+    )
 
 
 def refusal(read, data):
@@ -53,7 +57,9 @@ who = st.lists(whole | st.just(-1), max_size=32)
 )
 def test_a_frame_is_read_as_it_was_written_in_all_formats(frame, errors):
     packed = protocol.pack_frame(frame)
-    older = protocol.unpack_frame(packed[: -protocol.ERRORS.size])  # of a server that knew no errors
+    older = protocol.unpack_frame(
+        packed[: -protocol.ERRORS.size]
+    )  # of a server that knew no errors
     assert (older.errors, older.fingers, older.time) == (None, frame.fingers, frame.time)
     frame = replace(frame, errors=errors)
     read = protocol.unpack_frame(protocol.pack_frame(frame))
@@ -61,7 +67,11 @@ def test_a_frame_is_read_as_it_was_written_in_all_formats(frame, errors):
     said = json.loads(protocol.format_frame(frame))
     datagrams = [OscMessage(one) for one in format_osc_frame(frame, "pins")]
     told = {one.address.removeprefix("/digiclay/"): one.params for one in datagrams}
-    assert next(iter(told.items())) == ("flags", [2**40, frame.flags]) == ("flags", [2**40, read.flags])
+    assert (
+        next(iter(told.items()))
+        == ("flags", [2**40, frame.flags])
+        == ("flags", [2**40, read.flags])
+    )
     assert (said["height_error"], said["force_error"]) == (errors or (None, None))
     assert told.get("errors", [2**40])[1:] == list(errors or ())
     there = [finger for finger in frame.fingers if finger[0] >= 0]  # -1: nobody has it
@@ -70,14 +80,19 @@ def test_a_frame_is_read_as_it_was_written_in_all_formats(frame, errors):
         value for one, *rest in there for value in (one, rest[0], *rest[1])
     ]
     named = [
-        (one["id"], one["force"], (*one["position"], *one["orientation"])) for one in said.get("fingers", [])
+        (one["id"], one["force"], (*one["position"], *one["orientation"]))
+        for one in said.get("fingers", [])
     ]
     assert named == there
     assert said["flags"] == [flag.name.lower() for flag in protocol.Flag if frame.flags & flag]
     state = told["state"]
     scalars = [said[name] for name in ("period", "number", "time", "total_force")]
     plain = (*scalars, *said["position"], *said["orientation"])
-    for found in ((read.period, read.number, read.time, read.total_force, *read.pose), plain, tuple(state)):
+    for found in (
+        (read.period, read.number, read.time, read.total_force, *read.pose),
+        plain,
+        tuple(state),
+    ):
         assert found == (2**40, 2**32 - 1, 12.5, 0.75, *frame.pose)
     np.testing.assert_array_equal(read.heights, frame.heights)
     np.testing.assert_array_equal(read.forces, frame.forces)
@@ -93,10 +108,16 @@ keys = st.sampled_from(["type", "version", "position", "orientation", "number", 
 @settings(max_examples=50)
 @given(
     st.one_of(st.binary(max_size=100), st.binary(max_size=80).map(lambda end: b"DC\1\2" + end)),
-    st.one_of(st.text(max_size=30), st.dictionaries(keys, anything | st.just("pose")).map(json.dumps)),
+    st.one_of(
+        st.text(max_size=30), st.dictionaries(keys, anything | st.just("pose")).map(json.dumps)
+    ),
 )
 def test_any_bytes_text_or_address_is_a_request_or_refused_in_one_line(data, text):
-    readers = (protocol.read_binary, protocol.unpack_frame, lambda data: read_request(*read_osc(data)[1:]))
+    readers = (
+        protocol.read_binary,
+        protocol.unpack_frame,
+        lambda data: read_request(*read_osc(data)[1:]),
+    )
     said = [refusal(read, data) for read in readers]
     said += [refusal(protocol.read_json, text)]
     said += [refusal(check_rate, address) for address in (text, f"/?{text}", f"/?rate={text}")]

@@ -41,12 +41,16 @@ def tilted(path, turn):
 
 def bed(stepper="bernoulli", **parts):
     """Return a small bed under Method I; Runge and Kutta's steps are short enough for a deep press."""
-    return make_system(CELLS, stepper=stepper, step=0.25e-3 if stepper != "bernoulli" else 1e-3, **parts)
+    return make_system(
+        CELLS, stepper=stepper, step=0.25e-3 if stepper != "bernoulli" else 1e-3, **parts
+    )
 
 
 @settings(max_examples=5)
 @given(points, turns, st.floats(0.0, 100.0), steppers)
-@example([(0.0, 0.0, 45.0), (0.0, 0.0, 36.0), (9.0, 3.0, 38.0)], (0.0, 0.0, 0.0), 40.0, "runge_kutta_4")
+@example(
+    [(0.0, 0.0, 45.0), (0.0, 0.0, 36.0), (9.0, 3.0, 38.0)], (0.0, 0.0, 0.0), 40.0, "runge_kutta_4"
+)
 def test_a_session_is_finite_within_the_stroke_without_pull_and_its_commands_are_openings(
     spots, turn, rest, stepper
 ):
@@ -95,14 +99,19 @@ def test_a_session_twice_or_interrupted_is_the_same_session_bit_for_bit(spots, w
 
 commands = st.lists(st.floats(-1.0, 1.0), min_size=6, max_size=6)
 #: A laminar valve, and one that is turbulent in between.
-valves = st.sampled_from([{}, {"valve": Valve(orifice_diameter=0.8e-3), "fluid": Fluid(760.0, 0.65e-6)}])
+valves = st.sampled_from(
+    [{}, {"valve": Valve(orifice_diameter=0.8e-3), "fluid": Fluid(760.0, 0.65e-6)}]
+)
 
 
 @settings(max_examples=10)
 @given(commands, valves)
 def test_the_fluid_pumped_is_what_the_pin_rose_by(script, parts):
-    # Flow of the exact opening by a fine sum, through the law itself; no load, no end stop, no dead time.
-    system = one_cell(dead_time=0.0, control=scripted(lambda t, x, y: script[round(t / 5e-3)]), **parts)
+    # Flow of the exact opening by a fine sum, through the law itself; no load, no end stop, no dead
+    # time.
+    system = one_cell(
+        dead_time=0.0, control=scripted(lambda t, x, y: script[round(t / 5e-3)]), **parts
+    )
     run = record(system, make_level(np.zeros(1), np.array([[0, 0, 1.0]])), len(script))
     opening, volume, count = 0.0, 0.0, 1000
     dt = 5e-3 / count
@@ -112,8 +121,9 @@ def test_the_fluid_pumped_is_what_the_pin_rose_by(script, parts):
         volume += system.cell.flow.flow(k, system.cell.supply.pressure(k)).sum() * dt
         opening = command + (opening - command) * np.exp(-2.5)
     way = run.height[-1, 0] - run.height[0, 0]
-    # Two Gauss points a millisecond: 1e-5 of the way where all is smooth; where the opening changes sign or
-    # the flow turns turbulent within a step, up to a thousandth of what a pin can rise in a period.
+    # Two Gauss points a millisecond: 1e-5 of the way where all is smooth; where the opening changes
+    # sign or the flow turns turbulent within a step, up to a thousandth of what a pin can rise in a
+    # period.
     assert system.cell.actuator.area * way == pytest.approx(
         volume, abs=1e-3 * system.cell.actuator.area * system.fastest * system.period
     )
@@ -152,7 +162,9 @@ class Everywhere:
     (-9.1, 12.0, 54.9), (-10.0, 2.3, 49.7),
 ])  # fmt: skip
 def test_integrating_only_the_cells_that_move_gives_what_integrating_all_does(spots):
-    trajectory = make_level(np.linspace(0.0, PERIODS * BED.period, len(spots)), np.array(spots) * 1e-3)
+    trajectory = make_level(
+        np.linspace(0.0, PERIODS * BED.period, len(spots)), np.array(spots) * 1e-3
+    )
     fewer = record(BED, trajectory, PERIODS)
     all_cells = record(replace(BED, controller=Everywhere(BED.controller)), trajectory, PERIODS)
     assert all_cells.last.active.cells.size == BED.grid.count
@@ -167,11 +179,14 @@ def test_integrating_only_the_cells_that_move_gives_what_integrating_all_does(sp
         (9, [(0, 0, 0, 200), (1, 5, 5, 200)], 20, 0, 0),  # far above
         # At rest. The servo's flow goes with the error squared, so coming to rest takes some 20 s.
         (9, [(0, 0, 0, 45), (0.3, 0, 0, 36), (0.6, 0, 0, 60)], 6000, 0, 0),
-        # Rows and columns that hold the disc to the edge ring, with a pitch to spare on every side: 15 x 15.
+        # Rows and columns that hold the disc to the edge ring, with a pitch to spare on every side:
+        # 15 x 15.
         (25, [(0, 0, 0, 45), (0.3, 0, 0, 36)], 60, 21, 15 * 15),
     ],
 )
-def test_only_cells_around_a_touch_are_integrated_until_the_surface_is_at_rest(side, way, count, least, most):
+def test_only_cells_around_a_touch_are_integrated_until_the_surface_is_at_rest(
+    side, way, count, least, most
+):
     run = record(make_system(Layout(side, side), control=VirtualMaster()), path(*way), count)
     assert np.any(run.height[-1] != 40e-3) == (count > 20)
     assert least <= run.last.active.cells.size <= most
@@ -186,7 +201,8 @@ def test_pins_that_rise_into_a_still_finger_meet_it_at_once():
     assert np.array_equal(run.force[:, 40] > 0.0, touching)
 
 
-#: Press, lift, drag, lift off: off the cells' axes, tilted. Time, x, y, z in mm, then the quaternion.
+#: Press, lift, drag, lift off: off the cells' axes, tilted. Time, x, y, z in mm, then the
+#: quaternion.
 WAYPOINTS = np.array(
     [
         (0.0, -5.3, 3.1, 42.0, 0.97, 0.1, 0.2, 0.0), (0.25, -5.3, 3.1, 35.5, 0.97, 0.1, 0.2, 0.0),
@@ -196,7 +212,10 @@ WAYPOINTS = np.array(
 )  # fmt: skip
 MIDDLE = WAYPOINTS * [1, 0, 0, 1, 1, 0, 0, 0]
 #: What a mirror across x, or across y, makes of a waypoint.
-MIRRORED_X, MIRRORED_Y = np.array([1, -1, 1, 1, 1, 1, -1, -1]), np.array([1, 1, -1, 1, 1, -1, 1, -1])
+MIRRORED_X, MIRRORED_Y = (
+    np.array([1, -1, 1, 1, 1, 1, -1, -1]),
+    np.array([1, 1, -1, 1, 1, -1, 1, -1]),
+)
 
 
 def turned(points):
@@ -213,8 +232,18 @@ CASES = {
     "mirrored, odd": ("aligned", (11, 11), lambda p: p * MIRRORED_X, lambda h: h[:, :, ::-1]),
     "rotated by 90": ("aligned", (11, 11), turned, lambda h: h.transpose(0, 2, 1)[:, :, ::-1]),
     "rotated by 180": ("aligned", (9, 12), lambda p: turned(turned(p)), lambda h: h[:, ::-1, ::-1]),
-    "hexagonal, mirrored": ("hexagonal", (11, 12), lambda p: p * MIRRORED_Y, lambda h: h[:, ::-1, :]),
-    "staggered, rotated": ("staggered", (10, 12), lambda p: turned(turned(p)), lambda h: h[:, ::-1, ::-1]),
+    "hexagonal, mirrored": (
+        "hexagonal",
+        (11, 12),
+        lambda p: p * MIRRORED_Y,
+        lambda h: h[:, ::-1, :],
+    ),
+    "staggered, rotated": (
+        "staggered",
+        (10, 12),
+        lambda p: turned(turned(p)),
+        lambda h: h[:, ::-1, ::-1],
+    ),
 }
 
 
@@ -240,6 +269,7 @@ def test_a_moved_scene_gives_the_moved_result(case, points, profile):
     height, force = formed(arrangement, shape, points, profile)
     moved_height, moved_force = formed(arrangement, shape, points_moved(points), profile)
     assert np.ptp(height[-1]) > 1e-3
-    # Rounding of positions, 1e-17 m, through 260 periods of a closed loop; forces grow e-fold in 0.5 mm.
+    # Rounding of positions, 1e-17 m, through 260 periods of a closed loop; forces grow e-fold in
+    # 0.5 mm.
     assert np.abs(moved_height - cells_moved(height)).max() < 1e-12
     assert np.abs(moved_force - cells_moved(force)).max() < 1e-10

@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 
 from tests.prisms import prism_volume
 
-#: Volumes are sums of up to 1e4 terms, the largest about 100 times the result: rounding stays below this.
+#: Volumes are sums of up to 1e4 terms, the largest about 100 times the result: rounding stays below
+#: this.
 ROUNDING = 1e-9
 
 
@@ -58,7 +59,8 @@ def test_the_solid_is_closed_in_one_piece_without_handles_and_of_the_volume_of_i
     # Positive also says that the normals point outward.
     assert mesh.volume == pytest.approx(volume(*case), rel=ROUNDING)
     assert volume(*case) > 0.0
-    # The mirror image of a shifted layout is no layout, so the positions are mirrored with the heights.
+    # The mirror image of a shifted layout is no layout, so the positions are mirrored with the
+    # heights.
     mirrored = made(*case, mirror=-1.0)
     assert mirrored.is_winding_consistent
     assert mirrored.volume == pytest.approx(mesh.volume, rel=ROUNDING)

@@ -31,11 +31,15 @@ orders = st.tuples(
 
 def measure_steps(grid, height):
     pairs = make_exchange(grid, 1e-6, 1e-3).find_pairs(np.arange(grid.count))
-    return float(sum(share * ((height[one] - height[other]) ** 2).sum() for one, other, share in pairs))
+    return float(
+        sum(share * ((height[one] - height[other]) ** 2).sum() for one, other, share in pairs)
+    )
 
 
 @given(layouts, orders, st.integers(0, 2**32 - 1))
-def test_smoothed_heights_keep_sum_range_and_what_is_outside_and_are_never_rougher(layout, order, seed):
+def test_smoothed_heights_keep_sum_range_and_what_is_outside_and_are_never_rougher(
+    layout, order, seed
+):
     grid = make_grid(layout)
     height = np.random.default_rng(seed).uniform(0.0, STROKE, grid.count)
     cells, none = np.arange(grid.count), np.zeros(grid.count)

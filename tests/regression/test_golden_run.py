@@ -1,10 +1,11 @@
 """Two runs, digit for digit: what changes a parameter by a part in 1e9 is seen.
 
-The first nine seconds of the paper's session, where every flow is laminar; and one pin whose valve follows a
-script, pressed while its flow is turbulent. Compared are not bits, since other processors and other versions
-of numpy take sums in another order, but numbers, with a tolerance between two measurements. The contact's
-exponent moved by a part in 1e15, which is what rounding does, moves these forces by 2e-14 N and heights by
-1e-16 m. Moved by a part in 1e9 it moves them by 1e-10 N and 2e-12 m.
+The first nine seconds of the paper's session, where every flow is laminar; and one pin whose valve
+follows a script, pressed while its flow is turbulent. Compared are not bits, since other processors
+and other versions of numpy take sums in another order, but numbers, with a tolerance between two
+measurements. The contact's exponent moved by a part in 1e15, which is what rounding does, moves
+these forces by 2e-14 N and heights by 1e-16 m. Moved by a part in 1e9 it moves them by 1e-10 N and
+2e-12 m.
 """
 
 import json

@@ -1,9 +1,10 @@
 """No decision hangs on the last bit: what is shaken by a part in 1e15 comes out the same.
 
-Another processor or version of numpy adds in another order, which moves numbers by as much. Here all that a
-controller reads, the paths and the heights are moved so, at random, in every control period. Equal distances,
-symmetric forces and touches on the stroke of the clock are equal no longer: what they decide must not change.
-Each scene ends after the moment at which something once changed.
+Another processor or version of numpy adds in another order, which moves numbers by as much. Here
+all that a controller reads, the paths and the heights are moved so, at random, in every control
+period. Equal distances, symmetric forces and touches on the stroke of the clock are equal no
+longer: what they decide must not change. Each scene ends after the moment at which something once
+changed.
 """
 
 from collections.abc import Callable
@@ -39,7 +40,8 @@ from tests.scenes.test_pressed_together import at_times, play, pose_at, replayin
 
 #: Largest relative change of a number.
 SHAKEN = 1e-15
-#: m and N: what a part in 1e15 may grow to, below what can be felt; what was decided came to 4 µm or more.
+#: m and N: what a part in 1e15 may grow to, below what can be felt; what was decided came to 4 µm
+#: or more.
 HEIGHT, FORCE = 1e-6, 1e-3
 
 
@@ -107,7 +109,9 @@ def test_a_run_is_the_same_when_all_it_reads_is_shaken(name, method, lasting, se
     for one, other in zip(known, found, strict=True):
         period = str(one.period)
         np.testing.assert_allclose(other.row(0), one.row(0), rtol=0.0, atol=HEIGHT, err_msg=period)
-        np.testing.assert_allclose(other.row(force), one.row(force), rtol=0.0, atol=FORCE, err_msg=period)
+        np.testing.assert_allclose(
+            other.row(force), one.row(force), rtol=0.0, atol=FORCE, err_msg=period
+        )
         np.testing.assert_array_equal(other.mode(), one.mode(), period)
 
 
@@ -134,13 +138,16 @@ def test_a_fingertip_at_the_very_height_of_pins_is_as_one_a_rounding_error_above
         assert_near(forces, ends[0][1], FORCE)
 
 
-#: Heights off the bed, mm, at places x, y, mm: each with equal heights at places that are none's neighbor.
+#: Heights off the bed, mm, at places x, y, mm: each with equal heights at places that are none's
+#: neighbor.
 RELIEFS = {
     "cross": lambda x, y: 6.0 * np.maximum(_ridge(x, y), _ridge(y, x)),
     "frame": lambda x, y: 5.0 * (abs(np.maximum(abs(x), abs(y)) - 16.5) <= 4.6),
     "wave": lambda x, y: 4.0 * np.sin(2.0 * np.pi * x / 36.0),
     "four mounds": lambda x, y: sum(
-        6.0 * np.exp(-((x - a) ** 2 + (y - b) ** 2) / 40.0) for a in (-15.0, 15.0) for b in (-15.0, 15.0)
+        6.0 * np.exp(-((x - a) ** 2 + (y - b) ** 2) / 40.0)
+        for a in (-15.0, 15.0)
+        for b in (-15.0, 15.0)
     ),
 }
 
@@ -169,11 +176,14 @@ def test_features_and_triangles_are_the_same_when_heights_are_shaken(relief, arr
                 assert_near(line, own, 1e-8)
 
 
-#: A bed of 40 mm, m, its device without and with a blister, and what a stroke keeps to that leads one.
+#: A bed of 40 mm, m, its device without and with a blister, and what a stroke keeps to that leads
+#: one.
 CELLS = make_grid(Layout(21, 21))
 FINGER = Device(CELLS, Fingertip(), None, 80e-3)
 LED = replace(FINGER, blister=Blister())
-TRACKING = Tracking(1e-3, 2e-3, 0.05, 0.02, 0.5, 0.05, 0.015, 0.012, 200.0, 9e-3, 80e-3, 0.05, hard=1.0)
+TRACKING = Tracking(
+    1e-3, 2e-3, 0.05, 0.02, 0.5, 0.05, 0.015, 0.012, 200.0, 9e-3, 80e-3, 0.05, hard=1.0
+)
 OUT = [(float(x), 0.0, 4.0) for x in range(17)]
 
 
@@ -197,7 +207,9 @@ class Drawn:
             return np.array(values) if random is None else shake(np.array(values), random)
 
         bed = read(40e-3 + 1e-3 * self.rise(CELLS.x * 1e3, CELLS.y * 1e3))
-        images = tuple(Image(*(image + read(np.ones(6)) - 1.0)) for image in make_images(*self.symmetry))
+        images = tuple(
+            Image(*(image + read(np.ones(6)) - 1.0)) for image in make_images(*self.symmetry)
+        )
         samples = tuple(Sample(*row) for row in (1e-3 * read(self.places)).tolist())
         stamp = make_height_map("ramp", np.arange(16.0).reshape(4, 4) / 15.0)
         drawn = Stroke(1, samples, self.brush, images, self.accumulate, stamp, held=False)
@@ -216,12 +228,16 @@ class Drawn:
             poses += list(path[1:])
         ways = np.array(poses)
         turns = make_matrices(ways[..., 3:].reshape(-1, 4))  # a quaternion and its opposite are one
-        return np.hstack([ways[..., :3].reshape(len(ways), -1), turns.reshape(len(ways), -1)]), nominal
+        return np.hstack(
+            [ways[..., :3].reshape(len(ways), -1), turns.reshape(len(ways), -1)]
+        ), nominal
 
 
 UP = np.array([0.0, 0.0, 46e-3, *LEVEL])
 STROKES = {
-    "crosses the bed in whole steps": Drawn([(25.0, 0.0, 4.0)], rise=lambda x, y: 15.0 * (x * y > 800.0)),
+    "crosses the bed in whole steps": Drawn(
+        [(25.0, 0.0, 4.0)], rise=lambda x, y: 15.0 * (x * y > 800.0)
+    ),
     "comes down to a level bed in whole steps": Drawn([(1.0, 2.0, 4.0)]),
     "samples lie at the steps of a drag": Drawn(
         [(0.5 * i, 1.0, 4.0 - i % 2) for i in range(30)], rise=lambda x, y: 15.0 * (x * y > 800.0)
@@ -234,10 +250,15 @@ STROKES = {
         [(9.0, 0.0, 4.0), (9.0, 9.0, 4.0)], ("X",), device=LED, force=2.0
     ),
     "a step of half a millimeter": Drawn(
-        [(-9.0, 1.0, 4.0), (9.0, 1.0, 4.0)], device=LED, force=0.8, rise=lambda x, y: 0.5 * (x > 0.0) - 4.0
+        [(-9.0, 1.0, 4.0), (9.0, 1.0, 4.0)],
+        device=LED,
+        force=0.8,
+        rise=lambda x, y: 0.5 * (x > 0.0) - 4.0,
     ),
     "a pin half a millimeter above those around": Drawn(
-        [(0.0, 0.0, 4.0), (3.0, 0.0, 4.0)], device=LED, rise=lambda x, y: 0.625 * (np.hypot(x, y) < 1.0)
+        [(0.0, 0.0, 4.0), (3.0, 0.0, 4.0)],
+        device=LED,
+        rise=lambda x, y: 0.625 * (np.hypot(x, y) < 1.0),
     ),
     "a path that comes back after 32 mm": Drawn([*OUT, *OUT[-2::-1]], accumulate=True),
     "a pass half a fingertip beside the one before": Drawn(
@@ -298,8 +319,14 @@ def test_a_fingertip_that_hovers_exactly_on_a_pin_changes_nothing_of_what_anothe
 
 @pytest.mark.parametrize("arrangement", ["aligned", "hexagonal"])
 @pytest.mark.parametrize("level", [1 / 3, 0.7])
-def test_a_level_picture_forms_a_level_bed_up_to_pins_midway_to_pixels_without_data(level, arrangement):
-    grid, random, covered = make_grid(Layout(24, 24, 3e-3, arrangement)), np.random.default_rng(0), []
+def test_a_level_picture_forms_a_level_bed_up_to_pins_midway_to_pixels_without_data(
+    level, arrangement
+):
+    grid, random, covered = (
+        make_grid(Layout(24, 24, 3e-3, arrangement)),
+        np.random.default_rng(0),
+        [],
+    )
     without = np.tile(np.arange(24) > 20, (24, 1))
     at_pins = Placement(3e-3, 3e-3, float(grid.x[0]), float(grid.y[0]) - 1.5e-3)
     for _ in range(4):

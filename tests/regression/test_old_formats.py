@@ -15,8 +15,8 @@ from digiclay.core.session.take import from_bytes
 from tests.assemble import assert_near
 from tests.renew import SAMPLES, go_on
 
-#: m and N: other processors and versions of numpy take sums in another order. On those of the samples' README
-#: all numbers are the same.
+#: m and N: other processors and versions of numpy take sums in another order. On those of the
+#: samples' README all numbers are the same.
 ROUNDING = 1e-11
 #: The same, of forces that are some kN where a pin is driven to its stop.
 RELATIVE = 1e-12
@@ -37,13 +37,17 @@ def values(scene):
     for section in SECTIONS:
         part = scene.section(section)
         if part is not None:
-            table[section] = {name: listed(value) for name, value in vars(part).items() if known(part, name)}
+            table[section] = {
+                name: listed(value) for name, value in vars(part).items() if known(part, name)
+            }
         elif section not in ("contact", "blister"):
             table[section] = ABSENT
     if scene.control is not None:
         table["control"]["method"] = scene.method
     path = scene.section("trajectory")
-    points = [{name: listed(value) for name, value in vars(point).items()} for point in path.waypoints]
+    points = [
+        {name: listed(value) for name, value in vars(point).items()} for point in path.waypoints
+    ]
     table["trajectory"] = {"interpolation": path.interpolation, "waypoints": points}
     return table
 
@@ -83,7 +87,9 @@ def test_a_scene_written_by_hand_still_resolves_to_the_same_values(path):
     found, stated = values(load(path)), tomllib.loads(path.read_text(encoding="utf-8"))
     for section, own in stated.items():  # what is left out are defaults, which may change
         if isinstance(own, dict):
-            assert {key: found[section][key] for key in own} == {key: written[section][key] for key in own}
+            assert {key: found[section][key] for key in own} == {
+                key: written[section][key] for key in own
+            }
         else:
             assert found[section] == written[section]
 
@@ -93,7 +99,9 @@ def test_a_kept_state_of_an_older_version_is_what_it_was_and_the_session_goes_on
     system, known = assemble(load(path.with_suffix(".toml"))), np.load(path.with_suffix(".npz"))
     state = snapshot.load(system, path.read_bytes())
     assert state.period == known["period"]
-    np.testing.assert_array_equal([state.row(index) for index in range(len(state.rows))], known["rows"])
+    np.testing.assert_array_equal(
+        [state.row(index) for index in range(len(state.rows))], known["rows"]
+    )
     np.testing.assert_array_equal(state.mode(), known["mode"])
     np.testing.assert_array_equal(state.aged, known["aged"])
     found = go_on(path)

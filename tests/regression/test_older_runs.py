@@ -1,7 +1,7 @@
 """Folders of runs written by an older version: they are read, and their scenes give the same runs again.
 
-How they were made is in tests/samples/README.md. Runs are compared with the tolerance of the golden run, for
-its reason: other processors and other versions of numpy take sums in another order.
+How they were made is in tests/samples/README.md. Runs are compared with the tolerance of the golden
+run, for its reason: other processors and other versions of numpy take sums in another order.
 """
 
 import json
@@ -21,8 +21,8 @@ from tests.renew import REMEDY, SAMPLES, run_again
 RUNS = SAMPLES / "runs"
 RECORDED = ("virtual_master", "cell_states_every_7")
 ALL = (*RECORDED, "without_recorder")
-#: Largest differences of what a run of the same scene records: N, m, and of a command, which a gain of 500
-#: per meter makes of a height.
+#: Largest differences of what a run of the same scene records: N, m, and of a command, which a gain
+#: of 500 per meter makes of a height.
 TOLERANCES = {"force": 1e-11, "total_force": 1e-10, "height": 1e-13, "command": 1e-9}
 #: What says when, where and how quickly a run was made.
 CIRCUMSTANCES = ("run_time", "real_time_factor", "versions")
@@ -51,7 +51,8 @@ def check_metrics(found, stored, rounding):
         "metrics of older runs keep their names"
     )
     for name, value in stored.items():
-        # Versions estimate errors by other references: each is within a few hundredths of the true one's 4/3.
+        # Versions estimate errors by other references: each is within a few hundredths of the true
+        # one's 4/3.
         near = 0.1 if name.endswith("_error") else rounding
         wanted = pytest.approx(value, rel=near) if isinstance(value, float) else value
         if name == "units":
@@ -65,9 +66,12 @@ def test_an_older_scene_gives_the_same_folder(name, tmp_path):
     scene, stored = scene_of(name), metrics_of(RUNS / name)
     again = run_again(scene, stored)
     save(again, tmp_path)
-    # An estimated error is a difference of two heights or forces: its relative error is larger than theirs.
+    # An estimated error is a difference of two heights or forces: its relative error is larger than
+    # theirs.
     check_metrics(metrics_of(tmp_path), stored, 1e-7)
-    texts = [tomllib.loads((at / "scene.toml").read_text("utf-8")) for at in (tmp_path, RUNS / name)]
+    texts = [
+        tomllib.loads((at / "scene.toml").read_text("utf-8")) for at in (tmp_path, RUNS / name)
+    ]
     assert texts[0] == texts[1], "scenes of older runs are read as they were"
     if name not in RECORDED:
         return
@@ -121,6 +125,14 @@ def test_an_older_folder_is_a_scene_for_run_and_form_and_may_be_replaced(name, t
     assert not (older / "history.npz").exists()
     assert metrics_of(older)["scene"] == "stroke"
     if name in RECORDED:
-        form = ["form", "pyramid", "--scene", str(RUNS / name), "--quiet", "--out", str(tmp_path / "form")]
+        form = [
+            "form",
+            "pyramid",
+            "--scene",
+            str(RUNS / name),
+            "--quiet",
+            "--out",
+            str(tmp_path / "form"),
+        ]
         assert main(form) == 0
         assert (tmp_path / "form" / "surface.stl").stat().st_size > 0

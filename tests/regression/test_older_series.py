@@ -52,7 +52,11 @@ def test_an_older_sweep_that_is_done_is_shown_as_it_was():
     Path("sweep/sweep.csv").unlink()
     assert main(SWEEP) == 0
     assert (times("sweep/points/*"), numbers(Path("sweep/sweep.csv"))) == (before, known)
-    assert sorted(path.stem for path in Path("sweep").glob("*.png")) == ["height_error", "lag_mean", "rfd"]
+    assert sorted(path.stem for path in Path("sweep").glob("*.png")) == [
+        "height_error",
+        "lag_mean",
+        "rfd",
+    ]
 
 
 def test_an_older_sweep_of_another_scene_is_refused(refused):
@@ -88,6 +92,7 @@ def test_an_older_batch_that_is_done_is_shown_and_one_that_was_stopped_goes_on()
     assert main(BATCH) == 0
     assert times("batch/runs/my-soft/*") == before
     soft, firm = (
-        {path.name for path in Path("batch/runs", name).iterdir()} for name in ("my-soft", "my-firm")
+        {path.name for path in Path("batch/runs", name).iterdir()}
+        for name in ("my-soft", "my-firm")
     )
     assert soft == firm

@@ -46,7 +46,8 @@ def test_the_force_stays_near_its_set_point_and_the_blister_under_the_finger_whi
 def test_the_finger_is_never_lost_but_where_it_is_lifted_off(session):
     losses = np.array([memory.losses for memory in session[1].memory])
     assert np.flatnonzero(np.diff(losses)) * 5e-3 == pytest.approx([13.4, 25.7], abs=0.15)
-    # Twice the balance force of 0.157 N, in the fast push at the start; a locked pin would carry newtons.
+    # Twice the balance force of 0.157 N, in the fast push at the start; a locked pin would carry
+    # newtons.
     assert session[1].force.max() < 0.4
 
 

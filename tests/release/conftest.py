@@ -29,7 +29,13 @@ ENVIRONMENT = {name: value for name, value in os.environ.items() if not name.sta
 def git(folder, *words):
     command = ["git", "-c", "safe.directory=*", *words]
     done = subprocess.run(
-        command, cwd=folder, env=ENVIRONMENT, capture_output=True, text=True, timeout=TIMEOUT, check=True
+        command,
+        cwd=folder,
+        env=ENVIRONMENT,
+        capture_output=True,
+        text=True,
+        timeout=TIMEOUT,
+        check=True,
     )
     return done.stdout
 

@@ -26,7 +26,8 @@ NEEDING_MORE = {"test_source_file.py": "Pillow", "test_speed_limits.py": "Pillow
 FOLDERS = ("unit", "regression")
 #: Python and the file of requirements/ that pins its libraries, empty for what pip chooses.
 KINDS = {"3.11": "lowest", "3.12": "", "3.13": "highest"}
-#: Difference of heights between versions of numpy, m: its sums have another order, and valves amplify that.
+#: Difference of heights between versions of numpy, m: its sums have another order, and valves
+#: amplify that.
 ROUNDING = 1e-12
 
 
@@ -37,7 +38,9 @@ class BarePython:
 
     def run(self, *words, cwd, path="", limit=TIMEOUT):
         """Run a program of the environment, which imports nothing from elsewhere but from `path`."""
-        environment = {name: value for name, value in os.environ.items() if not name.startswith("PYTHON")}
+        environment = {
+            name: value for name, value in os.environ.items() if not name.startswith("PYTHON")
+        }
         return subprocess.run(
             [self.folder / "bin" / words[0], *words[1:]],
             cwd=cwd,
@@ -55,20 +58,31 @@ def read_pins(name):
 
 def _carry_out(*command):
     environment = {**os.environ, "GOAL": "test-release", "PYTHONPATH": ""}
-    done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True, timeout=TIMEOUT)
+    done = subprocess.run(
+        command, cwd=ROOT, env=environment, capture_output=True, text=True, timeout=TIMEOUT
+    )
     assert done.returncode == 0, f"{done.stdout[-2000:]}{done.stderr[-2000:]}"
     return done.stdout
 
 
 def _install(environment, *words):
-    pip = (environment / "bin" / "python", "-m", "pip", "--disable-pip-version-check", "install", "--quiet")
+    pip = (
+        environment / "bin" / "python",
+        "-m",
+        "pip",
+        "--disable-pip-version-check",
+        "install",
+        "--quiet",
+    )
     _carry_out(*pip, "--retries", "5", *words)
 
 
 def make_bare(folder, version, wheel, pins):
     """Make an environment of a Python (``3.12``); install the wheel, pinned by a file of requirements/."""
     variable = f"PYTHON{version.replace('.', '')}"
-    python = _carry_out(ROOT / "tools" / "find-python", version, variable, os.environ.get(variable, ""))
+    python = _carry_out(
+        ROOT / "tools" / "find-python", version, variable, os.environ.get(variable, "")
+    )
     _carry_out(python.strip(), "-m", "venv", folder)
     limits = ("-c", ROOT / "requirements" / f"{pins}.txt") if pins else ()
     _install(folder, *limits, wheel)
@@ -77,7 +91,12 @@ def make_bare(folder, version, wheel, pins):
 
 def install_pytest(bare, folder):
     pins = read_pins("test")
-    _install(bare.folder, "--target", folder, *(f"{name}=={pins[name]}" for name in ("pytest", "hypothesis")))
+    _install(
+        bare.folder,
+        "--target",
+        folder,
+        *(f"{name}=={pins[name]}" for name in ("pytest", "hypothesis")),
+    )
 
 
 @functools.cache
@@ -104,9 +123,13 @@ def find_core_tests():
     def fits(path):
         names = _needed(path)
         others = [name for name in names if name.split(".")[0] not in CORE_ONLY]
-        return any(names) and bool(others) and all(name.startswith("digiclay.core") for name in others)
+        return (
+            any(names) and bool(others) and all(name.startswith("digiclay.core") for name in others)
+        )
 
-    files = [path for folder in FOLDERS for path in sorted((ROOT / "tests" / folder).glob("test_*.py"))]
+    files = [
+        path for folder in FOLDERS for path in sorted((ROOT / "tests" / folder).glob("test_*.py"))
+    ]
     kept = [path for path in files if path.name not in NEEDING_MORE and fits(path)]
     return [path.relative_to(ROOT).as_posix() for path in kept]
 
@@ -123,7 +146,11 @@ def tap(bare, tmp_path_factory):
     done = bare.run("digiclay", "run", "tap", "--out", "tap", cwd=folder)
     assert (done.returncode, done.stderr) == (0, "")
     assert "0.5 s simulated" in done.stdout
-    assert {path.name for path in (folder / "tap").iterdir()} == {"history.npz", "metrics.json", "scene.toml"}
+    assert {path.name for path in (folder / "tap").iterdir()} == {
+        "history.npz",
+        "metrics.json",
+        "scene.toml",
+    }
     return folder / "tap"
 
 

@@ -13,7 +13,12 @@ from .conftest import ENVIRONMENT, ROOT, copy_checkout
 
 def carry_out(folder, *words):
     done = subprocess.run(
-        words, cwd=folder, env=ENVIRONMENT | {"GOAL": "demo"}, capture_output=True, text=True, timeout=TIMEOUT
+        words,
+        cwd=folder,
+        env=ENVIRONMENT | {"GOAL": "demo"},
+        capture_output=True,
+        text=True,
+        timeout=TIMEOUT,
     )
     assert done.returncode == 0, f"{done.stdout[-2000:]}{done.stderr[-2000:]}"
     return done.stdout
@@ -28,7 +33,15 @@ def test_all_extras_fit_into_the_checkout_without_another_numpy(tmp_path):
     carry_out(checkout, "tools/environment", ".venv", "few.txt", "3.11", "PYTHON", sys.executable)
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     extras = {*project["optional-dependencies"]} - {"blender", "dev"}
-    pip = (".venv/bin/python", "-m", "pip", "--disable-pip-version-check", "install", "--dry-run", "--quiet")
+    pip = (
+        ".venv/bin/python",
+        "-m",
+        "pip",
+        "--disable-pip-version-check",
+        "install",
+        "--dry-run",
+        "--quiet",
+    )
     said = carry_out(checkout, *pip, "--report", "-", f"digiclay[{','.join(extras)}]")
     found = [one["metadata"] for one in json.loads(said)["install"]]
     wanted = {one["name"].lower(): one["version"] for one in found}

@@ -41,12 +41,18 @@ def test_the_zip_is_small_and_every_file_once_and_of_a_kind_that_is_needed(conte
 
 def test_what_the_manifest_leaves_out_is_not_there(contents):
     manifest = tomllib.loads(contents["blender_manifest.toml"].decode())
-    named = [name[1:] for name in manifest["build"]["paths_exclude_pattern"] if name.startswith("/commands")]
+    named = [
+        name[1:]
+        for name in manifest["build"]["paths_exclude_pattern"]
+        if name.startswith("/commands")
+    ]
     assert named
     assert set(named) & set(contents) == set()
 
 
-def test_the_bundled_wheels_are_those_of_the_manifest_with_their_license(contents, extension_zip, tmp_path):
+def test_the_bundled_wheels_are_those_of_the_manifest_with_their_license(
+    contents, extension_zip, tmp_path
+):
     manifest = tomllib.loads(contents["blender_manifest.toml"].decode())
     wheels = sorted(f"./{name}" for name in contents if name.startswith("wheels/"))
     assert wheels == sorted(manifest["wheels"])
@@ -61,7 +67,10 @@ def test_the_bundled_wheels_are_those_of_the_manifest_with_their_license(content
 
 def test_the_wheel_has_the_package_and_those_beside_it_and_no_benchmark(wheel):
     names = set(zipfile.ZipFile(wheel).namelist())
-    assert {name.split("/")[0] for name in names if ".dist-info/" not in name} == {"digiclay", *BESIDE}
+    assert {name.split("/")[0] for name in names if ".dist-info/" not in name} == {
+        "digiclay",
+        *BESIDE,
+    }
     beside = {f"{name}/{path.name}" for name in BESIDE for path in (ROOT / name).glob("*.*")}
     shipped = {"digiclay/manual/guide.html", "digiclay/sample_shapes/sessions/tap.toml"}
     assert (beside | shipped) - names == set()

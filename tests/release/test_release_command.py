@@ -52,7 +52,9 @@ def remove(name):
 def empty_the_section(folder):
     text = (folder / CHANGELOG).read_text(encoding="utf-8")
     heading = next(line for line in text.splitlines() if line.startswith("## "))
-    (folder / CHANGELOG).write_text(f"# Changelog\n\n{heading}\n\n## 0.0.1 - 2026-01-01\n\n- First.\n")
+    (folder / CHANGELOG).write_text(
+        f"# Changelog\n\n{heading}\n\n## 0.0.1 - 2026-01-01\n\n- First.\n"
+    )
     commit(folder)
 
 
@@ -65,8 +67,14 @@ HEADING = f"## {__version__} - "
 REPORT = ".reports/window.txt"
 FAILED = "tests in a window: FAILED (status 1)\n"
 BROKEN = {
-    "a change that is not committed": (write("README.md", "Changed."), "README.md is not committed"),
-    "a file that git does not know": (write("addon/digiclay/new.py", ""), "addon/digiclay/new.py is not"),
+    "a change that is not committed": (
+        write("README.md", "Changed."),
+        "README.md is not committed",
+    ),
+    "a file that git does not know": (
+        write("addon/digiclay/new.py", ""),
+        "addon/digiclay/new.py is not",
+    ),
     "another version of the package": (
         edit(VERSION_FILE, __version__, "9.9.9"),
         f"{VERSION_FILE} has version 9.9.9, and",
@@ -104,12 +112,16 @@ def test_a_broken_condition_is_one_line_and_nothing_is_left(broken, checkout):
     assert leftovers(checkout) == before
 
 
-@pytest.mark.parametrize("version", ["", "0.1", "v0.1.0", "0.1.0rc1", "01.0.0", "0.1.0 ", "nan", "٠.١.٠"])
+@pytest.mark.parametrize(
+    "version", ["", "0.1", "v0.1.0", "0.1.0rc1", "01.0.0", "0.1.0 ", "nan", "٠.١.٠"]
+)
 def test_a_version_is_three_numbers(version, original):
     done = run_release(original, version)
-    assert (done.returncode, done.stderr.count("\n"), "such as 0.1.0" in done.stderr) == (1, 1, True), (
-        done.stderr
-    )
+    assert (done.returncode, done.stderr.count("\n"), "such as 0.1.0" in done.stderr) == (
+        1,
+        1,
+        True,
+    ), done.stderr
     assert leftovers(original) == []
 
 
@@ -133,7 +145,9 @@ def test_reports_of_other_commits_do_not_count(checkout, monkeypatch):
 
 def put_chance_into_the_zip(folder):
     line = '    shutil.copyfile(ROOT / "LICENSE", folder / "LICENSE")\n'
-    edit("tools/extension.py", line, f'{line}    (folder / "chance.md").write_bytes(os.urandom(9))\n')(folder)
+    edit(
+        "tools/extension.py", line, f'{line}    (folder / "chance.md").write_bytes(os.urandom(9))\n'
+    )(folder)
 
 
 def make_the_zip_large(folder):
@@ -143,8 +157,14 @@ def make_the_zip_large(folder):
 
 FAILING = {
     "a zip that Blender refuses": (edit(MANIFEST, '"Modeling"', '"Pottery"'), "extension.py --out"),
-    "a wheel that is not built": (edit("pyproject.toml", "[build-system]", "[build-system"), "'-m build"),
-    "builds that differ": (put_chance_into_the_zip, f"two builds of the same commit differ in {ARCHIVES[2]}"),
+    "a wheel that is not built": (
+        edit("pyproject.toml", "[build-system]", "[build-system"),
+        "'-m build",
+    ),
+    "builds that differ": (
+        put_chance_into_the_zip,
+        f"two builds of the same commit differ in {ARCHIVES[2]}",
+    ),
     "a large zip": (make_the_zip_large, "2 MB is the most"),
 }
 
@@ -155,16 +175,22 @@ def test_a_failure_during_the_builds_leaves_nothing(failing, checkout):
     change(checkout)
     done = run_release(checkout)
     last = done.stderr.splitlines()[-1]
-    assert (done.returncode, last.startswith("Nothing is released: "), reason in last) == (1, True, True), (
-        done.stderr
-    )
+    assert (done.returncode, last.startswith("Nothing is released: "), reason in last) == (
+        1,
+        True,
+        True,
+    ), done.stderr
     assert leftovers(checkout) == []
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_stop_during_the_builds_leaves_nothing(number, checkout):
     process = subprocess.Popen(
-        release_command(checkout), env=ENVIRONMENT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        release_command(checkout),
+        env=ENVIRONMENT,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
     )
     assert process.stdout.readline().startswith(f"building {__version__}")
     process.send_signal(number)
@@ -183,10 +209,15 @@ def test_a_release_leaves_its_files_their_checksums_and_an_annotated_tag_with_th
     assert git(released, "tag").split() == [TAG]
     assert git(released, "rev-parse", f"{TAG}^{{commit}}") == git(released, "rev-parse", "HEAD")
     notes = (released / FOLDER / "release-notes.md").read_text(encoding="utf-8")
-    assert git(released, "for-each-ref", "--format=%(contents)", f"refs/tags/{TAG}").strip() == notes.strip()
+    assert (
+        git(released, "for-each-ref", "--format=%(contents)", f"refs/tags/{TAG}").strip()
+        == notes.strip()
+    )
     assert list(released.glob("build/release-*")) == []
     check = ["sha256sum", "--check", "--strict", "SHA256SUMS"]
-    done = subprocess.run(check, cwd=released / FOLDER, capture_output=True, text=True, timeout=TIMEOUT)
+    done = subprocess.run(
+        check, cwd=released / FOLDER, capture_output=True, text=True, timeout=TIMEOUT
+    )
     assert (done.returncode, done.stdout.count(": OK")) == (0, len(ARCHIVES) + 1), done.stdout
 
 

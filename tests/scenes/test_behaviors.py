@@ -48,17 +48,20 @@ def test_an_elastic_bed_is_felt_as_a_spring():
     result = pressed("elastic")
     row = at(result, 1.99)
     force, height = result.history["force"][row], heights(result)[row]
-    # The pulp relaxes, so pins creep up, by 0.1 mm/s at the most, and for c = 5 N s/m that takes 0.5 mN; the
-    # opening of a free pin does 1 - F/F_max of it, half of it at 75 mN: up to 1 mN.
+    # The pulp relaxes, so pins creep up, by 0.1 mm/s at the most, and for c = 5 N s/m that takes
+    # 0.5 mN; the opening of a free pin does 1 - F/F_max of it, half of it at 75 mN: up to 1 mN.
     assert force == pytest.approx(20.0 * (REST - height), abs=1e-3)
 
 
 def test_a_plastic_bed_stays_at_the_deepest_press_and_as_it_is_under_a_shallower_one():
     again = (*PRESS[:4], (3.2, 0, 0, 40), (3.6, 0, 0, 35.3), (3.8, 0, 0, 70), (4.8, 0, 0, 70))
     result = run(scene("plastic", again))
-    deepest, before = heights(result)[: at(result, GONE)].min(axis=0), heights(result)[at(result, 3.0)]
-    # The valve lags 3 ms: what a pin sinks in that time after its force fell below yield is no press.
-    # At 12 mm/s that is 36 µm, and the dead band comes on top.
+    deepest, before = (
+        heights(result)[: at(result, GONE)].min(axis=0),
+        heights(result)[at(result, 3.0)],
+    )
+    # The valve lags 3 ms: what a pin sinks in that time after its force fell below yield is no
+    # press. At 12 mm/s that is 36 µm, and the dead band comes on top.
     assert np.abs(before - deepest).max() <= 46e-6
     assert np.ptp(heights(result)[at(result, 2.5) : at(result, 3.0)], axis=0).max() == 0.0
     assert result.history["total_force"][at(result, 3.0) :].max() > 0.0
@@ -107,8 +110,8 @@ def test_a_larger_disc_changes_nothing_visible_in_a_viscous_bed(arrangement):
         *_, last = periods(replace(system, controller=wider), [way], begin(system), 600)
         ends.append((last.row(0), last.row(system.rows.target)))
     (narrow, asked), (wide, asked_wide) = ends
-    # Beyond the border the displacement is below a tenth of the dead band: commanded heights differ by no
-    # more, heights by no more than the dead band as well.
+    # Beyond the border the displacement is below a tenth of the dead band: commanded heights differ
+    # by no more, heights by no more than the dead band as well.
     assert np.abs(asked - asked_wide).max() <= 0.1 * DEAD_BAND
     assert np.abs(narrow - wide).max() <= 1.1 * DEAD_BAND
 
@@ -132,8 +135,9 @@ def test_a_resting_finger_feels_the_field(field):
     force, asked = result.history["force"][row], assemble(result.scene).controller.field
     felt = force > 0.0
     assert np.count_nonzero(felt) >= 15
-    # The pulp goes on relaxing, and pins creep up after it, by 0.1 mm/s at the most. For c = 5 N s/m that
-    # takes 0.5 mN; a valve worked out for a free pin does 1 - F/F_max of it, half of it at 75 mN: 1 mN, 2 %.
+    # The pulp goes on relaxing, and pins creep up after it, by 0.1 mm/s at the most. For c = 5 N
+    # s/m that takes 0.5 mN; a valve worked out for a free pin does 1 - F/F_max of it, half of it at
+    # 75 mN: 1 mN, 2 %.
     assert force[felt] == pytest.approx(asked[felt], abs=1e-3)
 
 
@@ -147,7 +151,8 @@ def displayed(refresh, shape="crater", **known):
 
 
 @pytest.mark.parametrize(
-    "refresh, shape", [("one_time", "saddle"), ("gradual", "pyramid"), ("approximate_gradual", "file")]
+    "refresh, shape",
+    [("one_time", "saddle"), ("gradual", "pyramid"), ("approximate_gradual", "file")],
 )
 def test_the_display_reaches_its_shape(refresh, shape, tmp_path):
     if shape == "file":
@@ -176,8 +181,8 @@ def test_a_one_time_refresh_moves_row_by_row_and_a_gradual_one_shows_intermediat
     for share in (1 / 3, 2 / 3, 1.0):
         surface = REST + share * (wanted - REST)
         nearest = np.abs(heights(result) - surface).max(axis=1).min()
-        # The first rows are on their way to the next surface before the last one has come to rest in the
-        # dead band: no more than a settling time's end, a dead band more.
+        # The first rows are on their way to the next surface before the last one has come to rest
+        # in the dead band: no more than a settling time's end, a dead band more.
         assert nearest <= 2 * DEAD_BAND, share
 
 
@@ -195,7 +200,9 @@ def test_the_approximate_refresh_is_the_quickest_and_a_small_step_as_quick_as_th
 
 def test_a_displayed_shape_holds_against_a_finger():
     way = [(0, 70), (2, 70), (2.5, 48), (3, 48), (3.5, 70), (4.5, 70)]
-    result = run(scene("shape_display", tuple((t, 0, 0, z) for t, z in way), refresh="approximate_gradual"))
+    result = run(
+        scene("shape_display", tuple((t, 0, 0, z) for t, z in way), refresh="approximate_gradual")
+    )
     wanted = assemble(result.scene).controller.heights
     assert result.history["total_force"].max() > 0.5
     assert np.abs(heights(result)[-1] - wanted).max() <= DEAD_BAND + 1e-12

@@ -39,7 +39,8 @@ LIFT = [(0, 0, 0, 43), (0.8, 0, 0, 36), (1.2, 0, 0, 37), (3.2, 0, 0, 46)]
 
 
 @pytest.mark.parametrize(
-    "method, arrangement", [*(("cell_states", name) for name in ("aligned", "staggered", "hexagonal"))]
+    "method, arrangement",
+    [*(("cell_states", name) for name in ("aligned", "staggered", "hexagonal"))],
 )
 def test_a_slow_lift_pulls_the_clay_up_after_the_finger(method, arrangement):
     # The finger ends 6 mm above the surface; the pins under it press into it from below.
@@ -49,8 +50,9 @@ def test_a_slow_lift_pulls_the_clay_up_after_the_finger(method, arrangement):
 @pytest.mark.parametrize("method", BOTH)
 def test_a_finger_that_leaves_at_once_leaves_the_clay_where_it_was_and_is_counted_as_lost(method):
     last = lasting(followed(method, [*LIFT, (3.3, 0, 0, 90), (4.4, 0, 0, 90)]))
-    # Pins stood 1.5 mm into the finger; they follow it for some 30 ms, then rise for the loss time of
-    # 50 ms, at 24 mm/s at the most: 3.5 mm above the finger's last place, and 1 mm for the servo's lag.
+    # Pins stood 1.5 mm into the finger; they follow it for some 30 ms, then rise for the loss time
+    # of 50 ms, at 24 mm/s at the most: 3.5 mm above the finger's last place, and 1 mm for the
+    # servo's lag.
     assert 46e-3 < last.row(0).max() < 46e-3 + 4.5e-3
     assert last.memory.losses == 1
 
@@ -63,8 +65,8 @@ def test_a_finger_that_comes_back_elsewhere_is_found_again(method):
 
 @pytest.mark.parametrize("method", METHODS)
 def test_nothing_sticks_in_a_mode_a_second_after_the_finger_has_left(method):
-    # A failing session is named by its seed. The display goes to a low shape, all rows at once: its refresh
-    # would take longer than the way.
+    # A failing session is named by its seed. The display goes to a low shape, all rows at once: its
+    # refresh would take longer than the way.
     low = {"refresh": "approximate_gradual", "surfaces": 1, "amplitude": 3e-3}
     control = {"method": method, **(low if method == "shape_display" else {})}
     stuck = {}
@@ -121,6 +123,8 @@ def test_noise_is_no_touch(method):
     [("virtual_master", 21.0), ("cell_states", 8.1), ("plastic", 6.1), ("force_display", 10.1)],
 )
 def test_noise_that_hides_what_is_asked_for_is_refused_in_one_line(method, noise):
-    with pytest.raises(ParameterError, match=r"^sensors\.force_noise must .*control\.\w+ = [\d.]+ N") as told:
+    with pytest.raises(
+        ParameterError, match=r"^sensors\.force_noise must .*control\.\w+ = [\d.]+ N"
+    ) as told:
         run(followed(method, WAY, sensors={"force_noise": noise * 1e-3}))
     assert "\n" not in str(told.value)

@@ -15,7 +15,16 @@ from digiclay.core.session.run_scene import run, save
 from digiclay.core.studies.omissions import propose_omissions
 from digiclay.plugins.method_loader import load_method
 
-from tests.own_methods import COPY, COPY_THREE, COPY_TWO, PAD, PLACED, forgotten, small, write_method
+from tests.own_methods import (
+    COPY,
+    COPY_THREE,
+    COPY_TWO,
+    PAD,
+    PLACED,
+    forgotten,
+    small,
+    write_method,
+)
 from tests.scene_files import folder_with, rows, timeless
 
 WAY = """trajectory.waypoints = [
@@ -36,7 +45,15 @@ fingertip.length = "11 mm"
 {WAY.format(0.009)}
 """
 SHAPED = ["form", "dome", "--scene", "my.toml", "--out", "out", "--quiet", "--finger"]
-GAINS = ["sweep", "my.toml", "--vary", "control.force_gain=3,4,5,6", "--metric", "rfd,lag", "--quiet"]
+GAINS = [
+    "sweep",
+    "my.toml",
+    "--vary",
+    "control.force_gain=3,4,5,6",
+    "--metric",
+    "rfd,lag",
+    "--quiet",
+]
 
 
 @pytest.mark.parametrize(
@@ -55,12 +72,19 @@ def test_a_sample_of_hands_loses_no_finger_and_forms_what_it_is_called(name, fin
     # Where it is high, and where low.
     high, low = {
         "two_hands_bowl": (abs(out - 29e-3) < 2e-3, out < 10e-3),
-        "pinch_crease": ((abs(abs(y) - 7e-3) < 2e-3) & (abs(x) < 15e-3), (abs(y) < 1e-3) & (abs(x) < 15e-3)),
+        "pinch_crease": (
+            (abs(abs(y) - 7e-3) < 2e-3) & (abs(x) < 15e-3),
+            (abs(y) < 1e-3) & (abs(x) < 15e-3),
+        ),
         "five_fingers_mound": ((out > 6e-3) & (out < 16e-3), out > 34e-3),
     }[name]
     assert np.median(formed[high]) > 6e-3
-    assert formed[high].min() > 7e-3 or name != "two_hands_bowl"  # where the hands meet too; 7.5 mm measured
-    assert np.median(formed[low]) < np.median(formed[high]) - (0.5e-3 if name == "pinch_crease" else 8e-3)
+    assert (
+        formed[high].min() > 7e-3 or name != "two_hands_bowl"
+    )  # where the hands meet too; 7.5 mm measured
+    assert np.median(formed[low]) < np.median(formed[high]) - (
+        0.5e-3 if name == "pinch_crease" else 8e-3
+    )
 
 
 @pytest.mark.parametrize(
@@ -84,11 +108,16 @@ def test_a_command_takes_a_scene_of_two_fingers(command, made, tmp_path, monkeyp
     "command, said",
     [
         ([*SHAPED[:-2], "--finger", "press"], "formed by the first of 2 fingers alone"),
-        (["compare", "my.toml", "--speed", "--out", "out"], "Followed, for the first finger alone, "),
+        (
+            ["compare", "my.toml", "--speed", "--out", "out"],
+            "Followed, for the first finger alone, ",
+        ),
         (["compare", "my.toml", "--out", "out"], "The worst of 2 fingers; metrics.json has each."),
     ],
 )
-def test_a_command_says_what_it_takes_of_several_fingers(command, said, tmp_path, monkeypatch, capsys):
+def test_a_command_says_what_it_takes_of_several_fingers(
+    command, said, tmp_path, monkeypatch, capsys
+):
     folder = folder_with(TWO, tmp_path, monkeypatch)
     assert main(command) == 0
     assert said in capsys.readouterr().out
@@ -101,10 +130,13 @@ def test_a_command_says_what_it_takes_of_several_fingers(command, said, tmp_path
 
 
 def test_rows_are_beyond_a_finger_where_one_is_and_not_where_all_together_are():
-    made = load(find("pinch_crease"), [Setting("control", "absent"), Setting("relaxation", "absent")])
+    made = load(
+        find("pinch_crease"), [Setting("control", "absent"), Setting("relaxation", "absent")]
+    )
     done = run(replace(made, simulation=replace(made.simulation, duration=1.0)))
     marked, each = done.history["beyond_a_finger"], done.history["finger_force"]
-    # Pressed 3 mm deep into pins that hold, each finger alone comes to more than 2 N, both together before.
+    # Pressed 3 mm deep into pins that hold, each finger alone comes to more than 2 N, both together
+    # before.
     np.testing.assert_array_equal(marked, (each > MOST_FORCE).any(axis=1))
     assert (each.sum(axis=1)[~marked] > MOST_FORCE).any()
 
@@ -122,14 +154,17 @@ def test_describe_names_the_finger_of_a_part_and_counts_all_rows(tmp_path, monke
     assert "of 2: length 11 mm" in said
     assert "  contact     stiffness" in said
     assert (
-        "14 rows: height, relaxation (6), valve, commands on their way (2), commanded height, force, " in said
+        "14 rows: height, relaxation (6), valve, commands on their way (2), commanded height, force, "
+        in said
     )
     assert "forces of the fingers (2); 112 bytes" in said
     assert main(["describe", "my.toml", "--parameters"]) == 0
     assert "finger #2.fingertip.length = 0.011 m" in capsys.readouterr().out
 
 
-def test_points_of_several_fingers_run_one_at_a_time_to_the_same_bits(tmp_path, monkeypatch, capsys):
+def test_points_of_several_fingers_run_one_at_a_time_to_the_same_bits(
+    tmp_path, monkeypatch, capsys
+):
     folder = folder_with(TWO, tmp_path, monkeypatch)
     for count in "12":
         assert main([*GAINS[:-1], "--out", count, "--workers", count]) == 0
@@ -177,7 +212,9 @@ def test_a_method_of_ones_own_takes_several_fingers(code, word, like, tmp_path, 
     assert np.ptp(own.history["height"]) > 1e-4
     if like:  # a controller a finger; what they sum goes in another order
         built_in = run(with_two(small(like, longer)))
-        np.testing.assert_allclose(own.history["height"], built_in.history["height"], rtol=0, atol=1e-9)
+        np.testing.assert_allclose(
+            own.history["height"], built_in.history["height"], rtol=0, atol=1e-9
+        )
         assert own.metrics["losses"] == built_in.metrics["losses"]
 
 
@@ -190,5 +227,6 @@ def with_two(scene):
         for side in (-9e-3, 9e-3)
     )
     return replace(
-        scene, fingers=tuple(replace(finger, trajectory=replace(path, waypoints=way)) for way in ways)
+        scene,
+        fingers=tuple(replace(finger, trajectory=replace(path, waypoints=way)) for way in ways),
     )

@@ -35,7 +35,9 @@ def scene(method, *fingers, **parts):
     shape = find_method(method).blister if method else None
     blister = None if shape is None else Blister(**shape)
     layout = replace(PAPER.layout, rows=50, columns=50)
-    made = replace(PAPER, layout=layout, control=control, method=method or "virtual_master", blister=blister)
+    made = replace(
+        PAPER, layout=layout, control=control, method=method or "virtual_master", blister=blister
+    )
     return replace(made, fingers=fingers, recorder=None, **parts)
 
 
@@ -73,7 +75,8 @@ def test_fingers_far_from_each_other_form_what_each_forms_alone(method):
     poses = press(alone, places, (14e-3, 5e-3), 180)
     single = [follow(alone, poses[:, :, [finger]]) for finger in range(3)]
     state, forces = follow(assemble(scene(method, *[FINGER] * 3)), poses)
-    # Rounding alone: sums go over the cells in another order; viscous pins depend on the active set.
+    # Rounding alone: sums go over the cells in another order; viscous pins depend on the active
+    # set.
     assert_near(forces, np.hstack([own for _, own in single]), 1e-9)
     formed = sum(own.row(0) - REST for own, _ in single)
     assert_near(state.row(0) - REST, formed, 1e-10)
@@ -117,7 +120,8 @@ def test_nobody_knows_who_presses_a_pin_just_below_two_predicted_fingertips(belo
 def drag(system, apart, angle, turn):
     """Return poses (t, p, 2, 7): pressed, lifted by 5.5 and 11.5 mm, at rest, then off at once.
 
-    They are so far apart, m, in a direction, rad, and go in one that is turned from it; the lower rises.
+    They are so far apart, m, in a direction, rad, and go in one that is turned from it; the lower
+    rises.
     """
     time = np.arange(730)[:, None] * PERIOD + system.instants
     poses = np.zeros((*time.shape, 2, 7))
@@ -211,7 +215,8 @@ def test_fingers_that_come_and_go_leave_the_others_what_they_have(method):
 def test_where_blisters_overlap_each_pin_has_the_ground_it_had_before_the_first_one(later):
     made = [scene("virtual_master", *[FINGER] * count) for count in (1, 2)]
     one, two = (assemble(replace(own, control=replace(own.control, ground="cell"))) for own in made)
-    # 27 mm apart at first, or 13 mm, and dragged towards each other on a bias until they are 11 mm apart.
+    # 27 mm apart at first, or 13 mm, and dragged towards each other on a bias until they are 11 mm
+    # apart.
     time = np.arange(240)[:, None] * PERIOD + two.instants
     poses = np.zeros((*time.shape, 2, 7))
     for finger, side in enumerate((-1.0, 1.0)):
@@ -234,7 +239,9 @@ def test_where_blisters_overlap_each_pin_has_the_ground_it_had_before_the_first_
 
 
 @pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("first", [replace(FINGER, relaxation=None), LONG], ids=["elastic", "two filters"])
+@pytest.mark.parametrize(
+    "first", [replace(FINGER, relaxation=None), LONG], ids=["elastic", "two filters"]
+)
 def test_a_finger_with_more_filters_than_the_others_comes_and_goes(first, method):
     one, two = assemble(scene(method, first)), assemble(scene(method, first, FINGER))
     poses = press(two, [(-20e-3, 1e-3), (20e-3, 0.0)], (6e-3, 0.0), 120)
@@ -268,7 +275,9 @@ def test_pins_that_a_display_raises_against_resting_fingers_press_each_as_alone(
     for finger in trace_fingers(two, poses):
         state = advance(two, state, finger)
         forces.append(state.finger_forces())
-        assert state.active.block[0].max() <= state.active.peak  # or pins that are touched may be left out
+        assert (
+            state.active.block[0].max() <= state.active.peak
+        )  # or pins that are touched may be left out
     alone = [follow(one, poses[:, :, [finger]])[1] for finger in range(2)]
     assert np.max(forces, axis=0).min() > 0.05
     assert_near(forces, np.hstack(alone), 1e-9)
@@ -297,7 +306,9 @@ def test_where_the_law_of_two_fingers_begins_at_a_depth_a_pin_above_both_is_nobo
 
 def test_a_run_of_two_fingers_has_the_metrics_of_each_and_its_errors():
     path = FINGER.trajectory
-    shifted = [replace(one, position=(one.position[0], 40e-3, one.position[2])) for one in path.waypoints]
+    shifted = [
+        replace(one, position=(one.position[0], 40e-3, one.position[2])) for one in path.waypoints
+    ]
     aside = replace(path, waypoints=tuple(shifted))
     short = replace(PAPER.simulation, duration=1.5)
     both = scene("virtual_master", FINGER, replace(FINGER, trajectory=aside), simulation=short)
@@ -305,7 +316,9 @@ def test_a_run_of_two_fingers_has_the_metrics_of_each_and_its_errors():
     assert result.history["fingertip"].shape[1:] == (2, 7)
     assert_near(result.history["finger_force"].sum(axis=1), result.history["total_force"], 1e-12)
     first, second = result.metrics["fingers"]
-    alone = run(replace(scene("virtual_master", FINGER, simulation=short), recorder=PAPER.recorder)).metrics
+    alone = run(
+        replace(scene("virtual_master", FINGER, simulation=short), recorder=PAPER.recorder)
+    ).metrics
     assert first["rfd"] == pytest.approx(alone["rfd"], rel=1e-6)
     assert result.metrics["rfd"] == max(first["rfd"], second["rfd"])
     assert result.metrics["losses"] is not None

@@ -59,13 +59,18 @@ def test_it_holds_the_force_better_than_method_i_turned_finger_or_not(turn):
     assert three < 0.55 * one
 
 
-@pytest.mark.parametrize("turn, pitch", [(90.0, 0.0), (105.0, 30.0)], ids=["across", "across, tilted"])
+@pytest.mark.parametrize(
+    "turn, pitch", [(90.0, 0.0), (105.0, 30.0)], ids=["across", "across, tilted"]
+)
 def test_a_finger_across_its_way_between_two_rows_of_pins_is_held_as_well(turn, pitch):
     poses = drag_row(np.radians(turn), np.radians(pitch))
     bed = {"columns": 25, "rows": 15}
-    one, three = (run(with_paths(device(method, layout=bed), "linear", poses)).metrics for method in BOTH)
+    one, three = (
+        run(with_paths(device(method, layout=bed), "linear", poses)).metrics for method in BOTH
+    )
     assert three["contact_loss_share"] == 0.0
-    # Measured 0.39 and 0.38; 2.8 and 0.9 by a filter of the angle, flat 90 degrees off where it begins.
+    # Measured 0.39 and 0.38; 2.8 and 0.9 by a filter of the angle, flat 90 degrees off where it
+    # begins.
     assert three["rfd"] < 0.6 * one["rfd"]
 
 
@@ -129,8 +134,12 @@ def mismatched(known):
     """Return the true device under a controller made for another one."""
     part, factors = MODELS[known]
     section = TRUE.section(part)
-    changed = replace(section, **{name: getattr(section, name) * by for name, by in factors.items()})
-    return replace(assemble(TRUE), controller=assemble(TRUE.with_sections(**{part: changed})).controller)
+    changed = replace(
+        section, **{name: getattr(section, name) * by for name, by in factors.items()}
+    )
+    return replace(
+        assemble(TRUE), controller=assemble(TRUE.with_sections(**{part: changed})).controller
+    )
 
 
 @pytest.mark.parametrize("known", MODELS)
@@ -147,7 +156,9 @@ def test_method_i_takes_over_from_a_wrong_prediction_until_the_finger_has_left()
     found = record(mismatched("valve × 3"), path(*STROKE, (2.5, 7, 0, 80), (2.7, 7, 0, 80)), 540)
     taken = [memory.master.phase is Phase.SHAPING for memory in found.memory]
     assert (taken[100], taken[479], taken[-1]) == (True, True, False)
-    assert not any(memory.master.phase for memory in record(assemble(TRUE), path(*STROKE), 480).memory)
+    assert not any(
+        memory.master.phase for memory in record(assemble(TRUE), path(*STROKE), 480).memory
+    )
 
 
 def test_the_trim_stays_within_half_the_set_point():
@@ -188,7 +199,9 @@ def test_a_finger_that_jumps_is_found_again_where_it_is():
 def test_a_touched_cell_is_never_frozen():
     found = record(assemble(device()), path(*STROKE, (3.4, -8, 0, 46), (3.6, -8, 0, 44)), 720)
     assert np.any(found.mode == Mode.FROZEN)
-    assert not np.any((found.mode == Mode.FROZEN)[:-1] & (found.force > Hybrid().release_force)[:-1])
+    assert not np.any(
+        (found.mode == Mode.FROZEN)[:-1] & (found.force > Hybrid().release_force)[:-1]
+    )
 
 
 @pytest.mark.parametrize(
@@ -206,8 +219,11 @@ def test_a_touched_cell_is_never_frozen():
          "a fingertip larger than the bed"],
 )  # fmt: skip
 def test_it_holds_a_press_on_other_devices(tables):
-    known = along(device(**tables), (0.0, 1.3, 0.4, 41), (0.4, 1.3, 0.4, 38.5), (1.2, 1.3, 0.4, 38.5))
+    known = along(
+        device(**tables), (0.0, 1.3, 0.4, 41), (0.4, 1.3, 0.4, 38.5), (1.2, 1.3, 0.4, 38.5)
+    )
     found = run(known)
     late = found.history["total_force"][int(0.8 / known.simulation.control_period) :]
-    # With commands under way for three periods it swings by 0.02 N about 0.44 N, and the trim takes 0.5 s.
+    # With commands under way for three periods it swings by 0.02 N about 0.44 N, and the trim takes
+    # 0.5 s.
     assert late == pytest.approx(0.4, abs=0.08 if "delay" in tables else 0.02)

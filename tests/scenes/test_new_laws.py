@@ -175,7 +175,9 @@ def test_new_laws_and_a_new_behavior_are_a_file_and_a_line_each(copy):
         "contact law pad doubling 0.3e-3 0.4e-3 0.6e-3",
         "control method sponge swelling_time 0.1 0.3 0.9",
     )
-    *parts, plain = (json.loads(line) for line in run_python(copy, "-c", SESSION, *asked).splitlines())
+    *parts, plain = (
+        json.loads(line) for line in run_python(copy, "-c", SESSION, *asked).splitlines()
+    )
     for words, found in zip(asked, parts, strict=True):
         section, choice, name, key, *_ = words.split()
         # Sums in another order: a last bit here and there.
@@ -194,7 +196,11 @@ def test_new_laws_and_a_new_behavior_are_a_file_and_a_line_each(copy):
     [
         (ExponentialLaw, "tension", "tension must be that of ExponentialLaw: the closed form"),
         (ExponentialLaw, "_numbers", "_numbers must be that of ExponentialLaw: the closed form"),
-        (Orifice, "flow", "flow must be that of Orifice: steppers and conduits compute the flow from lam"),
+        (
+            Orifice,
+            "flow",
+            "flow must be that of Orifice: steppers and conduits compute the flow from lam",
+        ),
         (Orifice, "conductance", "conductance must be that of Orifice"),
         (Parameters, "gap", "gap must have one of the units m, s, Pa, N"),
     ],
@@ -208,14 +214,21 @@ def test_a_class_that_the_steps_cannot_see_is_refused_in_a_line(base, name, said
     "number, old, new, said",
     [
         (0, "def flow_law", "def flows", "EqualPercentage without flow_law"),
-        (1, "Pad(ExponentialLaw, ", "Pad(", "contact.pad must derive from Parameters and ExponentialLaw"),
+        (
+            1,
+            "Pad(ExponentialLaw, ",
+            "Pad(",
+            "contact.pad must derive from Parameters and ExponentialLaw",
+        ),
     ],
 )
 def test_a_law_that_lacks_what_a_law_has_is_refused_in_a_line(copy, number, old, new, said):
     *place, text = PARTS[number]
     add_part(copy, *place, text.replace(old, new))
     make = "from digiclay.core.scene.toml_table import resolve; from digiclay.core.base.errors import *\n"
-    assert said in run_python(copy, "-c", f"{make}try: resolve({{}})\nexcept ParameterError as e: print(e)")
+    assert said in run_python(
+        copy, "-c", f"{make}try: resolve({{}})\nexcept ParameterError as e: print(e)"
+    )
 
 
 #: What runs in the copy: each arrangement under several methods, and what refuses it.

@@ -58,7 +58,9 @@ def slide(finger, apart):
     """Return the poses at times, s, of one of two fingertips so far apart, m, that press, rock and slide."""
 
     def poses(times):
-        depth = 1.9e-3 * np.sin(np.minimum(16.0 * times, np.pi / 2)) + finger * 0.3e-3 * np.sin(20.0 * times)
+        depth = 1.9e-3 * np.sin(np.minimum(16.0 * times, np.pi / 2)) + finger * 0.3e-3 * np.sin(
+            20.0 * times
+        )
         x = (finger - 0.5) * apart + 4e-3 * np.sin(9.0 * times)
         return pose_at(x, (0.5e-3, 1.8e-3)[finger], REST + 0.6e-3 - depth, 0.3 * (finger + 1))
 
@@ -102,7 +104,8 @@ def integrate(system, cell, commands, ways):
     # Between two of these, 25 µs apart, an underside is straight to within 1 nm.
     moments = np.linspace(0.0, len(commands) * PERIOD, 200 * len(commands) + 1)
     forms = [
-        compute_forms(touch.fingertip.outline(way(moments))) for touch, way in zip(touches, ways, strict=True)
+        compute_forms(touch.fingertip.outline(way(moments)))
+        for touch, way in zip(touches, ways, strict=True)
     ]
     undersides = [compute_underside(*form, basis).ravel() for form in forms]
 
@@ -149,14 +152,22 @@ CASES = {
     "5 mm apart": (SLIDE, {}, partial(slide, apart=5e-3), (FINGER, FINGER), (10, 3e-6, 3e-3)),
     "7 mm apart": (SLIDE, {}, partial(slide, apart=7e-3), (FINGER, FINGER), (10, 3e-6, 3e-3)),
     "another exponent": (SLIDE, {}, partial(slide, apart=6e-3), (FINGER, SOFT), (10, 3e-6, 3e-3)),
-    "another size and relaxation": (SLIDE, {}, partial(slide, apart=7e-3), (FINGER, LONG), (10, 3e-6, 3e-3)),
+    "another size and relaxation": (
+        SLIDE,
+        {},
+        partial(slide, apart=7e-3),
+        (FINGER, LONG),
+        (10, 3e-6, 3e-3),
+    ),
     "one elastic": (SLIDE, {}, partial(slide, apart=6e-3), (FINGER, ELASTIC), (10, 3e-6, 3e-3)),
-    # 0.17, 0.21 and 0.33 mN; 0.6 by the trapezoidal rule, 0.7 in one part, 1.1 without the bend of the way,
-    # 0.35 if a finger may be pressed harder than alone, 1.7 where another m is not of equal slope.
+    # 0.17, 0.21 and 0.33 mN; 0.6 by the trapezoidal rule, 0.7 in one part, 1.1 without the bend of
+    # the way, 0.35 if a finger may be pressed harder than alone, 1.7 where another m is not of
+    # equal slope.
     "locked": (LOCKED, {}, rock, (FINGER, FINGER), (10, 0.0, 0.3e-3)),
     "locked, another exponent": (LOCKED, {}, rock, (FINGER, SOFT), (10, 0.0, 0.3e-3)),
     "locked, a slack one": (LOCKED, {}, rock, (FINGER, SLACK), (10, 0.0, 0.4e-3)),
-    # Measured 34, 96, 42 and 25 µm, and 2, 1, 18 and 17 mN: bounded, not accurate (docs/stability.md).
+    # Measured 34, 96, 42 and 25 µm, and 2, 1, 18 and 17 mN: bounded, not accurate
+    # (docs/stability.md).
     "bore 0.2 mm": (QUICK, NARROW, rock, (FINGER, FINGER), (1, 0.1e-3, 5e-3)),
     "bore 0.2 mm, three unlike": (QUICK, NARROW, rock, (FINGER, SOFT, LONG), (0, 0.2e-3, 5e-3)),
     "orifice 2 mm": (QUICK, WIDE, rock, (FINGER, FINGER), (5, 0.1e-3, 50e-3)),
@@ -184,12 +195,16 @@ def test_a_pin_that_several_fingers_press_agrees_with_scipy(bed, parts, motion, 
 @pytest.mark.parametrize("seed", [0, 3])
 @pytest.mark.parametrize("parts", [NARROW, WIDE], ids=["bore", "orifice"])
 @pytest.mark.parametrize("fingers", [(FINGER,) * 2, (FINGER,) * 3, (FINGER, STEEP, SOFT)])
-def test_a_pin_that_rises_into_several_fingertips_is_pressed_at_most_as_by_each_alone(fingers, parts, seed):
+def test_a_pin_that_rises_into_several_fingertips_is_pressed_at_most_as_by_each_alone(
+    fingers, parts, seed
+):
     random, layout = np.random.default_rng(seed), Layout(rows=5, columns=5)
     commands = random.uniform(-1.0, 1.0, (6, 25)).repeat(10, axis=0)
     turn, shift = random.uniform(0.0, 2.0 * np.pi), random.uniform(-1.5e-3, 1.5e-3, 2)
     across, along = np.array([np.cos(turn), np.sin(turn)]), np.array([-np.sin(turn), np.cos(turn)])
-    middles = [x * across + y * along + shift for x, y in ((-4e-3, 0.7e-3), (3.5e-3, -1e-3), (1e-3, 4e-3))]
+    middles = [
+        x * across + y * along + shift for x, y in ((-4e-3, 0.7e-3), (3.5e-3, -1e-3), (1e-3, 4e-3))
+    ]
     system = replaying(fingers, commands, layout=layout, **parts)
     poses = press(system, [(x, y) for x, y in middles[: len(fingers)]], (0.0, 0.0), 60)
     _, forces, _ = play(system, poses)
@@ -197,8 +212,9 @@ def test_a_pin_that_rises_into_several_fingertips_is_pressed_at_most_as_by_each_
         play(replaying((own,), commands, layout=layout, **parts), poses[:, :, [i]])[1].max()
         for i, own in enumerate(fingers)
     ]
-    # None is pressed harder than alone, so together they press as many times as hard at most: 1.3 times here,
-    # 2.25 among hundreds; 1e52 where a finger that a pin meets within half a step is not seen.
+    # None is pressed harder than alone, so together they press as many times as hard at most: 1.3
+    # times here, 2.25 among hundreds; 1e52 where a finger that a pin meets within half a step is
+    # not seen.
     assert forces.max() <= len(fingers) * max(alone)
 
 
@@ -212,7 +228,8 @@ def test_a_finger_that_comes_or_goes_within_a_step_takes_no_pin_lower_than_one_t
     pins = 500
     fingers, heights = np.arange(count).repeat(pins).reshape(count, pins), np.full(pins, REST)
     valves, filters = np.tile(random.uniform(-1.0, 1.0, pins), (3, 1)), np.zeros((3, count, pins))
-    # The first presses; each of the others does at the first one or two instants of the step, or the last.
+    # The first presses; each of the others does at the first one or two instants of the step, or
+    # the last.
     pressed = random.uniform(0.2e-3, 2e-3, (count, pins))
     away = random.choice([2e-3, 47e-3, 1.0], (count, pins))
     last, goes = random.integers(1, 3, (count, pins)), random.integers(0, 2, (count, pins)) == 1
@@ -223,5 +240,6 @@ def test_a_finger_that_comes_or_goes_within_a_step_takes_no_pin_lower_than_one_t
     jumped, held = (
         system.press_together(heights, valves, filters, one, fingers)[0] for one in (under, stays)
     )
-    # Rounding; 80 µm lower where a parabola through three instants is followed below the lowest of them.
+    # Rounding; 80 µm lower where a parabola through three instants is followed below the lowest of
+    # them.
     assert (jumped >= held - 1e-9).all()

@@ -25,7 +25,9 @@ def profile(session, y):
 
 def features(session, time, former=0.0):
     """Return what was formed between two times, s, by its form."""
-    row, before = (int(np.argmin(np.abs(session.history["time"] - moment))) for moment in (time, former))
+    row, before = (
+        int(np.argmin(np.abs(session.history["time"] - moment))) for moment in (time, former)
+    )
     found = find(fit_skin(make_formed(dict(session.history), row, before), "bilinear", 1, 1e-3))
     assert len(found) == len({one.form for one in found})
     return {one.form: one for one in found}
@@ -36,7 +38,8 @@ def test_the_valley_lies_below_the_surface_from_side_to_side_without_a_lump_at_i
     # 21 mm to either path: outside both blisters (15 mm).
     assert np.abs(profile(session, 0.0)).max() == 0.0
     heights = session.history["height"].reshape(-1, 25, 25)
-    # The finger leaves the valley's end at 25.5 s; pins end where it was last felt, but for a servo's lag.
+    # The finger leaves the valley's end at 25.5 s; pins end where it was last felt, but for a
+    # servo's lag.
     assert abs(heights[-1, 19, 19] - heights[int(25.49 / 5e-3), 19, 19]) < 0.5 * MM
 
 
@@ -52,7 +55,11 @@ def test_at_the_end_there_are_a_ridge_a_mound_and_a_valley_along_the_ways_of_the
 
 
 def test_the_mound_stands_where_the_finger_was_lifted_and_the_ridge_is_as_high_as_before(session):
-    found, before, grown = features(session, 26.5), features(session, 10.3), features(session, 14.0, 10.3)
+    found, before, grown = (
+        features(session, 26.5),
+        features(session, 10.3),
+        features(session, 14.0, 10.3),
+    )
     assert (before.keys(), grown.keys()) == ({"ridge"}, {"mound"})
     for mound in (found["mound"], grown["mound"]):
         assert np.linalg.norm(mound.region.position.mean(axis=0) - (21e-3, -21e-3)) < 6e-3

@@ -81,7 +81,8 @@ TURNED = [
 @pytest.mark.parametrize("way, image", TURNED)
 @pytest.mark.parametrize("method", METHODS)
 def test_a_finger_that_slides_off_raises_no_pin(method, way, image):
-    # 8 to 36 mm with Method I, up to 3 with Method III without a rim. Method II raises flanks on a whole bed.
+    # 8 to 36 mm with Method I, up to 3 with Method III without a rim. Method II raises flanks on a
+    # whole bed.
     scene = add("paper", method)
     off = np.dot(WAYS[way](half(scene)), np.transpose(IMAGES[image])).tolist()
     assert rise(scene, *off) <= rise_within(method, way) + MOST
@@ -133,12 +134,16 @@ def test_a_finger_lifted_over_the_outer_cells_raises_them(method, beside):
 def deviation(method, beyond, image, outside=0.0):
     """Return the rms deviation of the force from its set point, N, along the rim, lifted 8 mm, at 12 mm/s.
 
-    The lowest point is so far beyond the last row, mm; judged from the lift on, also without contact. The
-    finger is pressed there, or farther `outside`, mm, from where it comes in.
+    The lowest point is so far beyond the last row, mm; judged from the lift on, also without
+    contact. The finger is pressed there, or farther `outside`, mm, from where it comes in.
     """
     scene = add("paper", method)
     out, lift = half(scene) + beyond, 0.8 + outside / 12.0
-    ways = [(0.0, outside, -8, 42), (0.5, outside, -8, 35.5), (lift - 0.3, 0.0, -8, 35.5)] if outside else []
+    ways = (
+        [(0.0, outside, -8, 42), (0.5, outside, -8, 35.5), (lift - 0.3, 0.0, -8, 35.5)]
+        if outside
+        else []
+    )
     ways = ways or [(0.0, 0.0, -8, 42), (0.5, 0.0, -8, 35.5)]
     ways += [(lift, 0.0, -8, 35.5), (lift + 1.6, 0.0, -8, 44), (lift + 1.8, 0.0, -8, 44)]
     ways += [(lift + 3.1, 0.0, 7.6, 44)]
@@ -168,8 +173,12 @@ def test_along_the_rim_method_three_is_no_worse_than_method_one(beyond, image, m
     "beyond, image, most",
     [(0.0, "as it is", 1.75), (1.5, "mirrored", 1.5), (5.0, "as it is", 1.1), (0.0, "turned", 0.7)],
 )
-def test_pressed_in_from_outside_method_three_is_as_much_worse_as_the_page_says(beyond, image, most):
-    one, three = (deviation(method, beyond, image, 20.0 - beyond) for method in ("virtual_master", "hybrid"))
+def test_pressed_in_from_outside_method_three_is_as_much_worse_as_the_page_says(
+    beyond, image, most
+):
+    one, three = (
+        deviation(method, beyond, image, 20.0 - beyond) for method in ("virtual_master", "hybrid")
+    )
     print(f"{beyond:g} mm: Method I {1e3 * one:.0f} mN, Method III {1e3 * three:.0f} mN")
     assert three <= most * one
     assert max(one, three) < 0.2  # neither is lost

@@ -18,15 +18,18 @@ from digiclay.core.session.run_scene import run
 
 from tests.assemble import STACKABLE, followed, moved, sample
 
-#: Sums in another order: a last bit here and there. Heights are centimeters, forces tenths of a newton.
+#: Sums in another order: a last bit here and there. Heights are centimeters, forces tenths of a
+#: newton.
 HEIGHT, FORCE = 1e-12, 1e-10
-#: So many times as much of Method III: its estimates end at the 11th digit, which a last bit may change.
+#: So many times as much of Method III: its estimates end at the 11th digit, which a last bit may
+#: change.
 ESTIMATED = 100.0
-#: The same of figures: lags are rounded to 1e-12 m; forces, by their unit, as above; a volume adds up some
-#: hundred heights, each over 1e-5 m².
+#: The same of figures: lags are rounded to 1e-12 m; forces, by their unit, as above; a volume adds
+#: up some hundred heights, each over 1e-5 m².
 RELATIVE, ABSOLUTE, OTHERS = 1e-9, {"N": FORCE, "m3": 1e-15}, 1e-12
-#: An estimate is the difference of two integrations under the same commands. Alone and in a stack both end in
-#: other last bits (sums in another order), some 1e-17 m and 1e-14 N, of heights of 4 cm and forces of 0.4 N.
+#: An estimate is the difference of two integrations under the same commands. Alone and in a stack
+#: both end in other last bits (sums in another order), some 1e-17 m and 1e-14 N, of heights of 4 cm
+#: and forces of 0.4 N.
 NOTHING = {"height": 1e-15, "force": 1e-12, "total_force": 1e-12}
 
 
@@ -60,7 +63,9 @@ def assert_as_alone(found, alone):
     for name, values in alone.history.items():
         tolerance = HEIGHT if name == "height" else FORCE
         tolerance *= ESTIMATED if alone.scene.method == "hybrid" else 1.0
-        np.testing.assert_allclose(found.history[name], values, rtol=0, atol=tolerance, err_msg=name)
+        np.testing.assert_allclose(
+            found.history[name], values, rtol=0, atol=tolerance, err_msg=name
+        )
     assert_figures(found, alone)
 
 
@@ -88,9 +93,14 @@ def assert_all_as_alone(scenes, *, judge=False, errors=False):
 
 @pytest.mark.parametrize("method", METHODS)
 def test_runs_with_fingers_ends_and_devices_of_their_own_come_to_what_they_come_to_alone(method):
-    devices = ((f"valve.stroke={25 + 5 * i}e-6", f"actuator.rest_height={40 - 0.2 * i}e-3") for i in range(2))
+    devices = (
+        (f"valve.stroke={25 + 5 * i}e-6", f"actuator.rest_height={40 - 0.2 * i}e-3")
+        for i in range(2)
+    )
     known = [sample(STACKABLE[method], f"control.method={method}", *device) for device in devices]
-    scenes = [moved(one, 0.7e-3 * i, -0.2e-3 * i, 0.5 + 0.05 * i, 0.3) for i, one in enumerate(known)]
+    scenes = [
+        moved(one, 0.7e-3 * i, -0.2e-3 * i, 0.5 + 0.05 * i, 0.3) for i, one in enumerate(known)
+    ]
     assert_all_as_alone(scenes, errors=True)
 
 
@@ -160,7 +170,8 @@ def test_behaviors_and_steppers_do_what_they_do_alone(name, keys, settings, *, e
     [
         ("tap", "control.force_gain", (3, 5), ("layout.arrangement=hexagonal",)),
         ("slow_press", "control.force_gain", (3, 5), ("recorder.every=7", "simulation.duration=0.503")),
-        # The cells are chosen anew every 32 periods or sooner: most of their sets have no row of their own.
+        # The cells are chosen anew every 32 periods or sooner: most of their sets have no row of
+        # their own.
         ("plastic_press", "contact.exponent", (2e3, 1990), ("recorder.every=99", "simulation.duration=0.9")),
         ("tap", "actuator.rest_height", (0.01, 0.02), ("simulation.duration=0.1",)),  # nothing is touched
         ("tap", "actuator.bore", (1.8e-3, 2e-3), ("valve_lag=absent", "relaxation=absent", "conduit=absent")),
@@ -173,9 +184,17 @@ def test_what_is_recorded_and_judged_of_a_run_is_that_of_the_run_alone(name, key
 
 
 def test_every_metric_of_a_ridge_is_that_of_the_run_alone():
-    way = ((0, -14, 0, 41.5), (0.3, -14, 0, 37), (0.6, -14, 0, 37), (1.8, 14, 0, 37), (2.1, 14, 0, 37))
+    way = (
+        (0, -14, 0, 41.5),
+        (0.3, -14, 0, 37),
+        (0.6, -14, 0, 37),
+        (1.8, 14, 0, 37),
+        (2.1, 14, 0, 37),
+    )
     methods = ({"method": "virtual_master", "force_gain": gain} for gain in (3, 5))
-    for found in assert_all_as_alone([followed("", way, control=one) for one in methods], judge=True):
+    for found in assert_all_as_alone(
+        [followed("", way, control=one) for one in methods], judge=True
+    ):
         assert None not in (found.metrics[name] for name in METRICS)
 
 
@@ -187,7 +206,14 @@ def test_pins_on_end_stops_and_relaxed_pulp_come_to_what_they_come_to_alone():
         assert found.history["height"][pressed].min() == 0.0
     points = tuple(
         Waypoint(time=time, position=(0.0, 0.0, z))
-        for time, z in ((0.0, 41e-3), (0.2, 38e-3), (0.3, 60e-3), (0.5, 60e-3), (0.7, 38e-3), (0.9, 60e-3))
+        for time, z in (
+            (0.0, 41e-3),
+            (0.2, 38e-3),
+            (0.3, 60e-3),
+            (0.5, 60e-3),
+            (0.7, 38e-3),
+            (0.9, 60e-3),
+        )
     )
     known = sample("tap", "control.method=plastic", "simulation.duration=0.9")
     twice = known.with_sections(trajectory=replace(known.section("trajectory"), waypoints=points))
@@ -209,7 +235,11 @@ def test_a_bed_that_stands_still_or_shapes_itself_does_so_as_alone(name, setting
 
 def test_a_run_that_diverges_ends_in_its_own_error_and_the_others_go_on():
     # Steps far too long for Euler; only the middle one's finger gets to the bed.
-    long = ("simulation.control_period=50e-3", "simulation.physics_step=50e-3", "simulation.duration=2.0")
+    long = (
+        "simulation.control_period=50e-3",
+        "simulation.physics_step=50e-3",
+        "simulation.duration=2.0",
+    )
     known = sample("slow_press", "simulation.stepper=euler", *long)
     scenes = [moved(known, 0.0, 20e-3), known, moved(known, 1e-3, 20e-3)]
     said = r"^At [\d.]+ s the height of cell \d+ became inf\. Use a shorter"
@@ -241,9 +271,13 @@ def test_a_stack_without_recorder_has_no_history_shares_its_time_and_can_be_stop
     assert list(run_together(scenes, stopped=lambda: True)) == []
 
 
-@pytest.mark.parametrize("every, errors", [(1, False), (2, True)], ids=["not asked for", "no commands"])
+@pytest.mark.parametrize(
+    "every, errors", [(1, False), (2, True)], ids=["not asked for", "no commands"]
+)
 def test_without_all_commands_or_unasked_a_run_is_judged_without_errors_or_history(every, errors):
-    (only,) = judged([sample("tap", f"recorder.every={every}", "simulation.duration=0.05")], errors=errors)
+    (only,) = judged(
+        [sample("tap", f"recorder.every={every}", "simulation.duration=0.05")], errors=errors
+    )
     assert only.history == {}
     assert "height_error" not in only.metrics
 
@@ -276,14 +310,18 @@ NOISES = (("1e-3", "5e-6", "1"), ("2e-3", "2e-6", "2"), ("0.5e-3", "20e-6", str(
 
 def noisy(name, *settings):
     keys = ("force_noise", "height_noise", "seed")
-    noises = ([f"sensors.{key}={value}" for key, value in zip(keys, noise, strict=True)] for noise in NOISES)
+    noises = (
+        [f"sensors.{key}={value}" for key, value in zip(keys, noise, strict=True)]
+        for noise in NOISES
+    )
     return [sample(name, *settings, *noise) for noise in noises]
 
 
 @pytest.mark.parametrize("method", METHODS)
 def test_runs_with_noise_of_their_own_come_to_what_they_come_to_alone(method):
     scenes = noisy(STACKABLE[method], f"control.method={method}")
-    # Fingers that come down elsewhere, up to far apart, and differently far: other cells, and not as many.
+    # Fingers that come down elsewhere, up to far apart, and differently far: other cells, and not
+    # as many.
     ways = ((-8e-3, 0.5), (0.0, 0.45), (2e-3, 0.4))
     assert_all_as_alone(
         [
@@ -303,7 +341,11 @@ def test_runs_with_noise_of_their_own_come_to_what_they_come_to_alone(method):
         ("cell_states", ("observer=valve", "height_step=1e-6"), False),
     ],
 )
-def test_readings_that_are_rounded_late_or_estimated_are_those_of_the_run_alone(method, sensors, *, noise):
+def test_readings_that_are_rounded_late_or_estimated_are_those_of_the_run_alone(
+    method, sensors, *, noise
+):
     settings = [f"control.method={method}", *(f"sensors.{one}" for one in sensors)]
     known = noisy("slow_press", *settings) if noise else [sample("slow_press", *settings)] * 3
-    assert_all_as_alone([moved(one, 0.7e-3 * i, -1e-3 * i, 0.25, 0.3) for i, one in enumerate(known)])
+    assert_all_as_alone(
+        [moved(one, 0.7e-3 * i, -1e-3 * i, 0.25, 0.3) for i, one in enumerate(known)]
+    )

@@ -31,6 +31,7 @@ def test_on_40000_pins_as_many_cells_take_part_in_as_many_numpy_calls_as_on_625(
 
 
 def test_the_bytes_of_a_pin_are_those_of_its_rows_place_mode_and_age():
-    # Nine rows and the age as float64, x and y, and one byte of mode; what is left over is a few kilobytes.
+    # Nine rows and the age as float64, x and y, and one byte of mode; what is left over is a few
+    # kilobytes.
     least = ((9 + 1 + 2) * 8 + 1) * LARGE * LARGE
     assert 0 <= measure_bytes(LARGE) - least < 20_000

@@ -30,7 +30,9 @@ from tests.other_process import PACKAGES
 from tests.served import TOKEN, frame_message, load_example, serve
 from tests.timeouts import TIMEOUT, wait_until
 
-pytestmark = pytest.mark.skipif("sys.platform == 'win32'", reason="the server runs on Linux and macOS")
+pytestmark = pytest.mark.skipif(
+    "sys.platform == 'win32'", reason="the server runs on Linux and macOS"
+)
 PRESS = (0.0, 0.0, 0.038, 1.0, 0.0, 0.0, 0.0)
 
 
@@ -44,7 +46,9 @@ def server(tmp_path_factory):
         assert "doors that did not answer" not in report["counts"]
         found = sorted((folder / "recorded").iterdir())
         takes = [from_bytes(path.read_bytes()) for path in found]
-        assert [path.name for path in found] == [f"take_{1 + index:03}.npz" for index in range(len(takes))]
+        assert [path.name for path in found] == [
+            f"take_{1 + index:03}.npz" for index in range(len(takes))
+        ]
         assert sum(take.periods for take in takes) + report["left_out"] == report["periods"]
 
 
@@ -63,7 +67,11 @@ def press(client, number):
     while True:
         client.send(pack_pose(Pose(PRESS, number)))
         frame = next(frames(client))
-        if frame.number == number and frame.pose.tolist() == list(PRESS) and frame.total_force > 0.0:
+        if (
+            frame.number == number
+            and frame.pose.tolist() == list(PRESS)
+            and frame.total_force > 0.0
+        ):
             return frame
 
 
@@ -187,7 +195,12 @@ def test_hands_of_a_quest_are_recorded_and_played_into_a_server(tmp_path):
 def test_a_pose_comes_back_as_forces_and_heights(server):
     with server.connect("?format=binary&rate=200") as client:
         bed = json.loads(client.recv(TIMEOUT))
-        assert (bed["type"], bed["rows"], bed["columns"], len(bed["positions"])) == ("bed", 9, 9, 81)
+        assert (bed["type"], bed["rows"], bed["columns"], len(bed["positions"])) == (
+            "bed",
+            9,
+            9,
+            81,
+        )
         frame = press(client, 7)
         while frame.heights.min() > 0.0399:
             frame = press(client, 7)
@@ -204,7 +217,10 @@ def test_json_says_the_same_and_flags_a_jump_of_10_mm(server):
         while frame.get("number") != 8 or "pose_limited" in frame["flags"]:
             frame = json.loads(client.recv(TIMEOUT))
         assert (frame["type"], frame["version"]) == ("state", 1)
-        assert (frame["position"], frame["orientation"]) == ([0.0, 0.0, 0.039], [1.0, 0.0, 0.0, 0.0])
+        assert (frame["position"], frame["orientation"]) == (
+            [0.0, 0.0, 0.039],
+            [1.0, 0.0, 0.0, 0.0],
+        )
         assert len(frame["heights"]) == len(frame["forces"]) == 81
         while not {"beyond_a_finger", "force_limited"} <= set(frame["flags"]) - {"pose_limited"}:
             client.send(json.dumps({**said, "position": [0.0, 0.0, 0.029]}))
@@ -225,7 +241,9 @@ def test_a_reset_brings_the_bed_to_rest(server):
 def test_a_client_names_the_token_in_its_header_or_in_the_address(server):
     with server.connect(f"?token={TOKEN}", token="") as client:
         assert json.loads(client.recv(TIMEOUT))["type"] == "bed"
-    wrong = [refused(server, token=token) for token in ("", "another-token", TOKEN[:-1], TOKEN + "x")]
+    wrong = [
+        refused(server, token=token) for token in ("", "another-token", TOKEN[:-1], TOKEN + "x")
+    ]
     assert (wrong, refused(server, token=TOKEN, wishes="?format=xml")) == ([401] * 4, 400)
 
 
@@ -275,7 +293,9 @@ def test_a_flood_or_a_slow_reader_harms_nobody(server):
     with (
         server.connect("?format=binary&rate=200") as other,
         server.connect("?rate=0", close_timeout=0) as client,
-        server.connect("?rate=200", max_queue=1, close_timeout=0) as slow,  # reads nothing from here on
+        server.connect(
+            "?rate=200", max_queue=1, close_timeout=0
+        ) as slow,  # reads nothing from here on
     ):
         slow.recv(TIMEOUT)
         with suppress(OSError):  # a machine that takes them within a second closes the client
@@ -324,7 +344,9 @@ def test_a_thousand_silent_connections_shut_out_nobody_with_the_token(server):
         silent = [socket.create_connection(("127.0.0.1", server.port)) for _ in range(1000)]
         try:
             press(client, 20)
-            while server.count("connections beyond the limit") < 488:  # all but the newest 512 are cut
+            while (
+                server.count("connections beyond the limit") < 488
+            ):  # all but the newest 512 are cut
                 press(client, 20)
         finally:
             for one in silent:
@@ -375,7 +397,9 @@ def is_well_by_osc(door, number):
     subscribe = message("/digiclay/subscribe", TOKEN, "state", 200.0)
     pose = message("/digiclay/pose", TOKEN, *PLACE, number)
     state = [0, 0]
-    while state[1] != number or state[4:7] != pytest.approx(PLACE, abs=1e-8):  # python-osc sends 32 bits
+    while state[1] != number or state[4:7] != pytest.approx(
+        PLACE, abs=1e-8
+    ):  # python-osc sends 32 bits
         state = received(door, "/digiclay/state", subscribe, pose)
     assert state[1] == number
 
@@ -394,7 +418,9 @@ def test_the_examples_of_the_page_run(server, door, monkeypatch, capsys):
     assert float(said.split()[6]) > 0.0
     assert said.endswith(": 2.0 N\n")
     subscribe = message("/digiclay/subscribe", TOKEN, "state", 200.0)
-    wait_until(lambda: received(door, "/digiclay/state", subscribe)[4:7] == pytest.approx(PLACE, abs=1e-8))
+    wait_until(
+        lambda: received(door, "/digiclay/state", subscribe)[4:7] == pytest.approx(PLACE, abs=1e-8)
+    )
 
 
 def test_the_pins_come_as_blobs_and_a_reset_has_its_message(door):
@@ -414,7 +440,9 @@ def test_a_wrong_osc_message_is_answered_in_one_line(door):
         ("subscribe", ("state", 1e9)), ("subscribe", ("state",)), ("posse", ()),
     ):  # fmt: skip
         # Errors are sent ten times a second at most.
-        (said, *_) = received(door, "/digiclay/error", message(f"/digiclay/{address}", TOKEN, *values))
+        (said, *_) = received(
+            door, "/digiclay/error", message(f"/digiclay/{address}", TOKEN, *values)
+        )
         assert ("must" in said, "\n" in said) == (True, False)
 
 
@@ -434,15 +462,26 @@ def test_garbage_harms_nobody(door):
     for cut in range(0, len(good), 3):
         door.send(good[:cut])
     door.send(b"#bundle\0" + bytes(8) + b"\x7f\xff\xff\xff" + good)
-    for kind in range(1, 1000):  # arguments of kinds that are none: nothing is printed, see `Server.stop`
+    for kind in range(
+        1, 1000
+    ):  # arguments of kinds that are none: nothing is printed, see `Server.stop`
         door.send(b"/digiclay/pose\0\0," + bytes([1 + kind % 31, 1 + kind % 97, 0]) + bytes(16))
     is_well_by_osc(door, 4)
 
 
 def test_the_example_shows_the_heights_on_a_pin_display(server, door):
     ours, theirs = pty.openpty()
-    command = [sys.executable, str(pin_display.__file__), f"ws://127.0.0.1:{server.port}", os.ttyname(theirs)]
-    environment = {**os.environ, "DIGICLAY_SERVE_TOKEN": TOKEN, "PYTHONPATH": os.pathsep.join(sys.path)}
+    command = [
+        sys.executable,
+        str(pin_display.__file__),
+        f"ws://127.0.0.1:{server.port}",
+        os.ttyname(theirs),
+    ]
+    environment = {
+        **os.environ,
+        "DIGICLAY_SERVE_TOKEN": TOKEN,
+        "PYTHONPATH": os.pathsep.join(sys.path),
+    }
     rest, bodies = b"", []
 
     def receive():

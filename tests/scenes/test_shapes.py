@@ -18,7 +18,14 @@ DEAD_BAND, PERIOD = 10e-6, 5e-3
 #: Within this time a shape of 10 mm has come up; then the finger comes down.
 SHOWN = 2.0
 #: Time in s, then x, y, z in mm: away, into the top of the dome, away again, and time to recover.
-WAY = ((0.0, 0, 0, 75), (SHOWN, 0, 0, 75), (2.6, 0, 0, 47), (3.2, 0, 0, 46), (3.4, 0, 0, 75), (6.4, 0, 0, 75))
+WAY = (
+    (0.0, 0, 0, 75),
+    (SHOWN, 0, 0, 75),
+    (2.6, 0, 0, 47),
+    (3.2, 0, 0, 46),
+    (3.4, 0, 0, 75),
+    (6.4, 0, 0, 75),
+)
 SHAPE = {"file": "dome", "rise": 10e-3}
 
 
@@ -53,7 +60,8 @@ def test_every_method_takes_over_a_shape_that_stands(method):
     # Before it stands its cells are on their way.
     assert np.any(history["mode"][5] == Mode.BLISTER)
     assert not np.any(history["mode"][round(SHOWN / PERIOD)] == Mode.BLISTER)
-    # The finger is felt on it: the top of the dome is at 50 mm, a bed at rest is not reached at 46 mm.
+    # The finger is felt on it: the top of the dome is at 50 mm, a bed at rest is not reached at 46
+    # mm.
     assert history["total_force"].max() > 0.1
     losses = {"virtual_master": 1, "plastic": None}  # the hand-over counts the finger's
     assert formed(method).metrics["losses"] == losses.get(method, formed(method).metrics["losses"])
@@ -61,7 +69,11 @@ def test_every_method_takes_over_a_shape_that_stands(method):
 
 @pytest.mark.parametrize(
     "control",
-    ["absent", {"method": "shape_display", "refresh": "approximate_gradual"}, {"method": "elastic"}],
+    [
+        "absent",
+        {"method": "shape_display", "refresh": "approximate_gradual"},
+        {"method": "elastic"},
+    ],
 )
 def test_without_a_method_the_shape_stands_or_as_the_display_shows_it_and_costs_nothing(control):
     made = scene(None, control=control)
@@ -93,7 +105,9 @@ def test_a_bed_that_recovers_goes_back_to_the_shape_and_not_to_rest(method):
 def test_a_session_without_a_shape_is_what_it_was_before():
     # The same bed, displayed flat: a shape that is no shape changes no number.
     bed = {"layout": {"rows": 15, "columns": 15}, "simulation": {"duration": 1.5}}
-    one, other = (run(resolve(bed | shape)).history for shape in ({}, {"shape": SHAPE | {"rise": 0.0}}))
+    one, other = (
+        run(resolve(bed | shape)).history for shape in ({}, {"shape": SHAPE | {"rise": 0.0}})
+    )
     assert np.array_equal(one["height"], other["height"])
     assert one["total_force"].max() > 0.1
 
@@ -124,7 +138,8 @@ def test_every_sample_session_forms_what_it_says(name):
     made = load(find(name))
     result = run(made)
     raised = (result.history["height"][-1] - made.actuator.rest_height) * 1e3
-    # Between machines a session differs by far less than this; another way of forming differs by more.
+    # Between machines a session differs by far less than this; another way of forming differs by
+    # more.
     assert (raised.min(), raised.max()) == pytest.approx(SESSIONS[name], abs=0.2)
     assert 0.04 < result.history["total_force"].max() < 3.0
     assert set(result.history["mode"][-1].tolist()) <= {Mode.REST, Mode.HOLD}

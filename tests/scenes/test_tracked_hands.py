@@ -61,13 +61,25 @@ class Stream:
             names = names[::-1] if self.exchanged[0] <= time < self.exchanged[1] else names
             for hand, side in enumerate((-1.0, 1.0)):
                 places[hand][0] += side * self.beside * np.interp(time, [0.3, 0.6], [40e-3, 0.0])
-                places[hand][1] += self.astray * (round(time * self.rate) % 30 == 3 + 7 * hand) * 20e-3
+                places[hand][1] += (
+                    self.astray * (round(time * self.rate) % 30 == 3 + 7 * hand) * 20e-3
+                )
             named = [(name, place.tolist()) for name, place in zip(names, places, strict=True)]
             if self.gone[0] <= time < self.gone[1]:
                 named = named[:1]
             if self.hostile:
-                nan = [(3, [np.nan, 0.0, 0.0]), (4, [0.0, 0.0, 0.0]), (4, [1.0, 0.0, 0.0]), ("a", [0.0] * 3)]
-                named = [*named, *nan, *((name, [0.0] * 7) for name in range(5, 40)), (-1, [0.0] * 3)]
+                nan = [
+                    (3, [np.nan, 0.0, 0.0]),
+                    (4, [0.0, 0.0, 0.0]),
+                    (4, [1.0, 0.0, 0.0]),
+                    ("a", [0.0] * 3),
+                ]
+                named = [
+                    *named,
+                    *nan,
+                    *((name, [0.0] * 7) for name in range(5, 40)),
+                    (-1, [0.0] * 3),
+                ]
             if not self.silent[0] <= time < self.silent[1]:
                 yield time, named
 
@@ -76,7 +88,8 @@ class Stream:
 class Shaped:
     """What became of a stream."""
 
-    #: (t,), s; (t, 2), N; (t, 2), m, above the clay; (t, 2): whether pins follow the force below each.
+    #: (t,), s; (t, 2), N; (t, 2), m, above the clay; (t, 2): whether pins follow the force below
+    #: each.
     time: np.ndarray
     force: np.ndarray
     height: np.ndarray
@@ -92,7 +105,9 @@ class Shaped:
 @cache
 def shaped(stream, tracking=HANDS, lasts=LASTS):
     """Return what becomes of a stream within a time, s, as `real_time_loop` has it."""
-    scene = load(find("ridge_mound_valley"), [Setting("layout.rows", "19"), Setting("layout.columns", "27")])
+    scene = load(
+        find("ridge_mound_valley"), [Setting("layout.rows", "19"), Setting("layout.columns", "27")]
+    )
     session = begin_session(replace(scene, fingers=2 * scene.fingers), LIMITS, tracking)
     order, rows, messages = Order(), [], list(stream.messages())
     position, period = session.system.grid.positions, session.system.period
@@ -116,9 +131,13 @@ WORSE = {"gone": (3.0, 3.06), "silent": (4.0, 4.06), "exchanged": (5.0, 5.5), "h
 #: Another identity after a dropout of 60 ms, then in the next message; then they are exchanged.
 RENAMED = Stream(90.0, gone=(3.0, 3.06), exchanged=(5.0, 5.5), renamed=(3.06, 4.0))
 STREAMS = {
-    "at 60 Hz, with dropouts of 60 ms, exchanged identities, hostile fingers": Stream(60.0, **WORSE),
+    "at 60 Hz, with dropouts of 60 ms, exchanged identities, hostile fingers": Stream(
+        60.0, **WORSE
+    ),
     "at 90 Hz, with other identities": RENAMED,
-    "at 30 Hz, from beside the bed, with places that are none": Stream(30.0, beside=True, astray=True),
+    "at 30 Hz, from beside the bed, with places that are none": Stream(
+        30.0, beside=True, astray=True
+    ),
 }
 
 
@@ -155,7 +174,9 @@ def test_nobody_presses_on_after_a_dropout(gone):
 def test_without_a_part_tracked_hands_are_no_fingers():
     # With all parts it shapes from 2.6 s on, as deep as it then is.
     times = {"clutch": 3.2, "cutoff": 2.6, "coupling": 1.8}
-    found = {part: shaped(RENAMED, replace(HANDS, **{part: 0.0}), lasts) for part, lasts in times.items()}
+    found = {
+        part: shaped(RENAMED, replace(HANDS, **{part: 0.0}), lasts) for part, lasts in times.items()
+    }
     # Off by 7 mm, a hand touches nothing, or presses as much deeper.
     assert not found["clutch"].shaping[:, 0].any()
     assert found["cutoff"].force.max() > 1.5 * shaped(RENAMED).force.max()
@@ -165,9 +186,13 @@ def test_without_a_part_tracked_hands_are_no_fingers():
 @pytest.mark.parametrize(
     "coupling, depth, soft", [(100.0, 10e-3, True), (100.0, 2e-3, True), (0.0, 2e-3, False)]
 )
-def test_fingers_of_a_pad_that_have_their_whole_depth_at_once_need_the_coupling(coupling, depth, soft):
+def test_fingers_of_a_pad_that_have_their_whole_depth_at_once_need_the_coupling(
+    coupling, depth, soft
+):
     scene = load(find("ridge_mound_valley"))
-    session = begin_session(replace(scene, fingers=2 * scene.fingers), LIMITS, Tracking(coupling=coupling))
+    session = begin_session(
+        replace(scene, fingers=2 * scene.fingers), LIMITS, Tracking(coupling=coupling)
+    )
     places, force = [(-18e-3, 1e-3, 40e-3 - depth), (21e-3, -3e-3, 40e-3 - depth)], 0.0
     order, _ = Order().name(check_fingers([*enumerate(places)], None, 0), 2)
     for _ in range(200):

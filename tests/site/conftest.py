@@ -21,7 +21,9 @@ def site() -> Path:
 
 @pytest.fixture(scope="session")
 def browser() -> Iterator[Any]:
-    webdriver = pytest.importorskip("selenium.webdriver", reason="selenium is not installed: run 'make docs'")
+    webdriver = pytest.importorskip(
+        "selenium.webdriver", reason="selenium is not installed: run 'make docs'"
+    )
     program, driver = shutil.which("chromium"), shutil.which("chromedriver")
     if not program or not driver:
         pytest.skip("chromium and chromedriver are not installed: run 'make docs'")

@@ -98,12 +98,16 @@ def play(text: str, folder: Path, excused: set[str]) -> list[str]:
     """Carry out the commands of a page that are not excused, in a folder with its files; return failures."""
     for name, content in find_files(text).items():
         (folder / name).write_text(content, encoding="utf-8")
-    once = dict.fromkeys(command.text for command in find_commands(text) if command.text not in excused)
+    once = dict.fromkeys(
+        command.text for command in find_commands(text) if command.text not in excused
+    )
     return list(filter(None, (execute(one, folder) for one in once if not one.startswith("make "))))
 
 
 def _commands() -> list[Command]:
-    return [command for page in PAGES for command in find_commands(page.read_text(encoding="utf-8"))]
+    return [
+        command for page in PAGES for command in find_commands(page.read_text(encoding="utf-8"))
+    ]
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())
@@ -118,9 +122,8 @@ def test_every_make_of_the_pages_is_carried_out_in_the_checkout_where_it_belongs
 
 
 def test_a_command_that_fails_is_noticed(tmp_path: Path) -> None:
-    text = (
-        "    digiclay run \\\n absent_scene\n    digiclay --version\n`digiclay run`, `digiclay run SCENE`\n"
-    )
+    text = "    digiclay run \\\n absent_scene\n    digiclay --version\n"
+    text += "`digiclay run`, `digiclay run SCENE`\n"
     (failure,) = play(text, tmp_path, set())
     assert "digiclay run absent_scene: status 2" in failure
     assert play(text, tmp_path, {"digiclay run absent_scene"}) == []
@@ -132,10 +135,14 @@ def test_every_listed_command_is_on_a_page_and_has_a_reason_and_something_that_s
     assert len({command.text for command in _commands() if command.block} - _excused()) > 40
     assert sorted(set(listed) - {command.text for command in _commands()}) == []
     assert len(listed) == len(set(listed))
-    assert [group for group in groups if not group["reason"] or not (ROOT / group["shown"]).is_file()] == []
+    assert [
+        group for group in groups if not group["reason"] or not (ROOT / group["shown"]).is_file()
+    ] == []
 
 
 def test_a_command_shown_by_the_whole_check_is_one_of_its_parts() -> None:
     parts = (ROOT / ".ci" / "run").read_text(encoding="utf-8")
     (shown,) = [group["commands"] for group in _listed()["group"] if group["shown"] == ".ci/run"]
-    assert [command for command in shown if not re.search(rf" {command}( [A-Z]+=.*)?\n", parts)] == []
+    assert [
+        command for command in shown if not re.search(rf" {command}( [A-Z]+=.*)?\n", parts)
+    ] == []

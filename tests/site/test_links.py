@@ -60,7 +60,9 @@ def pages(site: Path) -> list[Path]:
     return [path for path in sorted(site.rglob("*.html")) if path.name != "404.html"]
 
 
-def test_every_link_and_picture_of_the_site_leads_to_something(site: Path, pages: list[Path]) -> None:
+def test_every_link_and_picture_of_the_site_leads_to_something(
+    site: Path, pages: list[Path]
+) -> None:
     found = {path.relative_to(site).as_posix(): broken(site, path) for path in pages}
     assert len(found) > 50
     assert sum(len(read_page(path).links) for path in pages) > 3000

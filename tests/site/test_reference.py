@@ -43,11 +43,17 @@ def test_every_command_is_on_the_page_of_the_command_line(site: Path) -> None:
 
 
 def test_every_example_of_the_command_line_is_one_that_its_program_takes() -> None:
-    epilogs = [*(command.epilog or "" for command in commands()), parser().epilog, benchmarks_parser().epilog]
+    epilogs = [
+        *(command.epilog or "" for command in commands()),
+        parser().epilog,
+        benchmarks_parser().epilog,
+    ]
     joined = [" ".join((epilog or "").split("\\\n")) for epilog in epilogs]
     found = [COMMAND.match(line.strip()) for epilog in joined for line in epilog.splitlines()]
     # Two blanks begin the remark beside a command.
-    examples = [(match[1], re.split(r"(?<! )\s{2,}(?=[^-\s])| > ", match[2])[0]) for match in found if match]
+    examples = [
+        (match[1], re.split(r"(?<! )\s{2,}(?=[^-\s])| > ", match[2])[0]) for match in found if match
+    ]
     assert len(examples) > 40
     assert [example for example in examples if is_refused(*example)] == []
 
@@ -68,14 +74,18 @@ def test_every_name_that_python_offers_has_its_entry_by_subject(site: Path) -> N
     headings = " ".join(re.findall(r"<h3 .*?</h3>", text, re.DOTALL))
     entries = set(re.findall(r">\s*digiclay\.(\w+)\s*<", headings))
     tree = ast.parse(Path(digiclay.__file__).read_text(encoding="utf-8"))
-    functions = [node.name for node in tree.body if isinstance(node, ast.FunctionDef) and node.name[0] != "_"]
+    functions = [
+        node.name for node in tree.body if isinstance(node, ast.FunctionDef) and node.name[0] != "_"
+    ]
     offered = {*functions, *digiclay.__all__}
     assert offered - entries == set(), "PYTHON in tools/site_pages.py needs a ':::' entry of each"
 
 
 def list_public(module: griffe.Object) -> Iterator[str]:
     for name, member in module.members.items():
-        hidden = module.exports and name not in module.exports and isinstance(member, griffe.Attribute)
+        hidden = (
+            module.exports and name not in module.exports and isinstance(member, griffe.Attribute)
+        )
         if name[0] != "_" and not hidden and not isinstance(member, griffe.Alias):
             yield member.path
             if isinstance(member, griffe.Module | griffe.Class):
@@ -103,7 +113,9 @@ def test_every_sample_scene_has_its_row_with_a_picture(site: Path) -> None:
         for name in re.findall(r"<code>(\w+)</code><br", row)
     }
     assert pictures.keys() == {*list_samples()}
-    lacking = [name for name, picture in pictures.items() if not (site / "reference" / picture).is_file()]
+    lacking = [
+        name for name, picture in pictures.items() if not (site / "reference" / picture).is_file()
+    ]
     assert lacking == [], "draw each by 'python tools/doc_pictures.py samples/NAME.jpg'"
 
 
@@ -113,6 +125,8 @@ def test_every_declared_name_has_its_row_with_its_unit(site: Path, table: dict[s
     lacking = [
         name
         for name, declared in table.items()
-        if not any(f"<code>{name}</code>" in row and f"<td>{declared.unit}</td>" in row for row in rows)
+        if not any(
+            f"<code>{name}</code>" in row and f"<td>{declared.unit}</td>" in row for row in rows
+        )
     ]
     assert lacking == []

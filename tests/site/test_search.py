@@ -38,24 +38,34 @@ def search(browser: Any, word: str, place: str) -> list[str]:
         links: list[str] = one.execute_script(every)
         return links if any(place in link for link in links) else []
 
-    links: list[str] = WebDriverWait(browser, PATIENCE).until(found, f"no result of {word} at {place}")
+    links: list[str] = WebDriverWait(browser, PATIENCE).until(
+        found, f"no result of {word} at {place}"
+    )
     return links
 
 
 @pytest.mark.parametrize("page", PAGES)
-def test_a_typed_word_is_found_in_a_page_opened_from_its_file(site: Path, browser: Any, page: str) -> None:
+def test_a_typed_word_is_found_in_a_page_opened_from_its_file(
+    site: Path, browser: Any, page: str
+) -> None:
     open_page(browser, site / page)
     # A name that one page has: the order of the results changes with the pages.
     links = search(browser, "Jindrich", "/nomenclature.html")
     assert {link.split(":")[0] for link in links} == {"file"}
-    wrong = [one for one in requested(browser) if not one.startswith(("file:", "data:", "blob:", "about:"))]
+    wrong = [
+        one
+        for one in requested(browser)
+        if not one.startswith(("file:", "data:", "blob:", "about:"))
+    ]
     assert wrong == []
     assert [entry for entry in browser.get_log("browser") if entry["level"] == "SEVERE"] == []
 
 
 def test_a_result_leads_to_the_parameter_that_was_searched(site: Path, browser: Any) -> None:
     open_page(browser, site / "index.html")
-    links = search(browser, "control.force_gain", "h=control+force_gain#control-with-method--virtual_master")
+    links = search(
+        browser, "control.force_gain", "h=control+force_gain#control-with-method--virtual_master"
+    )
     assert "/reference/parameters.html" in links[0]
 
 
@@ -69,7 +79,8 @@ def test_the_check_notices_a_request_to_another_machine(browser: Any, tmp_path: 
 
 @pytest.mark.parametrize("width", [390, 1400])
 @pytest.mark.parametrize(
-    "page", ["index.html", "guide.html", "reference/commands.html", "reference/samples.html", "paper.html"]
+    "page",
+    ["index.html", "guide.html", "reference/commands.html", "reference/samples.html", "paper.html"],
 )
 def test_no_page_is_wider_than_the_window(site: Path, browser: Any, page: str, width: int) -> None:
     size = {"width": width, "height": 800, "deviceScaleFactor": 1, "mobile": width < 700}

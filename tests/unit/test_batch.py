@@ -75,7 +75,9 @@ def test_every_scene_meets_every_method_and_every_setting():
     assert [job.name for job in made] == ["-".join(words) for words in itertools.product(*axes)]
     for jobs in (made, read_jobs(SAMPLES.parent / "batches" / "first.toml").jobs):
         assert [job.error for job in jobs] == [""] * 8
-    assert [(job.scene.method, job.scene.control.force_setpoint) for job in made[:4] if job.scene] == [
+    assert [
+        (job.scene.method, job.scene.control.force_setpoint) for job in made[:4] if job.scene
+    ] == [
         ("virtual_master", 0.3),
         ("virtual_master", 0.6),
         ("cell_states", 0.3),
@@ -99,7 +101,10 @@ def test_a_scene_beside_the_jobs_file_is_found_from_any_folder(tmp_path, monkeyp
         ('scenes = "tap"', "scenes must be a list of scenes"),
         ('scenes = ["tap", 3]', "scenes must be a list of scenes"),
         ('scenes = ["tapp"]', "tapp is neither a file nor a sample .* Did you mean tap?"),
-        ('scenes = ["tap"]\nmethod = ["cell_states"]', "method must be a known key .* Did you mean methods?"),
+        (
+            'scenes = ["tap"]\nmethod = ["cell_states"]',
+            "method must be a known key .* Did you mean methods?",
+        ),
         ('scenes = ["tap"]\nmethods = []', "methods must be a list"),
         ('scenes = ["tap"]\nmethods = ["magic"]', "methods must be one of virtual_master"),
         ('scenes = ["tap", "tap"]', r"scenes must not name the same thing twice \(got tap twice\)"),
@@ -110,15 +115,23 @@ def test_a_scene_beside_the_jobs_file_is_found_from_any_folder(tmp_path, monkeyp
         ('scenes = ["tap"]\nexport = ["stl", "stl"]', "export must not name a format twice"),
         ('scenes = ["tap"]\nerrors = 1', "errors must be true or false"),
         ('scenes = ["tap"]\nfilm = true', r"film must be a section, \[film\]"),
-        ('scenes = ["tap"]\n[film]\nheight = 101', r"film\.height must be an even number of pixels"),
+        (
+            'scenes = ["tap"]\n[film]\nheight = 101',
+            r"film\.height must be an even number of pixels",
+        ),
         ('scenes = ["tap"]\n[film]\nspeed = 0', r"film\.speed must be at least 0\.001"),
         ('scenes = ["tap"]\n[film]\nspeed = nan', r"film\.speed must be a finite number"),
         ('scenes = ["tap"]\n[film]\nrate = 2.5', r"film\.rate must be a whole number"),
-        ('scenes = ["tap"]\n[still]\nengine = "eevee"', r"still\.engine must be one of cycles, workbench"),
+        (
+            'scenes = ["tap"]\n[still]\nengine = "eevee"',
+            r"still\.engine must be one of cycles, workbench",
+        ),
         ('scenes = ["tap"]\n[turntable]\nframes = 1', r"turntable\.frames must be at least 2"),
         ('scenes = ["tap"]\n[film]\nfps = 3', r"film\.fps must be a known key"),
         ('scenes = ["tap"', r"two\.toml, line 1: "),
-        pytest.param(f'scenes = ["tap"]\n[settings]\n{MANY}', r"10000 jobs at most \(got 10001", id="many"),
+        pytest.param(
+            f'scenes = ["tap"]\n[settings]\n{MANY}', r"10000 jobs at most \(got 10001", id="many"
+        ),
     ],
 )
 def test_a_mistake_is_told_in_one_line(said, told):
@@ -129,7 +142,11 @@ def test_a_mistake_is_told_in_one_line(said, told):
 def test_a_jobs_own_files_say_all_there_is_to_do():
     film = Film(speed=0.5, start=0.1, arrows=False)
     full = Outputs(
-        ("stl", "glb"), errors=False, still=Still(engine="cycles"), turntable=Turntable(frames=4), film=film
+        ("stl", "glb"),
+        errors=False,
+        still=Still(engine="cycles"),
+        turntable=Turntable(frames=4),
+        film=film,
     )
     mesh = {"kind": "features", "skin": "smooth"}
     for made in (Outputs(), make_outputs({"export": ["stl"], "mesh": mesh}), full):
@@ -222,12 +239,17 @@ def test_every_job_leaves_a_whole_folder_and_the_page_links_to_it(capsys, monkey
     assert page.count("start of its process") == page.count("data:image/png;base64,") == 2
 
 
-def test_finished_jobs_are_kept_also_from_elsewhere_and_changed_or_half_written_ones_are_done_again(folder):
+def test_finished_jobs_are_kept_also_from_elsewhere_and_changed_or_half_written_ones_are_done_again(
+    folder,
+):
     prepare(TWO)
     assert runs() == []
     far = folder.parent / "a farm"
     shutil.copytree("two/jobs/tap-quick", far / "jobs" / "tap-quick")
-    for folder in (far / "jobs/tap-quick", "two/jobs/tap-slow"):  # in this process: others take seconds
+    for folder in (
+        far / "jobs/tap-quick",
+        "two/jobs/tap-slow",
+    ):  # in this process: others take seconds
         assert main(["job", str(folder), "--quiet"]) == 0
     shutil.copytree(far / "runs" / "tap-quick", "two/runs/tap-quick")
     shutil.rmtree("two/jobs")
@@ -236,7 +258,10 @@ def test_finished_jobs_are_kept_also_from_elsewhere_and_changed_or_half_written_
     shutil.copytree("two/runs/tap-quick", f"two/runs/.tap-quick.{dead()}.part")
     assert call("batch two.toml --quiet") == 0
     after = {name: Path("two/runs", name, "history.npz").stat().st_mtime_ns for name in runs()}
-    assert (after["tap-quick"] == before["tap-quick"], after["tap-slow"] > before["tap-slow"]) == (True, True)
+    assert (after["tap-quick"] == before["tap-quick"], after["tap-slow"] > before["tap-slow"]) == (
+        True,
+        True,
+    )
     assert list(after) == ["tap-quick", "tap-slow"]
     metrics = read_json(Path("two/runs/tap-slow/metrics.json"))
     assert metrics["simulated"] == pytest.approx(0.3, abs=1e-9)
@@ -283,7 +308,11 @@ def test_when_a_batch_is_killed_its_processes_end_and_a_process_that_dies_is_tol
     "words, said, told",
     [
         ("", 'scenes = ["tap"]\nexport = ["doc"]', "export: "),
-        ("", 'scenes = ["tap"]\nexport = ["stl"]\nsettings.a.recorder = "absent"', "need a recorder"),
+        (
+            "",
+            'scenes = ["tap"]\nexport = ["stl"]\nsettings.a.recorder = "absent"',
+            "need a recorder",
+        ),
         ("--out two.toml", TWO, "two.toml is a file"),
         ("--out .", TWO, ". contains something other than a batch"),
         ("--jobs 0", TWO, "--jobs"),

@@ -23,7 +23,11 @@ FREE = 24e-3
 
 def control(method, **known):
     """Return a behavior, put together for a bed of 5 x 5 cells, without conduits."""
-    table = {"layout": {"rows": 5, "columns": 5}, "conduit": "absent", "control": {"method": method, **known}}
+    table = {
+        "layout": {"rows": 5, "columns": 5},
+        "conduit": "absent",
+        "control": {"method": method, **known},
+    }
     return assemble(resolve(table)).controller
 
 
@@ -78,8 +82,12 @@ def test_commands_are_openings_and_an_untouched_bed_at_rest_is_left_alone(method
         assert set(given.mode.tolist()) == {int(Mode.REST)}
 
 
-@pytest.mark.parametrize("method", ["elastic", "plastic", "viscous", "force_display", "shape_display"])
-def test_a_cell_is_touched_from_the_felt_force_on_and_not_opened_to_more_than_its_reservoir_lifts(method):
+@pytest.mark.parametrize(
+    "method", ["elastic", "plastic", "viscous", "force_display", "shape_display"]
+)
+def test_a_cell_is_touched_from_the_felt_force_on_and_not_opened_to_more_than_its_reservoir_lifts(
+    method,
+):
     known = {} if method == "shape_display" else {"felt_force": 5e-3}
     behavior = control(method, **known)
     for force, touched in ((4.9, False), (5.1, True)) if known else ():
@@ -99,13 +107,16 @@ TABLE = 2e-5 * FREE
         # Elastic: 20 N/m x 3 mm = 60 mN balance; (20 N/m x 1 mm - 60 mN) / 5 N s/m.
         ("elastic", {"stiffness": 20.0}, {"height": -3.0, "force": 60.0}, 0.0),
         ("elastic", {"stiffness": 20.0, "damping": 5.0}, {"height": -1.0, "force": 60.0}, -8e-3),
-        # Plastic: below yield it does not move, above it sinks by the rest of the force over the damping.
+        # Plastic: below yield it does not move, above it sinks by the rest of the force over the
+        # damping.
         ("plastic", {"yield_force": 0.03}, {"force": 29.0}, 0.0),
         ("plastic", {"yield_force": 0.03, "damping": 5.0}, {"force": 50.0}, -4e-3),
-        # It does not push the fingertip back; left alone it goes back to where it yielded, 0.1 mm in 20 ms.
+        # It does not push the fingertip back; left alone it goes back to where it yielded, 0.1 mm
+        # in 20 ms.
         ("plastic", {}, {"height": -2.0, "force": 10.0, "target": -1.9}, 0.0),
         ("plastic", {}, {"height": -2.0, "target": -1.9}, 5e-3),
-        # Force display: at rest under the force of the field, above its limit it sinks, 0.1 mm in 20 ms.
+        # Force display: at rest under the force of the field, above its limit it sinks, 0.1 mm in
+        # 20 ms.
         ("force_display", {"field": "flat", "force": 0.05}, {"height": -2.0, "force": 50.0}, 0.0),
         ("force_display", {"field": "flat", "force": 0.05}, {"height": -2.0, "force": 25.0}, 5e-3),
         ("force_display", {"rise": 1e-3}, {"height": 1.1, "force": 10.0}, -5e-3),
@@ -161,7 +172,9 @@ def test_a_dent_draws_its_neighbors_along_and_the_cells_asked_for_hold_them(diff
     memory, given = behavior.command(memory, dent)
     assert np.flatnonzero(given.target < REST - 1e-6).tolist() == sunk
     # Those drawn along by a pressed neighbor show it.
-    assert np.flatnonzero(given.mode == Mode.BLISTER).tolist() == [cell for cell in sunk if cell != 12]
+    assert np.flatnonzero(given.mode == Mode.BLISTER).tolist() == [
+        cell for cell in sunk if cell != 12
+    ]
     _, (x, y, radius) = behavior.locate(memory, dent)
     # The four neighbors, 3 mm away, in a box of 6 x 6 mm, and a margin of two pitches.
     assert (x, y) == pytest.approx((0.0, 0.0), abs=1e-12)
@@ -190,22 +203,26 @@ def test_push_pull_never_reads_the_force_and_listens_down_as_fast_as_up():
     assert np.array_equal(up, -down)  # the reservoirs are alike
     table = {"supply": {"high": 0.8e5, "low": -0.2e5}, "control": {"method": "push_pull"}}
     up, down = assemble(resolve(table)).controller.drive.open_for(np.array([8e-3, -8e-3]))
-    # Flow goes with the square of the opening and the pressure: 4 times the pressure, half the opening.
-    # The conduit and the table's interpolation change it by some percent.
+    # Flow goes with the square of the opening and the pressure: 4 times the pressure, half the
+    # opening. The conduit and the table's interpolation change it by some percent.
     assert -down / up == pytest.approx(2.0, rel=0.05)
 
 
 @pytest.mark.parametrize(
-    "drift, dragged", [(-0.09, 0.0), (-0.11, -0.01), (0.09, 0.0), (0.11, 0.01), (-0.5, -0.4), (0.5, 0.4)]
+    "drift, dragged",
+    [(-0.09, 0.0), (-0.11, -0.01), (0.09, 0.0), (0.11, 0.01), (-0.5, -0.4), (0.5, 0.4)],
 )
-def test_a_drift_beyond_the_threshold_is_a_touch_that_takes_the_commanded_height_along(drift, dragged):
+def test_a_drift_beyond_the_threshold_is_a_touch_that_takes_the_commanded_height_along(
+    drift, dragged
+):
     behavior = control("push_pull", threshold=0.1e-3)
     given = cycle(behavior, seen(behavior, height=middle(drift)))
     assert (given.mode[12] == Mode.FORCE_FOLLOW) == bool(dragged)
     assert given.target[12] - REST == pytest.approx(dragged * 1e-3)
 
 
-# The pyramid's first row is at rest already; 11 periods of 5 ms are the first to be longer than 52.5 ms.
+# The pyramid's first row is at rest already; 11 periods of 5 ms are the first to be longer than
+# 52.5 ms.
 @pytest.mark.parametrize("patience, starts", [(0.0525, [0, 11, 22, 33]), (0.05, [0, 10, 20, 30])])
 def test_a_move_of_blocked_pins_waits_for_its_patience(patience, starts):
     behavior = control("shape_display", shape="pyramid", refresh="one_time", patience=patience)
@@ -245,8 +262,8 @@ def test_values_spread_alike_along_x_and_y(arrangement):
         values = rule.even_out(cells, values)
     x, y = plan.x - plan.x[center], plan.y - plan.y[center]
     spread = np.array([values @ x**2, values @ y**2])
-    # Variance 2 D t = 2 x 10 mm²/s x 0.25 s; the limit on the rates takes 1 - (1 - e^-a)/a of it, with
-    # a = 2 x 4 D T / p² = 0.044: 2 %. The bed's edge is 9 standard deviations away.
+    # Variance 2 D t = 2 x 10 mm²/s x 0.25 s; the limit on the rates takes 1 - (1 - e^-a)/a of it,
+    # with a = 2 x 4 D T / p² = 0.044: 2 %. The bed's edge is 9 standard deviations away.
     assert spread == pytest.approx(5e-6, rel=0.03)
 
 
@@ -276,7 +293,9 @@ VALUES = {
 
 @pytest.mark.parametrize("shape", SHAPES)
 def test_a_named_shape_has_the_values_of_its_formula_and_fits_a_bed_of_one_cell(shape):
-    assert SHAPES[shape](np.array([0.5]), np.array([0.25]))[0] == pytest.approx(VALUES[shape], abs=1e-6)
+    assert SHAPES[shape](np.array([0.5]), np.array([0.25]))[0] == pytest.approx(
+        VALUES[shape], abs=1e-6
+    )
     values = evaluate_shape(shape, bed("aligned", 41, 41))
     assert np.all(np.abs(values) <= 1.0 + 1e-12)
     assert shape == "flat" or np.ptp(values) > 0.9
@@ -286,17 +305,37 @@ def test_a_named_shape_has_the_values_of_its_formula_and_fits_a_bed_of_one_cell(
 WRONG = [
     ("elastic", {"stiffness": 0}, "stiffness must be above 0 N/m (got 0 N/m)."),
     ("plastic", {"yield_force": -0.1}, "yield_force must be above 0 N (got -0.1 N)."),
-    ("plastic", {"yield_force": 1e-3}, "yield_force must be at least felt_force, 0.005 N (got 0.001 N)."),
-    ("force_display", {"field": "ramp", "contrast": 0.95}, "0.005 N (got 0.0025 N at its smallest)."),
-    ("force_display", {"field": "ramp", "force": 0.12}, "can press, 0.157 N (got 0.18 N at its largest)."),
+    (
+        "plastic",
+        {"yield_force": 1e-3},
+        "yield_force must be at least felt_force, 0.005 N (got 0.001 N).",
+    ),
+    (
+        "force_display",
+        {"field": "ramp", "contrast": 0.95},
+        "0.005 N (got 0.0025 N at its smallest).",
+    ),
+    (
+        "force_display",
+        {"field": "ramp", "force": 0.12},
+        "can press, 0.157 N (got 0.18 N at its largest).",
+    ),
     ("viscous", {"recovery": 1.0}, "Did you mean control.recovery_time?"),
-    ("push_pull", {"following_speed": 1e-3}, "at least listening_speed, 0.008 m/s (got 0.001 m/s)."),
+    (
+        "push_pull",
+        {"following_speed": 1e-3},
+        "at least listening_speed, 0.008 m/s (got 0.001 m/s).",
+    ),
     ("push_pull", {"threshold": 20e-6}, "way in a control period, 4e-05 m (got 2e-05 m)."),
     ("shape_display", {"shape": "hat"}, "must be one of dome, "),
     ("shape_display", {"shape": "nowhere.npy"}, "(got nowhere.npy: No such file or directory)."),
     ("shape_display", {"refresh": "at_once"}, "refresh must be one of one_time, "),
     ("shape_display", {"amplitude": 70e-3}, "stroke, 0.1 m (got heights from 0.04 m to 0.11 m)."),
-    ("elastic", {"settling_time": 5e-3}, "settling_time must be at least two control periods, 0.01 s (got"),
+    (
+        "elastic",
+        {"settling_time": 5e-3},
+        "settling_time must be at least two control periods, 0.01 s (got",
+    ),
     ("elastic", {"damping": 1.0}, "damping must be at least 2.1 N s/m at this control period"),
 ]
 
@@ -304,7 +343,9 @@ WRONG = [
 @pytest.mark.parametrize("method, given, said", WRONG)
 def test_a_bad_parameter_is_refused_in_one_line(method, given, said):
     with refused_in_a_line(ParameterError, rf"^control\..*{re.escape(said)}"):
-        assemble(resolve({"layout": {"rows": 5, "columns": 5}, "control": {"method": method, **given}}))
+        assemble(
+            resolve({"layout": {"rows": 5, "columns": 5}, "control": {"method": method, **given}})
+        )
 
 
 @pytest.mark.parametrize(

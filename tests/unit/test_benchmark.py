@@ -41,7 +41,10 @@ def test_every_kind_of_call_is_counted_once_and_changes_no_result(ledger):
     b[1:]  # __getitem__
     b[0] = 1.0  # __setitem__
     assert ledger.total() == 7
-    assert (type(b), b.tolist()) == (session_parts.Counted, [1.0, *(2.0 * np.exp(np.full(2, 2.0))).tolist()])
+    assert (type(b), b.tolist()) == (
+        session_parts.Counted,
+        [1.0, *(2.0 * np.exp(np.full(2, 2.0))).tolist()],
+    )
     ledger.clear()
     bound = np.eye(3).dot
     with session_parts.note_methods():  # of plain arrays
@@ -52,7 +55,8 @@ def test_every_kind_of_call_is_counted_once_and_changes_no_result(ledger):
 
 
 def test_a_period_of_method_i_makes_at_most_115_numpy_calls_all_counted_and_of_method_iii_under_231():
-    # A count, not seconds: the same wherever it is taken, and a call more for the cells is one more.
+    # A count, not seconds: the same wherever it is taken, and a call more for the cells is one
+    # more.
     scene, asked = sample("ridge_mound_valley"), 0
     system, trajectories = assemble(scene), scene.trajectories()
 
@@ -71,7 +75,8 @@ def test_a_period_of_method_i_makes_at_most_115_numpy_calls_all_counted_and_of_m
         sys.setprofile(None)
     assert counted["dot"] >= asked > 100
     assert (len(calls), statistics.median(calls) <= 115) == (300, True)
-    # While the force is near its set point Method III solves every second period for less: 230.2 on average.
+    # While the force is near its set point Method III solves every second period for less: 230.2 on
+    # average.
     scene = sample("ridge_mound_valley", "control.method=hybrid")
     calls, _ = session_parts.period_calls(assemble(scene), scene.trajectories(), 400)
     assert statistics.mean(calls[300:]) < 231
@@ -81,7 +86,10 @@ def test_a_period_of_method_i_makes_at_most_115_numpy_calls_all_counted_and_of_m
     "line, message",
     [
         ("session --repeats 0", "must be a whole number from 1 to 1000"),
-        ("scale --out my.toml/new", "scale: argument --out: my.toml/new cannot be a folder: my.toml is a fi"),
+        (
+            "scale --out my.toml/new",
+            "scale: argument --out: my.toml/new cannot be a folder: my.toml is a fi",
+        ),
         ("sesion", "Did you mean session?"),
         ("commits nonsense --quiet", "commits: nonsense must be a commit, branch or tag"),
     ],
@@ -92,23 +100,36 @@ def test_a_mistake_is_one_line_and_exit_code_2(line, message, here, capsys):
 
 
 def test_a_session_gives_the_cost_of_every_part_and_its_processor_time(here, capsys):
-    files = [path.relative_to(session_parts.CORE).as_posix() for path in session_parts.CORE.rglob("*.py")]
-    assert [name for name in session_parts.FILES if not any(file.startswith(name) for file in files)] == []
+    files = [
+        path.relative_to(session_parts.CORE).as_posix() for path in session_parts.CORE.rglob("*.py")
+    ]
+    assert [
+        name for name in session_parts.FILES if not any(file.startswith(name) for file in files)
+    ] == []
     assert set(session_parts.FILES.values()) == set(session_parts.PARTS)
     main(["session", "--scene", "my.toml", "--repeats", "1", "--calls"])
     out = capsys.readouterr().out
-    costs = {part: re.search(rf"^  {part} +([\d.]+) ", out, re.MULTILINE) for part in session_parts.PARTS}
+    costs = {
+        part: re.search(rf"^  {part} +([\d.]+) ", out, re.MULTILINE) for part in session_parts.PARTS
+    }
     assert [part for part, cost in costs.items() if not cost or not float(cost[1]) > 0.0] == []
-    elapsed, spent = (float(re.search(rf"{word} ([\d.e-]+) s \(", out)[1]) for word in ("in", "time"))
+    elapsed, spent = (
+        float(re.search(rf"{word} ([\d.e-]+) s \(", out)[1]) for word in ("in", "time")
+    )
     # One process, one thread: it uses no more than passes, but for the grain of the two clocks.
     assert 0.0 < spent <= 1.1 * elapsed
     assert re.search(r"^  multiply +[\d.]+$", out, re.MULTILINE)
 
 
-def test_every_benchmark_shows_an_example_and_one_without_scipy_what_to_install(capsys, monkeypatch):
+def test_every_benchmark_shows_an_example_and_one_without_scipy_what_to_install(
+    capsys, monkeypatch
+):
     for kind in BENCHMARKS:
         code, out = main([kind, "--help"]), capsys.readouterr().out
-        assert (code, f"  python -m benchmarks {kind}" in out.partition("examples:")[2]) == (0, True)
+        assert (code, f"  python -m benchmarks {kind}" in out.partition("examples:")[2]) == (
+            0,
+            True,
+        )
     monkeypatch.setitem(sys.modules, "scipy", None)
     assert main(["peers", "--quick"]) == 2
     assert "pip install" in capsys.readouterr().err
@@ -121,7 +142,8 @@ def test_a_term_left_out_is_absent_and_nothing_else_changes(capsys):
         part = scene.section(section)
         assert (less and less.with_sections(**{section: part})) == (None if part is None else scene)
     less = session_parts.without(
-        replace(scene, simulation=replace(scene.simulation, physics_step=1e-3)), session_parts.LONGER
+        replace(scene, simulation=replace(scene.simulation, physics_step=1e-3)),
+        session_parts.LONGER,
     )
     assert less.simulation.physics_step == less.simulation.control_period
     assert session_parts.without(less, session_parts.LONGER) is None
@@ -163,7 +185,11 @@ def test_a_benchmark_prints_and_writes_a_table_and_a_picture(tmp_path, monkeypat
     printed = capsys.readouterr().out
     assert "control.force_gain varies" in printed
     assert "valve.stroke varies" in printed
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["stack.csv", "stack.md", "stack.png"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == [
+        "stack.csv",
+        "stack.md",
+        "stack.png",
+    ]
     text = (tmp_path / "stack.md").read_text(encoding="utf-8")
     assert printed in text
     # Results name versions and no path.

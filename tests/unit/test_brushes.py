@@ -69,8 +69,8 @@ def test_a_stroke_leaves_its_nominal_surface_and_presses_no_harder_than_a_finger
     queued = queue(session, SLANTING, brush, amount)
     nominal = find_nominal(queued.strokes[0], find_device(queued), heights(queued)).height
     formed = finish(queued)
-    # A pin has arrived within half a micrometer of its height; what its valve still lets through until it
-    # is shut is as much again.
+    # A pin has arrived within half a micrometer of its height; what its valve still lets through
+    # until it is shut is as much again.
     assert_near(heights(formed), nominal, 1e-6)
     sign = 1.0 if brush is Brush.RAISE else -1.0
     assert (sign * relief(formed)).max() == pytest.approx(amount, abs=0.2)
@@ -111,10 +111,14 @@ def test_level_lowers_a_hill_raises_a_hollow_and_fills_a_valley_that_it_crosses_
     session = form(begin(), [(12.0, -9.0), (12.0, 9.0)], Brush.RAISE, 6.0)
     session = form(session, [(-12.0, -9.0), (-12.0, 9.0)], Brush.LOWER, 8.0)
     before = along(session)
-    assert (before.max(), before.min()) == (pytest.approx(6.0, abs=0.2), pytest.approx(-8.0, abs=0.2))
+    assert (before.max(), before.min()) == (
+        pytest.approx(6.0, abs=0.2),
+        pytest.approx(-8.0, abs=0.2),
+    )
     level = form(session, [(-34.0, 0.0), (34.0, 0.0)], Brush.LEVEL)
     assert_near(along(level), 0.0, 0.01)
-    # Under a slanting view the pointer moves aside on the floor of a valley, and back when it comes out.
+    # Under a slanting view the pointer moves aside on the floor of a valley, and back when it comes
+    # out.
     way = [(0.0, -24.0), (0.0, -15.0), (-8.0, -5.0), (-8.0, 6.0), (0.0, 14.0), (0.0, 24.0)]
     valley = form(begin_bed("paper", 25, 25), ALONG, Brush.LOWER, 4.0)
     assert along(valley).max() < -3.0
@@ -173,7 +177,9 @@ def test_a_smooth_stroke_takes_down_a_spike_from_above_and_a_short_one_waits_for
     weaker = finish(queue_smooth(spiked((0.0, 0.0)), (-9.0, 0.0), (9.0, 0.0), 0.1))
     assert risen(session, 0.0, 0.0) + 1e-3 < risen(weaker, 0.0, 0.0) < SPIKE - 1e-3
     session, number = queue_stroke(spiked((0.0, 0.0)), start(0, 0.0, 0.0, 4e-3, brush=Brush.SMOOTH))
-    session = change_stroke(session, number, lambda one: replace(draw(one, 0.0, 0.0, 4e-3), held=False))
+    session = change_stroke(
+        session, number, lambda one: replace(draw(one, 0.0, 0.0, 4e-3), held=False)
+    )
     done = finish(session)
     assert risen(done, 0.0, 0.0) < SPIKE - 2e-3
     assert not (done.state.mode() == Mode.BLISTER).any()
@@ -235,7 +241,8 @@ def test_an_image_that_begins_on_another_one_is_pressed_into_what_stands_there(b
     assert finish(session).trace.force.max() < 1.0
 
 
-#: Pins in a row and column of a bed, half the length of a stroke, height of a ridge, depth of a groove, mm.
+#: Pins in a row and column of a bed, half the length of a stroke, height of a ridge, depth of a
+#: groove, mm.
 SIZES = {"paper": (21, 18.0, 10.0, 4.0), "design": (34, 16.0, 6.0, 3.0)}
 #: A pin may be off all those around it by so much, mm.
 BOUND = 0.2
@@ -274,7 +281,9 @@ def test_a_ridge_across_a_ridge_cuts_nothing_off_and_leaves_no_spikes(bed, degre
     # Where the flat tops end, a crest may stand out by what the corners of the sections do.
     assert measure_spikes(formed) < measure_spikes(relief(before)) + BOUND
     assert (relief(before) - formed).max() < 0.01
-    assert formed[len(formed) // 2, len(formed) // 2] == pytest.approx(2.0 * height, abs=0.3 * height)
+    assert formed[len(formed) // 2, len(formed) // 2] == pytest.approx(
+        2.0 * height, abs=0.3 * height
+    )
 
 
 @pytest.mark.parametrize("bed", SIZES)
@@ -293,8 +302,9 @@ def test_a_groove_across_a_ridge_goes_through_it_and_piles_nothing_up(bed):
     assert after[len(after) // 2, len(after) // 4] > height - 1.0
 
 
-#: What is left may be higher than what was shaped by so much, mm, and a pin so far off those around it.
-#: Measured: 0.3 and 0.5 mm; 4 and 2.7 mm where a search takes frozen cells along without a bound.
+#: What is left may be higher than what was shaped by so much, mm, and a pin so far off those around
+#: it. Measured: 0.3 and 0.5 mm; 4 and 2.7 mm where a search takes frozen cells along without a
+#: bound.
 LEFT = 1.0
 
 
@@ -312,7 +322,12 @@ def move(session, goal, duration):
 def shaped(bed):
     """Return a session whose finger has pressed, risen and gone aside by hand."""
     session = begin_bed(bed, 25, 25)
-    for place, duration in (((-4, 0, 46), 0.1), ((-4, 0, 37), 0.4), ((-4, 0, 46), 1.5), ((5, 0, 46), 1.0)):
+    for place, duration in (
+        ((-4, 0, 46), 0.1),
+        ((-4, 0, 37), 0.4),
+        ((-4, 0, 46), 1.5),
+        ((5, 0, 46), 1.0),
+    ):
         session = move(session, place, duration)
     return session
 

@@ -22,15 +22,22 @@ from scipy.integrate import quad
 from tests.assemble import AWAY, Motion, make_system, one_cell, path, record, scripted, table, under
 
 RAISE, LOWER = scripted(lambda t, x, y: 1.0), scripted(lambda t, x, y: -1.0)
-STEPPERS = pytest.mark.parametrize("stepper, step", [("bernoulli", 1e-3), ("runge_kutta_4", 0.5e-3)])
+STEPPERS = pytest.mark.parametrize(
+    "stepper, step", [("bernoulli", 1e-3), ("runge_kutta_4", 0.5e-3)]
+)
 #: Force that the high reservoir balances, N: half a bar on a bore of 2 mm.
 BALANCE = 0.5e5 * math.pi * 1e-6
 
 
 def test_pressure_is_force_and_speed_flow_over_area_and_reservoirs_move_pins_their_way_alone():
     assert Actuator().pressure(np.array([BALANCE])) == pytest.approx(0.5e5, rel=1e-15)
-    flow, height = np.array([1, 1, -1, -1, 1]) * math.pi * 1e-8, np.array([50e-3, 100e-3, 0.0, 100e-3, 0.0])
-    assert Actuator().rate(flow, height) == pytest.approx([10e-3, 0.0, 0.0, -10e-3, 10e-3], rel=1e-14)
+    flow, height = (
+        np.array([1, 1, -1, -1, 1]) * math.pi * 1e-8,
+        np.array([50e-3, 100e-3, 0.0, 100e-3, 0.0]),
+    )
+    assert Actuator().rate(flow, height) == pytest.approx(
+        [10e-3, 0.0, 0.0, -10e-3, 10e-3], rel=1e-14
+    )
     above, below = (one_cell(supply=Supply(*ends)) for ends in ((0.8e5, 0.2e5), (-0.2e5, -0.8e5)))
     assert find_speeds(above.cell).fall == find_speeds(below.cell).rise == below.fastest == 0.0
 
@@ -39,12 +46,19 @@ def test_pressure_is_force_and_speed_flow_over_area_and_reservoirs_move_pins_the
     "parts, rise, fall, digits",
     [
         ({}, 24e-3, -24e-3, 0.01),  # as printed
-        ({"valve": Valve(orifice_diameter=0.6e-3)}, 50e-3, -50e-3, 0.05),  # the fast preset; to one digit
+        (
+            {"valve": Valve(orifice_diameter=0.6e-3)},
+            50e-3,
+            -50e-3,
+            0.05,
+        ),  # the fast preset; to one digit
         ({"fluid": Fluid(viscosity=1.6e-9)}, 0.0, 0.0, math.inf),  # turbulent
         ({"supply": Supply(0.8e5, -0.2e5)}, 38.4e-3, -9.6e-3, 0.01),  # as the drops
     ],
 )
-def test_a_free_cell_has_the_printed_speed_at_full_valve_exactly_that_of_the_bound(parts, rise, fall, digits):
+def test_a_free_cell_has_the_printed_speed_at_full_valve_exactly_that_of_the_bound(
+    parts, rise, fall, digits
+):
     for control, printed in ((RAISE, rise), (LOWER, fall)):
         system = one_cell(dead_time=0.0, valve_lag=None, control=control, **parts)
         height, bound = record(system, AWAY, 3).height[:, 0], find_speeds(system.cell)
@@ -61,12 +75,16 @@ def test_a_free_cell_has_the_printed_speed_at_full_valve_exactly_that_of_the_bou
         (49e-3, None, 100, 1e-9, "bernoulli", 1e-3),
         (47e-3, None, 100, 1e-9, "bernoulli", 1e-3),
         (47e-3, None, 100, 1e-9, "runge_kutta_4", 0.5e-3),
-        # The pulp still creeps at 3 s, and the flow that makes up for it costs some 0.2 % of the pressure.
+        # The pulp still creeps at 3 s, and the flow that makes up for it costs some 0.2 % of the
+        # pressure.
         (47e-3, Relaxation(), 600, 5e-3, "bernoulli", 1e-3),
     ],
 )
-def test_a_pin_under_a_still_finger_comes_to_the_balance_force(start, pulp, count, error, stepper, step):
-    # The finger stays with its underside at 48 mm; whatever the start, P_s A_a balances it in the end.
+def test_a_pin_under_a_still_finger_comes_to_the_balance_force(
+    start, pulp, count, error, stepper, step
+):
+    # The finger stays with its underside at 48 mm; whatever the start, P_s A_a balances it in the
+    # end.
     system = one_cell(
         actuator=Actuator(rest_height=start),
         relaxation=pulp,
@@ -94,15 +112,17 @@ def test_a_pin_on_its_end_stop_feels_the_indentation_beyond_where_force_begins(s
     system = one_cell(
         actuator=start, contact=contact, relaxation=None, control=LOWER, stepper=stepper, step=step
     )
-    run = record(system, path((0.0, 0.0, 0.0, 1.0), (0.05, 0.0, 0.0, -1.5), (0.1, 0.0, 0.0, -1.5)), 20)
+    run = record(
+        system, path((0.0, 0.0, 0.0, 1.0), (0.05, 0.0, 0.0, -1.5), (0.1, 0.0, 0.0, -1.5)), 20
+    )
     m, wanted = contact.exponent, contact.share * contact.stiffness / contact.exponent
     assert run.height[-1, 0] == 0.0
     assert run.force[-1, 0] == pytest.approx(wanted * math.expm1(m * 1.0e-3), rel=1e-9)
 
 
 def test_a_finger_is_not_missed_by_pins_that_rise_towards_it_as_fast_as_they_can():
-    # A set of cells serves for 32 periods and counts on no pin rising faster than `fastest`. The pins come up
-    # 29 mm, to a finger that stands still 25 mm above them.
+    # A set of cells serves for 32 periods and counts on no pin rising faster than `fastest`. The
+    # pins come up 29 mm, to a finger that stands still 25 mm above them.
     start = Actuator(bore=0.5e-3, rest_height=10e-3)
     system = make_system(Layout(9, 9), dead_time=0.0, valve_lag=None, control=RAISE, actuator=start)
     count, still = round(29e-3 / (system.fastest * system.period)), path((0.0, 0.0, 0.0, 35.0))
@@ -137,7 +157,8 @@ def test_the_opening_follows_the_command_the_dead_time_later(dead_time):
         system = one_cell(dead_time=dead_time, step=step, control=SCRIPT)
         run = record(system, AWAY, len(COMMANDS))
         analytic = [opening(dead_time, t) if t > dead_time else 0.0 for t in run.time]
-        # Rounding of some hundred exponentials; a dead time rounded to the step would be off by 0.1.
+        # Rounding of some hundred exponentials; a dead time rounded to the step would be off by
+        # 0.1.
         assert run.rows[:, system.cell.lag_rows.start, 0] == pytest.approx(analytic, abs=1e-12)
         assert np.all(run.height[run.time <= dead_time] == 40e-3)  # nothing moves before
 
@@ -154,7 +175,11 @@ def test_a_free_pin_moves_as_the_delayed_opening_says(dead_time, stepper, step):
         k = opening(dead_time, time)
         return full * math.copysign(k**2 * (1.0 + series) / (1.0 + series * k**2), k)
 
-    arrivals = [dead_time + i * PERIOD for i in range(len(COMMANDS)) if dead_time + i * PERIOD < run.time[-1]]
+    arrivals = [
+        dead_time + i * PERIOD
+        for i in range(len(COMMANDS))
+        if dead_time + i * PERIOD < run.time[-1]
+    ]
     way = quad(speed, dead_time, run.time[-1], points=arrivals, limit=400, epsabs=1e-12)[0]
     # Where the opening changes sign, a step that does not end there is off by some 20 nm;
     # a dead time rounded to the step would show as 5 µm.
@@ -164,7 +189,9 @@ def test_a_free_pin_moves_as_the_delayed_opening_says(dead_time, stepper, step):
 @pytest.mark.parametrize("dead_time", [0.37e-3, 7.3e-3])
 def test_a_step_that_holds_the_arrival_of_a_command_is_as_exact_as_short_ones(dead_time):
     rising = scripted(lambda t, x, y: abs(COMMANDS[min(int(t / PERIOD + 1e-6), len(COMMANDS) - 1)]))
-    beds = (one_cell(dead_time=dead_time, step=step, control=rising) for step in (PERIOD, PERIOD / 50))
+    beds = (
+        one_cell(dead_time=dead_time, step=step, control=rising) for step in (PERIOD, PERIOD / 50)
+    )
     long, short = (record(bed, AWAY, len(COMMANDS)).height[-1, 0] for bed in beds)
     # 10 nm; 2 µm without Gauss points on either side of the kink that the opening has there.
     assert long == pytest.approx(short, abs=0.05e-6)
@@ -177,7 +204,11 @@ def test_commands_kept_and_the_cut_make_up_the_dead_time_and_steps_fill_the_peri
     assert whole * PERIOD + queue.cut == pytest.approx(dead_time, abs=1e-15)  # rounding
     assert (queue.cut == 0.0) == (round(dead_time / PERIOD, 9) % 1.0 == 0.0)
     # The next command is seen from the instant of its arrival on, where a step ends.
-    assert [queue.seen(time) for time in (0.0, 0.999 * queue.cut, queue.cut)] == [0, 0, int(queue.cut > 0.0)]
+    assert [queue.seen(time) for time in (0.0, 0.999 * queue.cut, queue.cut)] == [
+        0,
+        0,
+        int(queue.cut > 0.0),
+    ]
     parts, instants = make_segments(stepper, queue.cut, PERIOD, 5)
     ends = [part.start + part.length for part in parts]
     assert [part.start for part in parts] == pytest.approx([0.0, *ends[:-1]], abs=1e-18)
@@ -196,7 +227,9 @@ def test_tension_begins_at_the_offset_follows_the_exponential_and_stays_finite()
     assert contact.tension(depth) == pytest.approx(expected, rel=1e-13)  # rounding
     # T = b x (1 + m x/2): at 1 nm the second term is 1e-6.
     assert contact.tension(np.array([1e-9])) / 1e-9 == pytest.approx(250.0, rel=2e-6)
-    assert Contact(offset=0.5e-3).tension(np.array([-1.0, 0.0, 0.4e-3, 0.5e-3])).tolist() == [0.0] * 4
+    assert (
+        Contact(offset=0.5e-3).tension(np.array([-1.0, 0.0, 0.4e-3, 0.5e-3])).tolist() == [0.0] * 4
+    )
     # T' = b + m T, by a central difference: truncation (m dx)²/6, 7e-9; rounding 1e-10.
     dx = 1e-7
     low, here, high = contact.tension(np.array([1e-3 - dx, 1e-3, 1e-3 + dx]))
@@ -208,14 +241,22 @@ def test_tension_begins_at_the_offset_follows_the_exponential_and_stays_finite()
 
 @pytest.mark.parametrize("arrangement, share", [("aligned", 0.34), ("hexagonal", 0.29)])
 def test_the_cells_together_carry_what_a_flat_plate_does(arrangement, share):
-    # The share f_d was fitted for this: 0.34 on the square grid, 0.29 on the hexagonal one. One constant
-    # cannot match all depths: a quarter from 1 to 2.4 mm, averaged over where the finger stands.
-    contact, bed = Contact(share=share), make_grid(Layout(rows=15, columns=15, arrangement=arrangement))
+    # The share f_d was fitted for this: 0.34 on the square grid, 0.29 on the hexagonal one. One
+    # constant cannot match all depths: a quarter from 1 to 2.4 mm, averaged over where the finger
+    # stands.
+    contact, bed = (
+        Contact(share=share),
+        make_grid(Layout(rows=15, columns=15, arrangement=arrangement)),
+    )
     offsets = np.stack(np.meshgrid(np.arange(6), np.arange(6)), axis=-1).reshape(-1, 2) * 0.5e-3
     for depth in (1e-3, 1.5e-3, 2e-3, 2.4e-3):
         poses = np.array([[x, y, -depth, *LEVEL] for x, y in offsets])
-        carried = share * contact.tension(-under(Fingertip().outline(poses), bed.x, bed.y)).sum(axis=1)
-        assert carried.mean() == pytest.approx(float(contact.tension(np.array([depth]))[0]), rel=0.25)
+        carried = share * contact.tension(-under(Fingertip().outline(poses), bed.x, bed.y)).sum(
+            axis=1
+        )
+        assert carried.mean() == pytest.approx(
+            float(contact.tension(np.array([depth]))[0]), rel=0.25
+        )
 
 
 def reduced(time):
@@ -233,7 +274,9 @@ def convolved(depth, speed, time):
 
     # G falls by 0.62 within 4 ms of the end: that stretch gets its own panels.
     points = [time - s for s in (3e-3, 12e-3, 40e-3) if s < time]
-    return quad(integrand, 0.0, time, points=points or None, epsabs=1e-12, epsrel=1e-11, limit=400)[0]
+    return quad(integrand, 0.0, time, points=points or None, epsabs=1e-12, epsrel=1e-11, limit=400)[
+        0
+    ]
 
 
 def filtered(own, first, last, step):
@@ -243,9 +286,12 @@ def filtered(own, first, last, step):
 
 def test_relaxation_is_the_sum_of_equation_12_and_what_relaxes_quicker_than_the_step_a_share():
     times = np.array([0.0, 1e-3, 5e-3, 0.1, 1.0, 100.0])
-    assert Relaxation().reduced(times) == pytest.approx([reduced(t) for t in times], rel=1e-14)  # rounding
+    assert Relaxation().reduced(times) == pytest.approx(
+        [reduced(t) for t in times], rel=1e-14
+    )  # rounding
     assert Relaxation().reduced(times[[0, -1]]) == pytest.approx([1.0, 0.08], abs=1e-15)
-    # The slowest of 1 ns filters in a step of 5 ms: all but 2 in 5e6 of the tension is lost at once.
+    # The slowest of 1 ns filters in a step of 5 ms: all but 2 in 5e6 of the tension is lost at
+    # once.
     quick = Relaxation(times=(1e-9, 1e-9, 1e-9))
     weights, share = quick.mean_loss_map(5e-3)
     assert share == pytest.approx(float(quick.shares.sum()), rel=1e-6)
@@ -259,7 +305,9 @@ def test_a_constant_and_a_linear_tension_are_filtered_exactly(step, count, slope
     for i in range(count):
         own = filtered(own, start + slope * i * step, start + slope * (i + 1) * step, step)
     time = count * step
-    expected = start * reduced(time) + slope * quad(reduced, 0.0, time, epsabs=1e-13, epsrel=1e-13)[0]
+    expected = (
+        start * reduced(time) + slope * quad(reduced, 0.0, time, epsabs=1e-13, epsrel=1e-13)[0]
+    )
     # 500 steps of rounding stay below 1e-10.
     assert start + slope * time - Relaxation().relaxed(own) == pytest.approx(expected, abs=1e-10)
 
@@ -275,9 +323,12 @@ def test_a_constant_and_a_linear_tension_are_filtered_exactly(step, count, slope
     },
 )
 def test_filters_agree_with_the_convolution(depth, speed, stepper, step, tolerance):
-    # A locked pin that the finger presses; the errors of the frozen and linear parts are of order 2 and 4.
+    # A locked pin that the finger presses; the errors of the frozen and linear parts are of order 2
+    # and 4.
     system = one_cell(contact=Contact(share=1.0), stepper=stepper, step=step)
-    force = record(system, Motion(lambda times: 40e-3 - np.array([depth(t) for t in times])), 16).force
+    force = record(
+        system, Motion(lambda times: 40e-3 - np.array([depth(t) for t in times])), 16
+    ).force
     for count in (4, 16):
         expected = convolved(depth, speed, count * system.period)
         assert expected > 0.05
@@ -285,9 +336,13 @@ def test_filters_agree_with_the_convolution(depth, speed, stepper, step, toleran
 
 
 def test_a_pulp_one_of_whose_filters_is_cut_in_two_is_the_same():
-    halves = Relaxation((TIMES[0], *TIMES), (WEIGHTS[0], 0.5 * WEIGHTS[1], 0.5 * WEIGHTS[1], *WEIGHTS[2:]))
+    halves = Relaxation(
+        (TIMES[0], *TIMES), (WEIGHTS[0], 0.5 * WEIGHTS[1], 0.5 * WEIGHTS[1], *WEIGHTS[2:])
+    )
     motion = Motion(lambda times: 40e-3 - 20e-3 * times)
-    whole, cut = (record(one_cell(relaxation=pulp), motion, 20).force for pulp in (Relaxation(), halves))
+    whole, cut = (
+        record(one_cell(relaxation=pulp), motion, 20).force for pulp in (Relaxation(), halves)
+    )
     assert whole.max() > 0.05
     assert cut == pytest.approx(whole, rel=1e-12)  # rounding
 
@@ -302,13 +357,15 @@ def test_the_force_lost_over_a_step_is_its_mean_for_a_linear_tension(step):
 
     weights, share = Relaxation().mean_loss_map(step)
     foreseen = weights @ [*own, first] + share * 0.5 * (first + last)
-    # Rounding: what a filter gains in a step of 1 µs is a difference of numbers a million times larger.
+    # Rounding: what a filter gains in a step of 1 µs is a difference of numbers a million times
+    # larger.
     assert foreseen == pytest.approx(quad(lost_at, 0.0, step, epsrel=1e-12)[0] / step, rel=1e-9)
 
 
 @pytest.mark.parametrize("duration", [40e-3, 60e-3, 100e-3])
 def test_a_tap_loses_81_percent_of_its_work(duration):
-    # A half sine of 2 mm. The weights were fitted to 81 % a tap; in 30 ms to 1 s all lose 78 to 81 %.
+    # A half sine of 2 mm. The weights were fitted to 81 % a tap; in 30 ms to 1 s all lose 78 to 81
+    # %.
     depth = 2e-3 * np.sin(np.pi * np.linspace(0.0, 1.0, 251))
     own, forces = np.zeros(3), [0.0]
     for first, last in itertools.pairwise(Contact().tension(depth)):

@@ -66,17 +66,22 @@ def distance(cell):
     },
 )
 def test_a_cell_is_driven_by_its_own_force(before, force, after, command):
-    _, orders = ordered(seen({MIDDLE: force}, {MIDDLE: before}), Patch(felt=before == Mode.FORCE_FOLLOW))
+    _, orders = ordered(
+        seen({MIDDLE: force}, {MIDDLE: before}), Patch(felt=before == Mode.FORCE_FOLLOW)
+    )
     assert orders.mode[MIDDLE] == after
     assert orders.command[MIDDLE] == pytest.approx(command, rel=1e-12)
 
 
 @pytest.mark.parametrize(
-    "low, high, mode", [(0.0, BLISTER.radius * (1 - 1e-6), Mode.BLISTER), (12e-3, 15.5e-3, Mode.EDGE)]
+    "low, high, mode",
+    [(0.0, BLISTER.radius * (1 - 1e-6), Mode.BLISTER), (12e-3, 15.5e-3, Mode.EDGE)],
 )
 def test_the_neighbors_of_a_following_cell_become_its_blister_and_its_edge(low, high, mode):
     modes = ordered(seen({MIDDLE: 0.1}))[1].mode
-    assert {Mode(int(m)) for m in modes[[low < distance(c) < high for c in range(BED.count)]]} == {mode}
+    assert {Mode(int(m)) for m in modes[[low < distance(c) < high for c in range(BED.count)]]} == {
+        mode
+    }
 
 
 def test_only_critical_cells_count_their_periods_and_giving_up_the_last_one_or_a_far_jump_are_losses():
@@ -117,18 +122,23 @@ def test_the_blister_stays_within_the_stroke(low, expected):
 
 @pytest.mark.parametrize("toward", [(1.0, 0.0), (-1.0, 0.0), (0.0, -1.0), (0.6, 0.8)])
 def test_the_blister_s_edge_is_the_mean_height_of_the_ring_ahead_and_abeam(toward):
-    # On a bed that slopes both ways; behind lies what the finger has formed, no measure of the ground.
+    # On a bed that slopes both ways; behind lies what the finger has formed, no measure of the
+    # ground.
     measured = seen({MIDDLE: 0.1}, {MIDDLE: Mode.FORCE_FOLLOW})
     measured.height[:] += 0.2 * BED.x - 0.3 * BED.y
     # 1e-9: rounding in the places of cells on the border and abeam.
-    ring = [c for c in range(BED.count) if BLISTER.radius - 1e-9 < distance(c) < BLISTER.edge_radius]
+    ring = [
+        c for c in range(BED.count) if BLISTER.radius - 1e-9 < distance(c) < BLISTER.edge_radius
+    ]
     ahead = [c for c in ring if BED.x[c] * toward[0] + BED.y[c] * toward[1] > -1e-9]
     memory, _ = ordered(measured, Patch(heading=Heading(0.0, 0.0, *toward), felt=True))
     assert len(ring) / 2 <= len(ahead) < len(ring)
     assert memory.edge == pytest.approx(measured.height[ahead].mean(), abs=1e-15)
 
 
-@pytest.mark.parametrize("toward, leaves", [((1.0, 0.0), True), ((-1.0, 0.0), False), ((0.0, 1.0), False)])
+@pytest.mark.parametrize(
+    "toward, leaves", [((1.0, 0.0), True), ((-1.0, 0.0), False), ((0.0, 1.0), False)]
+)
 def test_no_cell_rises_for_a_finger_that_leaves_the_bed(toward, leaves):
     # The outer cells begin 2 mm beyond the pressed one, and 3 mm ahead carry the finger.
     cell, gains = MIDDLE + 2, CONTROL.parameters
@@ -143,9 +153,12 @@ def test_no_cell_rises_for_a_finger_that_leaves_the_bed(toward, leaves):
 
 
 FF, PATCH = Mode.FORCE_FOLLOW, Mode.BLISTER
-#: With sensors whose noise hides forces below 25 mN; with a flat top short of a pin 3 mm away, and beyond it.
+#: With sensors whose noise hides forces below 25 mN; with a flat top short of a pin 3 mm away, and
+#: beyond it.
 NOISY = replace(CONTROL, floor=25e-3)
-SHORT, WIDE = (replace(CONTROL, blister=replace(BLISTER, flat_radius=flat)) for flat in (2.9e-3, 3.1e-3))
+SHORT, WIDE = (
+    replace(CONTROL, blister=replace(BLISTER, flat_radius=flat)) for flat in (2.9e-3, 3.1e-3)
+)
 
 
 @table(
@@ -169,7 +182,12 @@ SHORT, WIDE = (replace(CONTROL, blister=replace(BLISTER, flat_radius=flat)) for 
             {MIDDLE: FF, MIDDLE - 1: PATCH},
             {MIDDLE - 1: Mode.FROZEN},
         ),
-        "and none within": (WIDE, {MIDDLE: 0.04}, {MIDDLE: FF, MIDDLE - 1: PATCH}, {MIDDLE - 1: PATCH}),
+        "and none within": (
+            WIDE,
+            {MIDDLE: 0.04},
+            {MIDDLE: FF, MIDDLE - 1: PATCH},
+            {MIDDLE - 1: PATCH},
+        ),
         "a force that may be noise makes no blister cell follow": (
             NOISY,
             {MIDDLE: 0.1, MIDDLE + 2: 24e-3, MIDDLE - 2: 26e-3},
@@ -203,8 +221,8 @@ def test_a_force_that_may_be_noise_moves_no_spring_but_counts_where_a_cell_follo
     assert memory.x - BED.x[MIDDLE] == pytest.approx(1.5e-3, abs=1e-12)
 
 
-#: Fig. 5, written down from the paper and drawn in docs/pictures/method_2.svg: from, to, when. VS is any cell
-#: on a virtual spring.
+#: Fig. 5, written down from the paper and drawn in docs/pictures/method_2.svg: from, to, when. VS
+#: is any cell on a virtual spring.
 FIGURE_5 = [
     ("VS", "FF", "above_spring_trigger"),
     ("blister", "FF", "above_blister_trigger"),
@@ -235,7 +253,12 @@ CONDITIONS = sorted({arrow.condition for arrow in (*BY_FORCE, *BY_PLACE)})
 
 @pytest.mark.parametrize("condition", [*CONDITIONS, None])
 def test_a_cell_goes_where_the_arrows_of_the_figure_point_and_nowhere_else(condition):
-    drawn = {mode: GOALS[goal] for one, goal, when in FIGURE_5 if when == condition for mode in STATES[one]}
+    drawn = {
+        mode: GOALS[goal]
+        for one, goal, when in FIGURE_5
+        if when == condition
+        for mode in STATES[one]
+    }
     holds = {name: np.array([name == condition]) for name in CONDITIONS}
     for mode in Mode:
         modes = follow_arrows(np.array([mode], np.int8), BY_FORCE, holds)
@@ -245,10 +268,14 @@ def test_a_cell_goes_where_the_arrows_of_the_figure_point_and_nowhere_else(condi
 def test_of_two_arrows_the_later_wins_and_a_critical_cell_is_given_up_after_the_time_out():
     both = ("below_critical_trigger", "above_critical_trigger")
     holds = {name: np.array([name in both]) for name in CONDITIONS}
-    assert follow_arrows(np.array([Mode.CRITICAL], np.int8), BY_FORCE, holds)[0] == Mode.FORCE_FOLLOW
+    assert (
+        follow_arrows(np.array([Mode.CRITICAL], np.int8), BY_FORCE, holds)[0] == Mode.FORCE_FOLLOW
+    )
     measured, memory, periods = seen({}, {MIDDLE: Mode.CRITICAL}), Patch(felt=True), 0
     while measured.mode[MIDDLE] == Mode.CRITICAL:
         memory, orders = CONTROL.command(memory, measured)
         measured.mode[:] = orders.mode
         periods += 1
-    assert periods * CONTROL.period == pytest.approx(CONTROL.parameters.critical_time, abs=CONTROL.period)
+    assert periods * CONTROL.period == pytest.approx(
+        CONTROL.parameters.critical_time, abs=CONTROL.period
+    )

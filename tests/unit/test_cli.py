@@ -31,7 +31,11 @@ def test_a_run_is_written_to_a_folder_called_like_the_scene_and_says_so(here, ca
     assert summary.startswith("0.1 s simulated in ")
     # No progress is shown where there is no terminal.
     assert (where, err) == ("written to my", "")
-    assert {path.name for path in (here / "my").iterdir()} == {"history.npz", "metrics.json", "scene.toml"}
+    assert {path.name for path in (here / "my").iterdir()} == {
+        "history.npz",
+        "metrics.json",
+        "scene.toml",
+    }
     versions = read_json(here / "my" / "metrics.json")["versions"]
     assert versions["digiclay"] == __version__
     assert call("run my.toml --quiet --out first") == 0
@@ -42,7 +46,10 @@ def test_settings_and_stepper_reach_the_run_which_can_be_run_again_from_its_fold
     call("run my.toml --quiet --set layout.rows=2 --stepper runge_kutta_4")
     assert read_json(here / "my" / "metrics.json")["stepper"] == "runge_kutta_4"
     call("run my --quiet --out second")
-    with np.load(here / "my" / "history.npz") as one, np.load(here / "second" / "history.npz") as other:
+    with (
+        np.load(here / "my" / "history.npz") as one,
+        np.load(here / "second" / "history.npz") as other,
+    ):
         assert one["height"].shape == (21, 8)
         assert [name for name in one.files if not np.array_equal(one[name], other[name])] == []
 
@@ -131,7 +138,9 @@ def test_export_writes_the_surface_of_a_run_in_a_unit_at_an_instant_and_refuses_
         for command in ("export", "features"):
             refused(f"{command} my --resolution={count}", " 64")
     scene, history = here / "my" / "scene.toml", here / "my" / "history.npz"
-    scene.write_text(scene.read_text(encoding="utf-8").replace("rows = 3", "rows = 4"), encoding="utf-8")
+    scene.write_text(
+        scene.read_text(encoding="utf-8").replace("rows = 3", "rows = 4"), encoding="utf-8"
+    )
     refused("export my", "height must have the shape (21, 16) of its scene (got (21, 12))")
     history.write_bytes(history.read_bytes()[:1000])
     refused("export my", "cannot be read as a run's history")
@@ -148,7 +157,9 @@ def test_describe_counts_cells_periods_and_bytes_and_lists_every_parameter_with_
     assert main(["describe", "tap", "--parameters", "--set", "layout.pitch=3.5 mm"]) == 0
     text = capsys.readouterr().out
     parts = {"layout": Layout, "actuator": Actuator, "control": VirtualMaster}
-    names = [f"{section}.{name} = " for section, part in parts.items() for name in list_quantities(part)]
+    names = [
+        f"{section}.{name} = " for section, part in parts.items() for name in list_quantities(part)
+    ]
     assert [name for name in names if name not in text] == []
     meaning = "distance of neighboring cells in a row; above 0, at most 0.5; P"
     assert f"layout.pitch = 0.0035 m\n    {meaning}\n" in text
@@ -172,7 +183,9 @@ MEANT = {
     "sweep tap --varry layout.rows=3 --out o": "Did you mean --vary (not --varry)?",
     "export my --kind soild": "Did you mean solid?",
     "--verson": "Did you mean --version (not --verson)?",
-    **dict.fromkeys(["walk", "run my.toml --fast", "run my.toml --set x", "run -- --exprot stl"], ""),
+    **dict.fromkeys(
+        ["walk", "run my.toml --fast", "run my.toml --set x", "run -- --exprot stl"], ""
+    ),
 }
 
 
@@ -299,7 +312,11 @@ def test_a_run_is_kept_whatever_goes_wrong_with_what_is_made_of_it(here, monkeyp
     monkeypatch.setattr(render, "plotted", draw)
     with pytest.raises(ValueError, match="a fault of a library"):
         call("run my.toml --plots --no-errors --quiet")
-    assert {path.name for path in (here / "my").iterdir()} == {"history.npz", "metrics.json", "scene.toml"}
+    assert {path.name for path in (here / "my").iterdir()} == {
+        "history.npz",
+        "metrics.json",
+        "scene.toml",
+    }
 
 
 def test_a_run_imports_no_other_command_and_none_of_the_packages_it_does_without(here):
@@ -307,7 +324,9 @@ def test_a_run_imports_no_other_command_and_none_of_the_packages_it_does_without
     modules = finish(start(script, "run", "my.toml", "--out", "o", "--quiet"))[1].split()
     parts = {name.removeprefix("digiclay.") for name in modules if name.startswith("digiclay")}
     files = {"arguments", "parser", "progress", "refusals", "run", "stop"}
-    assert {part for part in parts if part.startswith("commands.")} == {f"commands.{name}" for name in files}
+    assert {part for part in parts if part.startswith("commands.")} == {
+        f"commands.{name}" for name in files
+    }
     unused = {"batch", "mesh_io", "shapes", "studies", "surface"}
     assert not {part.split(".")[1] for part in parts if part.startswith("core.")} & unused
     assert {part.split(".")[0] for part in parts} == {"digiclay", "cli", "commands", "core"}
@@ -322,7 +341,9 @@ def test_a_run_imports_no_other_command_and_none_of_the_packages_it_does_without
         ("sweep my.toml --vary seed=3,4 --out o --scheduler tcp://a:1", "distributed", "digiclay[cluster]"),
     ],
 )  # fmt: skip
-def test_a_missing_library_is_told_before_any_work(line, missing, install, here, refused, monkeypatch):
+def test_a_missing_library_is_told_before_any_work(
+    line, missing, install, here, refused, monkeypatch
+):
     for name in [name for name in sys.modules if name.partition(".")[0] == missing]:
         monkeypatch.delitem(sys.modules, name)
     monkeypatch.delitem(sys.modules, "digiclay.compat", raising=False)
@@ -332,17 +353,24 @@ def test_a_missing_library_is_told_before_any_work(line, missing, install, here,
 
 
 def test_a_job_of_a_batch_exports_without_any_library(here):
-    (here / "jobs.toml").write_text('scenes = ["my.toml"]\nexport = ["stl", "3mf"]\nerrors = false\n')
+    (here / "jobs.toml").write_text(
+        'scenes = ["my.toml"]\nexport = ["stl", "3mf"]\nerrors = false\n'
+    )
     assert call("batch jobs.toml --prepare --quiet") == 0
     missing = "import sys; sys.modules.update(dict.fromkeys(['trimesh', 'scipy', 'matplotlib']))\n"
     code, _, err = finish(start(missing + PROGRAM, "job", "jobs/jobs/my"))
     assert code == 0, err
-    assert {"surface.stl", "surface.3mf"} <= {path.name for path in (here / "jobs/runs/my").iterdir()}
+    assert {"surface.stl", "surface.3mf"} <= {
+        path.name for path in (here / "jobs/runs/my").iterdir()
+    }
 
 
 def described(capsys, *settings):
     """Return the lines of the section on pins, by what they are about."""
-    assert main(["describe", "slow_press", *(part for one in settings for part in ("--set", one))]) == 0
+    assert (
+        main(["describe", "slow_press", *(part for one in settings for part in ("--set", one))])
+        == 0
+    )
     section = capsys.readouterr().out.split("\nThe pins\n")[1].split("\n\n")[0]
     joined = re.sub(r"\n {6,}", " ", section)
     return {line[:12].strip(): line[12:].strip() for line in joined.splitlines()}
@@ -359,7 +387,9 @@ UNLIKE = ("supply.high=0.4 bar", "supply.low=-0.6 bar", "layout.rows=12", "layou
 def test_speeds_hold_forces_and_refilling_are_those_of_a_pin_with_its_valve_wide_open(capsys):
     said, moved = described(capsys, *UNLIKE), []
     for command in (1.0, -1.0):
-        one = one_cell(supply=Supply(0.4e5, -0.6e5), control=scripted(lambda time, x, y, k=command: k))
+        one = one_cell(
+            supply=Supply(0.4e5, -0.6e5), control=scripted(lambda time, x, y, k=command: k)
+        )
         height = record(one, AWAY, 60).height[:, 0]
         # The valve is open after five of its time constants; then the pin goes at one speed.
         moved.append(1e3 * abs(height[60] - height[20]) / (40 * one.period))

@@ -39,7 +39,9 @@ PRESS = scene_text(11, 11, (0.0, 0.041), (0.3, 0.035), (0.5, 0.035))
 BOTH = ["virtual_master", "cell_states"]
 
 
-def test_both_methods_are_printed_side_by_side_and_kept_with_a_picture_of_the_same_input(here, capsys):
+def test_both_methods_are_printed_side_by_side_and_kept_with_a_picture_of_the_same_input(
+    here, capsys
+):
     (here / "my.toml").write_text(PRESS, encoding="utf-8")
     line = "compare my.toml --methods cell_states,virtual_master --set control.force_setpoint=0.03"
     assert call(line) == 0
@@ -62,7 +64,8 @@ def test_both_methods_are_printed_side_by_side_and_kept_with_a_picture_of_the_sa
     assert known["cell_states"]["duration"] == known["virtual_master"]["duration"] == 0.5
     # Other controllers, other forces: neither was run twice.
     assert known["cell_states"]["max_total_force"] != known["virtual_master"]["max_total_force"]
-    # The setting reached both, and is asked of each cell that follows: of one at least, of all 121 at most.
+    # The setting reached both, and is asked of each cell that follows: of one at least, of all 121
+    # at most.
     assert known["virtual_master"]["set_point"] == 0.03
     assert 0.03 <= known["cell_states"]["set_point"] < 121 * 0.03
 
@@ -81,7 +84,9 @@ def test_a_comparison_goes_on_after_a_stop_and_gives_way_to_another_one_only_wit
     with monkeypatch.context() as patched:
         stop_before(patched, compare_command, "run", before=1)
         assert call(command) == 130
-    assert capsys.readouterr().out.startswith("Stopped: 1 of 2 methods are done and kept in first run. ")
+    assert capsys.readouterr().out.startswith(
+        "Stopped: 1 of 2 methods are done and kept in first run. "
+    )
     (point,) = (here / OUT / "points").iterdir()
     first = read_json(point)["figures"]["run_time"]
     assert call(command) == 0
@@ -91,7 +96,9 @@ def test_a_comparison_goes_on_after_a_stop_and_gives_way_to_another_one_only_wit
     assert read_times(here / OUT) == times
     other = f"{command} --set control.force_setpoint=0.03"
     assert call(other) == 2
-    assert "holds another comparison (virtual_master, cell_states, digiclay" in capsys.readouterr().err
+    assert (
+        "holds another comparison (virtual_master, cell_states, digiclay" in capsys.readouterr().err
+    )
     assert call(f"{other} --overwrite") == 0
     assert not set(read_times(here / OUT).values()) & set(times.values())
 
@@ -163,7 +170,9 @@ FEW = ["--set", "layout.rows=13", "--set", "layout.columns=13", "--quiet"]
         "form": (["form", "dome", *FEW], ["surface.stl", "displayed/surface.stl"]),
     },
 )
-def test_what_is_stopped_before_its_extras_names_them_and_how_to_make_them(command, made, here, stopped):
+def test_what_is_stopped_before_its_extras_names_them_and_how_to_make_them(
+    command, made, here, stopped
+):
     assert main([*command, "--out", "whole"]) == 0
     commands = stopped(run_command, "save", *command)
     assert list(commands) == made
@@ -180,7 +189,10 @@ def test_plot_writes_into_a_folder_prints_its_files_and_says_what_it_cannot(here
     run = "run my.toml --quiet --no-errors --out"
     assert call(f"{run} o") == 0
     assert call("plot o --out new/pictures") == 0
-    assert [Path(line).name for line in capsys.readouterr().out.split()] == ["session.png", "surface.png"]
+    assert [Path(line).name for line in capsys.readouterr().out.split()] == [
+        "session.png",
+        "surface.png",
+    ]
     assert list_files(here / "new") == {"pictures/session.png", "pictures/surface.png"}
     refused("plot o --out my.toml/x", "my.toml/x cannot be a folder: my.toml is a file.")
     call(f"{run} row --set layout.rows=1")
@@ -199,7 +211,9 @@ def test_a_run_stopped_before_its_errors_are_estimated_says_so(here, stopped):
 
 
 @table("number", {"Ctrl-C": signal.SIGINT, "as farms stop": signal.SIGTERM})
-def test_a_run_stopped_within_its_session_is_kept_and_can_be_exported_as_it_says(number, here, stopped):
+def test_a_run_stopped_within_its_session_is_kept_and_can_be_exported_as_it_says(
+    number, here, stopped
+):
     arguments = ("run", "my.toml", "--quiet", "--export", "ply")
     commands = stopped(RunRecording, "observe", *arguments, number=number)
     assert list(commands) == ["surface.ply"]
@@ -212,7 +226,9 @@ def test_a_run_stopped_within_its_session_is_kept_and_can_be_exported_as_it_says
 def test_form_that_is_stopped_before_its_session_writes_nothing(step, here, monkeypatch, capsys):
     monkeypatch.setattr(run_command, "run", lambda *given, **known: pytest.fail("It went on."))
     stop_before(monkeypatch, form_command, step)
-    assert main(["form", "dome", "--out", OUT, "--set", "simulation.duration=1e4", "--quiet"]) == 130
+    assert (
+        main(["form", "dome", "--out", OUT, "--set", "simulation.duration=1e4", "--quiet"]) == 130
+    )
     assert capsys.readouterr().err == "Stopped; no file is half-written.\n"
     assert left(here) == []
 
@@ -233,7 +249,12 @@ def pressed(tmp_path_factory):
     """The folder of a run that pressed the middle in."""
     folder = tmp_path_factory.mktemp("features")
     (folder / "my.toml").write_text(MIDDLE, encoding="utf-8")
-    assert main(["run", str(folder / "my.toml"), "--out", str(folder / "run"), "--quiet", "--no-errors"]) == 0
+    assert (
+        main(
+            ["run", str(folder / "my.toml"), "--out", str(folder / "run"), "--quiet", "--no-errors"]
+        )
+        == 0
+    )
     return folder / "run"
 
 
@@ -261,7 +282,9 @@ def test_features_are_listed_in_a_table_and_none_at_the_start(run, capsys):
 def deepest(run):
     """Return how far the deepest pin has sunk, and how high it is at the end, m."""
     with np.load(run / "history.npz") as history:
-        return float((history["height"][0] - history["height"][-1]).max()), float(history["height"][-1].min())
+        return float((history["height"][0] - history["height"][-1]).max()), float(
+            history["height"][-1].min()
+        )
 
 
 def test_json_is_in_si_units_from_any_former_surface_and_a_threshold_has_a_unit(run, capsys):
@@ -316,7 +339,10 @@ def test_a_length_is_in_millimeters_or_has_a_unit_behind_it(said, run):
         ("export run --kind features --time 0", "There is no feature of at least 3 pins"),
         ("features run --threshold -1", "--threshold must be at least 1e-06 m (got -0.001 m)."),
         ("features run --threshold '1 furlong'", "--threshold: must have a unit known here"),
-        ("features run --threshold '1 N'", "argument --threshold: must be in m or a multiple of it"),
+        (
+            "features run --threshold '1 N'",
+            "argument --threshold: must be in m or a multiple of it",
+        ),
         ("features run --smallest 0", "--smallest must be at least 1 (got 0)."),
         ("features run --former 99", "--former must be between 0 s and"),
         ("features run --former soon", "--former must be a time or 'rest'"),
@@ -350,15 +376,21 @@ def test_a_mesh_goes_in_is_formed_and_comes_out(tmp_path, capsys):
     trimesh.creation.icosphere(subdivisions=3, radius=10.0).export(source)
     out = form(tmp_path, str(source), "--export", "stl,glb")
     said = capsys.readouterr().out.splitlines()
-    assert said[0] == "Größe 1.stl: heights from 40.0 to 52.0 mm, covers 137 of 169 cells, no cell clipped"
+    assert (
+        said[0]
+        == "Größe 1.stl: heights from 40.0 to 52.0 mm, covers 137 of 169 cells, no cell clipped"
+    )
     assert said[1].startswith("displayed to within ")
     assert said[2].startswith("formed: ")
     assert said[-1] == f"written to {out}"
-    before, after = (trimesh.load_mesh(out / name) for name in ("displayed/surface.stl", "surface.stl"))
+    before, after = (
+        trimesh.load_mesh(out / name) for name in ("displayed/surface.stl", "surface.stl")
+    )
     assert before.is_watertight
     assert after.is_watertight
     assert (out / "surface.glb").is_file()
-    # The finger draws a peak of some mm out of the top: 6 mm above where it touched, less its own give.
+    # The finger draws a peak of some mm out of the top: 6 mm above where it touched, less its own
+    # give.
     assert after.bounds[1, 2] - before.bounds[1, 2] > 4.0
     judged = read_json(out / "metrics.json")
     assert judged["display_error"] <= 10.1e-6
@@ -366,7 +398,9 @@ def test_a_mesh_goes_in_is_formed_and_comes_out(tmp_path, capsys):
     assert judged["shape_covered"] == 137
 
 
-def test_the_finger_comes_when_the_shape_stands_and_the_folder_alone_repeats_the_run(tmp_path, capsys):
+def test_the_finger_comes_when_the_shape_stands_and_the_folder_alone_repeats_the_run(
+    tmp_path, capsys
+):
     source = tmp_path / "shape.npy"
     np.save(source, np.eye(4))
     out = form(tmp_path, str(source), "--finger", "press")
@@ -379,14 +413,21 @@ def test_the_finger_comes_when_the_shape_stands_and_the_folder_alone_repeats_the
 
 
 @pytest.mark.parametrize(
-    "refresh, preset", [("one_time", "viscous"), ("gradual", "paper"), ("approximate_gradual", "fast")]
+    "refresh, preset",
+    [("one_time", "viscous"), ("gradual", "paper"), ("approximate_gradual", "fast")],
 )
 def test_a_shape_stands_by_the_time_it_is_said_to(refresh, preset):
     table = {
         "layout": {"rows": 9, "columns": 9},
         "control": {"method": "plastic"},
         "preset": preset,
-        "shape": {"file": "ripple", "rise": 30e-3, "foot": -10e-3, "refresh": refresh, "surfaces": 3},
+        "shape": {
+            "file": "ripple",
+            "rise": 30e-3,
+            "foot": -10e-3,
+            "refresh": refresh,
+            "surfaces": 3,
+        },
     }
     bare = resolve(table)
     system = assemble(bare)
@@ -402,7 +443,9 @@ def test_a_shape_stands_by_the_time_it_is_said_to(refresh, preset):
 
 
 @pytest.mark.parametrize("x, y", [(0.0, 0.0), (7.3e-3, -2.1e-3)])
-def test_the_finger_touches_the_highest_part_nearest_to_the_middle_at_the_height_it_is_said_to(x, y):
+def test_the_finger_touches_the_highest_part_nearest_to_the_middle_at_the_height_it_is_said_to(
+    x, y
+):
     top = np.full(169, 40e-3)
     top[[0, 60, 84]] = 50e-3, 49.9e-3, 41e-3
     assert forming.find_summit(BED, top) == (float(BED.x[60]), float(BED.y[60]))

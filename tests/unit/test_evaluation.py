@@ -86,7 +86,10 @@ def calls(count):
     scenes = [point.scene for point in some(f"control.force_gain=1:6:{count}", settings=[])]
     systems = [assemble(scene) for scene in scenes if scene]
     stack = make_batch(systems)
-    state, ways = begin(stack), [scene.section("trajectory").trajectory() for scene in scenes if scene]
+    state, ways = (
+        begin(stack),
+        [scene.section("trajectory").trajectory() for scene in scenes if scene],
+    )
     made, counted = [0], []
 
     def count_one(frame, event, argument):
@@ -155,7 +158,14 @@ TRIGGERS = ("control.blister_trigger=0.01,0.03", "control.spring_trigger=0.02,0.
         "not judged": (HALVED, "", False, [[*range(8)]], [], "8 points run in 1 batch"),
         # A dead time of half a control period falls on the end of a half step.
         "h": (HALVED, "", True, [[0, 1, 2, 3], [4, 5, 6, 7]], [], "8 points run in 2 batches"),
-        "too fine": (HALVED[1:], "simulation.physics_step=5e-6", True, [], [[0], [1], [2], [3]], None),
+        "too fine": (
+            HALVED[1:],
+            "simulation.physics_step=5e-6",
+            True,
+            [],
+            [[0], [1], [2], [3]],
+            None,
+        ),
         "every method with noise": (
             (METHODS, *NOISE),
             "",
@@ -190,7 +200,9 @@ TRIGGERS = ("control.blister_trigger=0.01,0.03", "control.spring_trigger=0.02,0.
         ),
     },
 )
-def test_points_of_one_structure_run_together_and_others_alone(varied, setting, errors, batches, alone, said):
+def test_points_of_one_structure_run_together_and_others_alone(
+    varied, setting, errors, batches, alone, said
+):
     settings = [*SHORT, *([Setting(*setting.split("="))] if setting else [])]
     points = some(*varied, settings=settings)
     parts = make_bundles(judge_all(points) if errors else points)
@@ -218,7 +230,9 @@ def test_errors_of_points_whose_contact_a_step_may_hide_are_doubted(step, errors
     said = make_bundles(judge_all(points) if errors else points).describe()
     assert (said[1:] != [], len(said)) == (doubted, 1 + doubted)
     if doubted:
-        assert said[1].startswith("4 points with larger errors: within a step the path of the fingertip")
+        assert said[1].startswith(
+            "4 points with larger errors: within a step the path of the fingertip"
+        )
     (done,) = [run(point.scene).estimate_errors() for point in points[:1] if point.scene]
     doubt = done.metrics.get("errors_in_doubt", "")
     assert (doubt != "", "or more" in done.summary(), doubt in done.summary()) == (
@@ -235,7 +249,11 @@ def test_a_bundle_comes_to_the_figures_of_its_points_and_can_be_stopped(errors):
     bundle = judge_all(bundle) if errors else bundle
     for record, point in zip(evaluate_bundle(bundle), bundle, strict=True):
         own, other = (
-            {name: value for name, value in one["figures"].items() if name not in TIMES and value is not None}
+            {
+                name: value
+                for name, value in one["figures"].items()
+                if name not in TIMES and value is not None
+            }
             for one in (record, evaluate(point.scene, errors=errors))
         )
         assert own == pytest.approx(other, rel=1e-9, abs=1e-15)
@@ -255,15 +273,34 @@ def test_a_fault_in_a_stack_is_not_passed_over(here, monkeypatch, capsys):
         records = evaluate_bundle(some("control.force_gain=1,5"))
     assert [record and record["alone"] for record in records] == ["ZeroDivisionError: by zero"] * 2
     break_stacks(monkeypatch, MemoryError())
-    varied = ["--vary", "control.force_gain=1:5:4", "--set", "simulation.duration=0.1", "--workers", "1"]
+    varied = [
+        "--vary",
+        "control.force_gain=1:5:4",
+        "--set",
+        "simulation.duration=0.1",
+        "--workers",
+        "1",
+    ]
     assert main(["sweep", "tap", *varied, "--out", "out"]) == 0
-    assert "\n4 points one at a time: there is not enough memory for a batch\n" in capsys.readouterr().out
+    assert (
+        "\n4 points one at a time: there is not enough memory for a batch\n"
+        in capsys.readouterr().out
+    )
     table = (here / "out" / "sweep.csv").read_text(encoding="utf-8").splitlines()
     assert [line.endswith(",") for line in table[1:]] == [True] * 4  # no point has an error
 
 
-def test_a_sweep_says_how_its_points_were_run_and_one_done_again_comes_to_the_same_bits(here, capsys):
-    sweep = ["sweep", "tap", "--vary", "control.force_gain=1:6:4", "--set", "simulation.duration=0.1"]
+def test_a_sweep_says_how_its_points_were_run_and_one_done_again_comes_to_the_same_bits(
+    here, capsys
+):
+    sweep = [
+        "sweep",
+        "tap",
+        "--vary",
+        "control.force_gain=1:6:4",
+        "--set",
+        "simulation.duration=0.1",
+    ]
     main([*sweep, "--out", "out"])
     assert "4 points\n4 points run in 1 batch\n" in capsys.readouterr().out
     file, figures = here / "out" / "points" / "000003.json", []
@@ -304,7 +341,9 @@ def address():
 
 def hours(count):
     long = [Setting("simulation.duration", "1e5"), Setting("recorder.every", "1000")]
-    return make_points(find("slow_press"), long, [read_axis(f"layout.rows=20:{19 + count}:{count}")])
+    return make_points(
+        find("slow_press"), long, [read_axis(f"layout.rows=20:{19 + count}:{count}")]
+    )
 
 
 def silent(note):
@@ -319,7 +358,9 @@ def never():
 def test_a_series_on_a_cluster_comes_to_the_tables_of_this_machine(words, tables, here, address):
     assert main([*words, "--workers", "1", "--out", "own"]) == 0
     assert main([*words, "--scheduler", address, "--out", "far"]) == 0
-    own, far = ({path.name: timeless(path) for path in (here / at).glob("*.csv")} for at in ("own", "far"))
+    own, far = (
+        {path.name: timeless(path) for path in (here / at).glob("*.csv")} for at in ("own", "far")
+    )
     assert (len(own), own) == (tables, far)
     assert left(here / "far/points") == left(here / "own/points") != []
 
@@ -341,7 +382,9 @@ def test_after_a_stop_no_task_is_left_in_the_cluster(address):
 
         with open_cluster(address, lambda: False, silent) as cluster:
             finish_series(
-                submit(cluster, evaluate_hours, hours(4), stopped=stop), lambda *_: None, lambda *_: None
+                submit(cluster, evaluate_hours, hours(4), stopped=stop),
+                lambda *_: None,
+                lambda *_: None,
             )
         wait_until(lambda: list(client.run(look).values()) == [(0, 0)])
 
@@ -364,13 +407,19 @@ def test_a_cluster_without_workers_is_waited_for_and_the_wait_can_be_stopped(cap
     )
 
 
-def test_errors_of_tasks_are_told_and_a_result_that_does_not_arrive_is_computed_again(address, monkeypatch):
+def test_errors_of_tasks_are_told_and_a_result_that_does_not_arrive_is_computed_again(
+    address, monkeypatch
+):
     done = {}
     with open_cluster(address, lambda: False, silent) as cluster:
-        finish_series(submit(cluster, invert, [0, 1, 2], stopped=never), done.__setitem__, done.__setitem__)
+        finish_series(
+            submit(cluster, invert, [0, 1, 2], stopped=never), done.__setitem__, done.__setitem__
+        )
         assert done == {0: "ZeroDivisionError: division by zero", 1: 1.0, 2: 0.5}
         monkeypatch.setattr(cluster_module, "FETCH", 0.3)
-        finish_series(submit(cluster, give_slowly, [0], stopped=never), done.__setitem__, done.__setitem__)
+        finish_series(
+            submit(cluster, give_slowly, [0], stopped=never), done.__setitem__, done.__setitem__
+        )
     assert isinstance(done[0], SlowToSend)
     assert SlowToSend.sent > 1
 
@@ -438,7 +487,9 @@ def test_the_example_for_slurm_makes_the_script_of_a_job_and_nothing_else_import
     script = "import sys\nfrom digiclay.commands.parser import parser\nparser()\n"
     script += "assert not {name.split('.')[0] for name in sys.modules} & {'dask', 'distributed', 'tornado'}\n"
     script += "\n".join([*lines[:made], "print(cluster.job_script())", "cluster.close()"])
-    code, out, err = finish(start(script, env={"DASK_DISTRIBUTED__LOGGING__DISTRIBUTED": "critical"}))
+    code, out, err = finish(
+        start(script, env={"DASK_DISTRIBUTED__LOGGING__DISTRIBUTED": "critical"})
+    )
     assert code == 0, err
     assert out.startswith("#!/")
     assert re.search(r"^#SBATCH --cpus-per-task=\d+$", out, re.MULTILINE)

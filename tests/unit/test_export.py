@@ -70,7 +70,8 @@ def test_a_glb_is_in_meters_and_y_up_whatever_the_unit(solid, tmp_path, unit):
     position = description["meshes"][0]["primitives"][0]["attributes"]["POSITION"]
     found = description["accessors"][position]
     low, high = solid[0].vertices.min(axis=0), solid[0].vertices.max(axis=0)
-    # x stays, up is y, and the bed's y runs toward the viewer's back: minus z. float32 keeps 4e-9 m of 50 mm.
+    # x stays, up is y, and the bed's y runs toward the viewer's back: minus z. float32 keeps 4e-9 m
+    # of 50 mm.
     assert_near(found["min"], [low[0], low[2], -high[1]], 4e-9)
     assert_near(found["max"], [high[0], high[2], -low[1]], 4e-9)
 
@@ -98,7 +99,10 @@ def test_a_3mf_names_its_unit_has_an_object_for_each_feature_and_says_what_is_an
         reader.SetStrictModeActive(True)
         reader.ReadFromFile(str(path))
         assert reader.GetWarningCount() == 0
-        assert model.GetUnit() == {"mm": lib3mf.ModelUnit.MilliMeter, "m": lib3mf.ModelUnit.Meter}[unit]
+        assert (
+            model.GetUnit()
+            == {"mm": lib3mf.ModelUnit.MilliMeter, "m": lib3mf.ModelUnit.Meter}[unit]
+        )
         objects = model.GetMeshObjects()
         for body in made:
             assert objects.MoveNext()
@@ -136,9 +140,14 @@ def test_the_same_mesh_gives_the_same_bytes_whatever_its_path_or_its_pieces(
 ):
     before, folder = solid[0].vertices.copy(), tmp_path / "für später 粘土"
     folder.mkdir()
-    whole = mesh_writer.write(solid, path_for(folder, kind).with_stem("gewölbte Fläche 1"), kind=kind)
+    whole = mesh_writer.write(
+        solid, path_for(folder, kind).with_stem("gewölbte Fläche 1"), kind=kind
+    )
     monkeypatch.setattr("digiclay.core.surface.formed.PIECE", 7)
-    assert mesh_writer.write(solid, tmp_path / "PIECES.STL", kind=kind).read_bytes() == whole.read_bytes()
+    assert (
+        mesh_writer.write(solid, tmp_path / "PIECES.STL", kind=kind).read_bytes()
+        == whole.read_bytes()
+    )
     np.testing.assert_array_equal(solid[0].vertices, before)
 
 
@@ -152,7 +161,12 @@ KNOWN = rf"known are {', '.join(mesh_writer.FORMATS)}\.$"
         (1, "surface", "mm", rf"^Unknown mesh format '': {KNOWN}"),
         (1, "surface.stl", "inch", r"^Export\.unit must be one of mm, m \(got 'inch'\)\.$"),
         (0, "surface.stl", "mm", r"^There is nothing to write to \S+surface\.stl\.$"),
-        (1, "missing/surface.stl", "mm", r"^Cannot write \S+surface\.stl: No such file or directory\.$"),
+        (
+            1,
+            "missing/surface.stl",
+            "mm",
+            r"^Cannot write \S+surface\.stl: No such file or directory\.$",
+        ),
     ],
 )
 def test_what_cannot_be_written_is_refused(solid, tmp_path, count, name, unit, said):
@@ -183,7 +197,9 @@ def test_an_export_that_is_stopped_leaves_nothing(solid, tmp_path, monkeypatch):
 def test_a_full_disk_keeps_the_older_file_and_leaves_no_other(tmp_path, kind):
     disk = tmp_path / "disk"
     disk.mkdir()
-    subprocess.run(["mount", "-t", "tmpfs", "-o", "size=64k", "tmpfs", disk], check=True, timeout=TIMEOUT)
+    subprocess.run(
+        ["mount", "-t", "tmpfs", "-o", "size=64k", "tmpfs", disk], check=True, timeout=TIMEOUT
+    )
     try:
         path = disk / f"surface{mesh_writer.find_suffix(kind)}"
         path.write_bytes(b"older")
@@ -202,7 +218,9 @@ def uneven(arrangement="aligned"):
     """A boss, a crease, level ground between them; every pin with a force and a mode of its own."""
     place = make_grid(Layout(rows=12, columns=14, arrangement=arrangement)).positions
     x, y = place.T * 1e3
-    raised = 5.0 * np.exp(-((x + 9) ** 2 + y**2) / 20.0) - 4.0 * np.exp(-((x - 9) ** 2 + y**2) / 20.0)
+    raised = 5.0 * np.exp(-((x + 9) ** 2 + y**2) / 20.0) - 4.0 * np.exp(
+        -((x - 9) ** 2 + y**2) / 20.0
+    )
     force, mode = np.arange(168) / 100.0, np.arange(168) % 8
     return Formed.of(place, 0.04 + raised * 1e-3, 0.04, force, mode)
 
@@ -223,7 +241,9 @@ def touching(arrangement, seed):
     for sign in (1.0, -1.0):
         off = np.hypot(np.clip(np.abs(along) - 16.0, 0.0, None), aside - sign * 12.0)
         ridge = 12.0 * np.clip(1.0 - (off / 7.0) ** 2, 0.0, None)
-        mound = 24.0 * np.clip(1.0 - np.hypot(along - 14.0, aside - sign * 12.0) ** 2 / 81.0, 0.0, None)
+        mound = 24.0 * np.clip(
+            1.0 - np.hypot(along - 14.0, aside - sign * 12.0) ** 2 / 81.0, 0.0, None
+        )
         raised += sign * np.maximum(ridge, mound)
     return Formed.of(place, 0.04 + raised * 1e-3, 0.04, 0.0, 0)
 
@@ -241,7 +261,9 @@ def test_every_kind_is_consistent_and_all_but_the_skin_are_watertight_after_weld
         assert mesh(body).volume > 0.0 or kind == "surface"
     formats = mesh_writer.FORMATS if (skin, arrangement) == ("bilinear", "aligned") else ("stl",)
     for name in formats if kind != "surface" else ():
-        path = mesh_writer.write(made, tmp_path / f"welded{mesh_writer.find_suffix(name)}", kind=name)
+        path = mesh_writer.write(
+            made, tmp_path / f"welded{mesh_writer.find_suffix(name)}", kind=name
+        )
         read = mesh_reader.read(path)
         welded = trimesh.Trimesh(read.vertices.astype(np.float32), read.faces, process=False)
         welded.merge_vertices()
@@ -266,7 +288,9 @@ def test_every_vertex_knows_height_force_and_mode_and_the_base_that_it_belongs_t
 
 def test_all_of_a_pins_top_has_its_values_and_a_skin_of_too_many_points_is_refused():
     place, steps = uneven().position, np.random.default_rng(4).permutation(168)
-    (body,) = make_bodies(Formed.of(place, 0.04 + 1e-4 * steps, 0.04, steps / 100.0, 0), Model(kind="pins"))
+    (body,) = make_bodies(
+        Formed.of(place, 0.04 + 1e-4 * steps, 0.04, steps / 100.0, 0), Model(kind="pins")
+    )
     over = body.values["mode"] != NO_PIN
     assert over.sum() > 4 * 168
     # Each height is that of one pin, and its force is a hundredth of the steps it is up.
@@ -274,7 +298,9 @@ def test_all_of_a_pins_top_has_its_values_and_a_skin_of_too_many_points_is_refus
     assert_near(body.values["force"][over], up / 100.0, 1e-12)
     place = make_grid(Layout(rows=400, columns=400)).positions
     bed = Formed.of(place, np.full(160_000, 0.04), 0.04, 0.0, 0)
-    with pytest.raises(ParameterError, match=r"^Model\.resolution must be low enough for 50 million points"):
+    with pytest.raises(
+        ParameterError, match=r"^Model\.resolution must be low enough for 50 million points"
+    ):
         make_bodies(bed, Model(resolution=40))
 
 
@@ -310,13 +336,19 @@ def test_a_model_that_makes_no_sense_is_refused(told, said):
 
 def history():
     bed = uneven()
-    rows = {"height": [np.full(168, 0.04), bed.height], "force": [bed.force] * 2, "mode": [bed.mode] * 2}
+    rows = {
+        "height": [np.full(168, 0.04), bed.height],
+        "force": [bed.force] * 2,
+        "mode": [bed.mode] * 2,
+    }
     return {"position": bed.position} | {name: np.stack(both) for name, both in rows.items()}
 
 
 def test_the_former_surface_is_a_row_or_one_height_that_the_history_has():
     np.testing.assert_allclose(make_formed(history(), -1, 0).raised, uneven().raised)
-    np.testing.assert_allclose(make_formed(history(), -1, 0.035).raised, uneven().raised + 0.005, atol=1e-15)
+    np.testing.assert_allclose(
+        make_formed(history(), -1, 0.035).raised, uneven().raised + 0.005, atol=1e-15
+    )
     assert not make_formed(history(), 1, 1).raised.any()
     said = r"^The history has 2 rows, 0 to 1 \(got -?\d as (row|former)\)\.$"
     for row, former in ((2, 0), (-3, 0), (0, 2), (0, -3)):
@@ -328,14 +360,17 @@ def test_the_former_surface_is_a_row_or_one_height_that_the_history_has():
 def test_values_that_are_not_finite_are_refused_by_cell(name, bad):
     known = {"height": np.full(168, 0.04), "former": 0.04, "force": 0.0, "mode": 0}
     known[name] = np.where(np.arange(168) == 7, bad, 0.04)
-    with pytest.raises(ParameterError, match=rf"^Surface\.{name} must be finite \(got {bad} at cell 7\)"):
+    with pytest.raises(
+        ParameterError, match=rf"^Surface\.{name} must be finite \(got {bad} at cell 7\)"
+    ):
         Formed.of(uneven().position, **known)
 
 
 @pytest.mark.parametrize("file", ["stl", "ply"])
 def test_a_solid_takes_no_more_memory_than_its_own_arrays_and_a_few_megabytes(file):
-    # Measured: 180 bytes a pin on a million pins, of which vertices, faces and values are 168; the file's
-    # 200 are never kept as a whole. On 160 000 pins the pieces that are written at once still count: 10 MB.
+    # Measured: 180 bytes a pin on a million pins, of which vertices, faces and values are 168; the
+    # file's 200 are never kept as a whole. On 160 000 pins the pieces that are written at once
+    # still count: 10 MB.
     side = 400
     exported = export(side, "solid", file)
     assert PIECE <= 65536

@@ -95,7 +95,10 @@ def test_an_openjd_template_has_these_tasks_in_an_order_that_respects_the_steps(
         current_working_dir=here,
     )
     job = create_job(job_template=template, job_parameter_values=values)
-    assert {name: one.value for name, one in values.items()} == {"Series": str(here / "out"), "Blender": "/p"}
+    assert {name: one.value for name, one in values.items()} == {
+        "Series": str(here / "out"),
+        "Blender": "/p",
+    }
     wanted, seen = planned(), []
     for name in [step.name for step in StepDependencyGraph(job=job).topo_sorted()]:
         (step,) = (one for one in job.steps if one.name == name)
@@ -110,7 +113,9 @@ def test_an_openjd_template_has_these_tasks_in_an_order_that_respects_the_steps(
             assert given == wanted[name][0]
             continue
         assert given[-2:] == ["--frames", "{{Task.Param.Frame}}+5"]
-        starts = [task["Frame"].value for task in StepParameterSpaceIterator(space=step.parameterSpace)]
+        starts = [
+            task["Frame"].value for task in StepParameterSpaceIterator(space=step.parameterSpace)
+        ]
         count = 4 if "turntable" in name else (2 if "tap-a" in name else COUNT)
         frames = [list(read_range(f"{start}+5", count)) for start in starts]
         assert [frame for part in frames for frame in part] == list(range(count))
@@ -122,7 +127,9 @@ def test_an_openjd_template_has_these_tasks_in_an_order_that_respects_the_steps(
 @pytest.mark.parametrize("every", [1, 7])
 def test_a_film_is_planned_with_the_frames_its_run_will_have(every):
     setting = f"a = {{ simulation.duration = 0.123, recorder.every = {every} }}"
-    submit("openjd", f'scenes = ["tap"]\nerrors = false\n[settings]\n{setting}\n[film]\nrate = 100\n')
+    submit(
+        "openjd", f'scenes = ["tap"]\nerrors = false\n[settings]\n{setting}\n[film]\nrate = 100\n'
+    )
     (job,) = (series := read_jobs(Path("two.toml"))).jobs
     frames = series.outputs.film.count(run(job.scene).history["time"])
     assert [task.frames.stop for task in plan_series(series, 5) if task.frames] == [frames]
@@ -151,7 +158,9 @@ function compile(text) {
 def compiled(job):
     """Return what Flamenco's Manager would be told of a job by the script, in strict mode as there."""
     context = quickjs.Context()
-    context.eval(f'"use strict";\n{STUB}{SCRIPT.read_text(encoding="utf-8")}\nglobalThis.compile = compile;')
+    context.eval(
+        f'"use strict";\n{STUB}{SCRIPT.read_text(encoding="utf-8")}\nglobalThis.compile = compile;'
+    )
     return json.loads(context.get("compile")(job))  # type: ignore[no-any-return]
 
 
@@ -168,7 +177,9 @@ def test_the_flamenco_script_makes_these_tasks_with_these_dependencies(program, 
     series = str(here / "out")
     for task in tasks:
         arguments, needs = wanted[task["name"]]
-        exact = [one.replace("S", series, 1) if one[:2] in ("S", "S/") else one for one in arguments]
+        exact = [
+            one.replace("S", series, 1) if one[:2] in ("S", "S/") else one for one in arguments
+        ]
         parameters = {"exe": program or sys.executable, "args": [*leading, *exact]}
         assert task["commands"] == [{"name": "exec", "parameters": parameters}]
         assert set(task["needs"]) == needs <= before
@@ -195,7 +206,12 @@ def test_the_flamenco_script_has_the_settings_its_jobs_give_and_is_plain_javascr
 def test_the_lists_of_cuecmd_hold_these_tasks_stage_by_stage(here):
     assert submit("cuecmd") == 0
     lists = sorted(Path("out/cuecmd").iterdir())
-    assert [path.name for path in lists] == ["1-runs.txt", "2-frames.txt", "3-films.txt", "4-page.txt"]
+    assert [path.name for path in lists] == [
+        "1-runs.txt",
+        "2-frames.txt",
+        "3-films.txt",
+        "4-page.txt",
+    ]
     wanted, before = planned(), set[str]()
     commands = {tuple(arguments): name for name, (arguments, _) in wanted.items()}
     for path in lists:
@@ -210,7 +226,10 @@ def test_the_lists_of_cuecmd_hold_these_tasks_stage_by_stage(here):
     assert commands == {}
     # Lists that another series of this folder had would be submitted with the others.
     assert submit("cuecmd", JOBS) == 0
-    assert sorted(path.name for path in Path("out/cuecmd").iterdir()) == ["1-runs.txt", "2-page.txt"]
+    assert sorted(path.name for path in Path("out/cuecmd").iterdir()) == [
+        "1-runs.txt",
+        "2-page.txt",
+    ]
 
 
 def test_a_line_for_windows_protects_what_its_shell_would_read():

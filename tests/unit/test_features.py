@@ -17,7 +17,9 @@ LEVEL = 0.04
 
 def formed(raised, arrangement="aligned", rows=41, columns=41, pitch=1e-3):
     """A bed formed from level to a function of x and y, mm in and mm out."""
-    place = make_grid(Layout(rows=rows, columns=columns, pitch=pitch, arrangement=arrangement)).positions
+    place = make_grid(
+        Layout(rows=rows, columns=columns, pitch=pitch, arrangement=arrangement)
+    ).positions
     height = LEVEL + 1e-3 * np.asarray(raised(*(place.T * 1e3)), float)
     return Formed.of(place, height, LEVEL, 0.0, 0)
 
@@ -52,12 +54,24 @@ def test_a_dome_is_one_boss_with_the_area_and_volume_of_the_cap(arrangement):
 
 
 def test_a_crease_is_measured_as_the_boss_it_mirrors_and_a_slope_counts_in_the_crest():
-    (up,), (down,) = (features(formed(lambda x, y, way=way: way * ridge(x, y))) for way in (1.0, -1.0))
+    (up,), (down,) = (
+        features(formed(lambda x, y, way=way: way * ridge(x, y))) for way in (1.0, -1.0)
+    )
     assert (up.kind, down.kind, down.name) == ("boss", "crease", "crease_1")
     figures = ("volume", "extreme", "crest_length")
-    assert [getattr(down, name) for name in figures] == pytest.approx([getattr(up, name) for name in figures])
+    assert [getattr(down, name) for name in figures] == pytest.approx(
+        [getattr(up, name) for name in figures]
+    )
     head, row = make_table([up])
-    assert head == ("feature", "form", "pins", "area, mm²", "height or depth, mm", "crest, mm", "volume, mm³")
+    assert head == (
+        "feature",
+        "form",
+        "pins",
+        "area, mm²",
+        "height or depth, mm",
+        "crest, mm",
+        "volume, mm³",
+    )
     assert (*row[:2], row[4]) == ("boss_1", "ridge", "6.00")
     (boss,) = features(formed(lambda x, y: ridge(x, y) / 6.0 * (9.0 + x / 2.0)))
     span = boss.crests[0][-1] - boss.crests[0][0]
@@ -83,10 +97,12 @@ def test_features_are_measured_from_the_surface_as_it_was_and_put_it_right():
     # Squares may be cut along their other diagonal, which moves the surface within them.
     assert other.volume == pytest.approx(one.volume, rel=1e-3)
     np.testing.assert_array_equal(other.pins, one.pins)
-    # What is formed is what was there, plus the boss, minus the crease, but for the rim below the threshold.
+    # What is formed is what was there, plus the boss, minus the crease, but for the rim below the
+    # threshold.
     bed = formed(lambda x, y: ridge(x, y - 8.0) - ridge(x, y + 8.0, height=4.0))
     boss, crease = features(bed, Finding(threshold=1e-6))
-    # A pin stands for 1 mm²; along the outline the skin is straight where the sum over pins has a corner.
+    # A pin stands for 1 mm²; along the outline the skin is straight where the sum over pins has a
+    # corner.
     assert boss.volume - crease.volume == pytest.approx(bed.raised.sum() * 1e-6, rel=5e-3)
 
 
@@ -107,7 +123,8 @@ def test_a_pin_exactly_at_the_threshold_does_not_belong_to_the_feature_nor_leave
     np.testing.assert_array_equal(boss.pins, [12, 13])
     a, b, c = np.moveaxis(boss.region.position[boss.region.faces], 1, 0)
     area = 0.5 * np.abs((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0])
-    # Beside a corner of the contour stands a triangle of a thousandth of a pitch, and not of rounding.
+    # Beside a corner of the contour stands a triangle of a thousandth of a pitch, and not of
+    # rounding.
     assert area.min() > 1e-4 * 0.5 * 9e-6
     assert len(np.unique(boss.region.position, axis=0)) == len(boss.region.position)
 
@@ -126,8 +143,11 @@ def test_every_body_is_closed_and_of_the_volume_that_is_listed(arrangement, seed
         assert set(counts) == {2}
         assert mesh.is_winding_consistent
         assert mesh.volume == pytest.approx(one.apart.volume, rel=1e-9)
-        # Where it is divided, a strip as wide as 0.005 to 0.01 pitches is missing: 0.1 mm² under up to 1 mm.
-        assert mesh.volume == pytest.approx(one.volume, rel=1e-9 if one.apart is one.region else 0.01)
+        # Where it is divided, a strip as wide as 0.005 to 0.01 pitches is missing: 0.1 mm² under up
+        # to 1 mm.
+        assert mesh.volume == pytest.approx(
+            one.volume, rel=1e-9 if one.apart is one.region else 0.01
+        )
         assert len(np.unique(mesh.faces)) == len(mesh.vertices)
 
 
@@ -144,7 +164,13 @@ def test_bodies_follow_the_skin_that_is_asked_for(skin):
 
 
 #: Pitch in mm; three of a kind that no ridge here fits to.
-BEDS = (("aligned", 3.0), ("staggered", 3.0), ("hexagonal", 3.0), ("aligned", 2.3), ("staggered", 2.3))
+BEDS = (
+    ("aligned", 3.0),
+    ("staggered", 3.0),
+    ("hexagonal", 3.0),
+    ("aligned", 2.3),
+    ("staggered", 2.3),
+)
 #: A crest is as long as the line its shape was drawn along, to this share.
 LENGTH = 0.05
 
@@ -212,7 +238,8 @@ ACROSS = 34.0 * np.cos(AROUND) / (1.0 + np.sin(AROUND) ** 2)
 EIGHT = along(np.column_stack([ACROSS, 1.6 * ACROSS * np.sin(AROUND)]))
 CRATER = ridges(10, 7, circle(0, 16))
 SLANTED = "-25,-6 25,8", "-4,-25 4,25"
-#: Shapes: heights in mm over x and y in mm, and the forms to be found, with the lengths of crests in plan.
+#: Shapes: heights in mm over x and y in mm, and the forms to be found, with the lengths of crests
+#: in plan.
 SHAPES = {
     "ridge": (ridges(12, 7, "-18,-10 20,9"), "ridge 42.5"),
     "cross": (ridges(12, 7, "-25,0 25,0", "0,-25 0,25"), "2 ridges 50 50"),
@@ -256,7 +283,9 @@ def form_shape(name, arrangement, pitch, turn=0.0, at=(0.0, 0.0)):
     layout = Layout(int(size / spacing) + 1, int(size / pitch) + 1, pitch * 1e-3, arrangement)
     place = make_grid(layout).positions
     x, y = (place * 1e3 - at).T
-    raised = SHAPES[name][0](np.cos(turn) * x + np.sin(turn) * y, np.cos(turn) * y - np.sin(turn) * x)
+    raised = SHAPES[name][0](
+        np.cos(turn) * x + np.sin(turn) * y, np.cos(turn) * y - np.sin(turn) * x
+    )
     return Formed.of(place, 0.04 + 1e-3 * raised, 0.04, 0.0, 0)
 
 
@@ -278,8 +307,12 @@ def find_faults(name, found, slack=0.0):
     for kind, form, lengths in wanted:
         if lengths:
             (one,) = [one for one in found if (one.kind, one.form) == (kind, form)]
-            measured = [np.hypot(*np.diff(crest[:, :2], axis=0).T).sum() * 1e3 for crest in one.crests]
-            if measured != [pytest.approx(length, abs=LENGTH * length + slack) for length in lengths]:
+            measured = [
+                np.hypot(*np.diff(crest[:, :2], axis=0).T).sum() * 1e3 for crest in one.crests
+            ]
+            if measured != [
+                pytest.approx(length, abs=LENGTH * length + slack) for length in lengths
+            ]:
                 faults.append(f"{name}: {form} of {measured}")
     return faults
 
@@ -288,7 +321,8 @@ def find_faults(name, found, slack=0.0):
 @pytest.mark.parametrize("name", SHAPES)
 def test_a_shape_is_found_as_what_it_is(name, arrangement, pitch):
     found = features(form_shape(name, arrangement, pitch))
-    # The crest of a ridge that runs to the edge ends at the outermost pins, up to a pitch inside it.
+    # The crest of a ridge that runs to the edge ends at the outermost pins, up to a pitch inside
+    # it.
     assert not find_faults(name, found, pitch if name == "ridge to the edge" else 0.0)
 
 
@@ -297,7 +331,11 @@ def test_of_the_shapes_turned_and_beside_the_middle_95_in_100_are_found_as_what_
     for (name, _), (arrangement, pitch) in itertools.product(SHAPES.items(), BEDS[2:4]):
         if name != "ridge to the edge":  # how long it is then depends on the edge
             bed = form_shape(
-                name, arrangement, pitch, random.uniform(0.1, 6.2), tuple(random.uniform(-6.0, 6.0, 2))
+                name,
+                arrangement,
+                pitch,
+                random.uniform(0.1, 6.2),
+                tuple(random.uniform(-6.0, 6.0, 2)),
             )
             faults += find_faults(name, features(bed))[:1]
             count += 1
@@ -316,7 +354,11 @@ def test_the_crests_of_a_cross_keep_to_its_lines(arrangement, pitch):
 
 @pytest.mark.parametrize(
     "name, bed",
-    [("ridge with a mound at its end", BEDS[1]), ("two mounds on a ridge", BEDS[2]), ("two domes", BEDS[3])],
+    [
+        ("ridge with a mound at its end", BEDS[1]),
+        ("two mounds on a ridge", BEDS[2]),
+        ("two domes", BEDS[3]),
+    ],
 )
 def test_the_parts_of_a_boss_share_its_pins_area_and_volume(name, bed):
     bed = form_shape(name, *bed)

@@ -82,9 +82,13 @@ def test_a_text_without_an_end_is_not_gone_over_again_and_again(tmp_path, quote)
 def test_a_scene_or_array_beyond_all_sizes_or_for_another_bed_is_not_read(tmp_path):
     with (tmp_path / "hole.toml").open("wb") as file:
         file.truncate(LARGEST + 1)  # takes no room on the disk
-    assert "hole.toml must have at most 128 MB (got 128 MB)." in refused(lambda: load(tmp_path / "hole.toml"))
+    assert "hole.toml must have at most 128 MB (got 128 MB)." in refused(
+        lambda: load(tmp_path / "hole.toml")
+    )
     many = np.broadcast_to(np.float32(0.0), (20_000, 20_000))
-    with pytest.raises(ParameterError, match=r"at most 128 million heights .got x.npy: 20000 x 20000"):
+    with pytest.raises(
+        ParameterError, match=r"at most 128 million heights .got x.npy: 20000 x 20000"
+    ):
         make_height_map("x.npy", many)
     np.save(tmp_path / "large.npy", np.zeros((1000, 1000)))
     bed = make_grid(Layout(2, 2, 3e-3))
@@ -94,7 +98,9 @@ def test_a_scene_or_array_beyond_all_sizes_or_for_another_bed_is_not_read(tmp_pa
 
 def history(folder, **arrays):
     """Leave what a run of four cells and ten periods leaves, with some arrays in place of its own."""
-    scene = resolve({"layout": {"rows": 2, "columns": 2}, "simulation": {"duration": 0.05}, "blister": SMALL})
+    scene = resolve(
+        {"layout": {"rows": 2, "columns": 2}, "simulation": {"duration": 0.05}, "blister": SMALL}
+    )
     (folder / "scene.toml").write_text(format_scene(scene), encoding="utf-8")
     own = {"time": np.arange(11) * 5e-3, "height": np.zeros((11, 4)), "force": np.zeros((11, 4))}
     np.savez_compressed(folder / "history.npz", **(own | arrays))
@@ -147,7 +153,9 @@ def npy(array):
 def head(shape):
     """Return the head of a file of numpy's, without the numbers."""
     file = io.BytesIO()
-    np.lib.format.write_array_header_1_0(file, {"shape": shape, "fortran_order": False, "descr": "<f8"})
+    np.lib.format.write_array_header_1_0(
+        file, {"shape": shape, "fortran_order": False, "descr": "<f8"}
+    )
     return file.getvalue()
 
 
@@ -176,13 +184,25 @@ def take():
 @pytest.mark.parametrize(
     "save, name, value, said",
     [
-        (np.savez_compressed, "poses", np.zeros((1_000_000, 1, 7)), r"unpack to at most its own .*got 56,"),
-        (np.savez, "scene", np.frombuffer(f"{BOMB} = 1".encode(), np.uint8), "must have at most 16 names"),
+        (
+            np.savez_compressed,
+            "poses",
+            np.zeros((1_000_000, 1, 7)),
+            r"unpack to at most its own .*got 56,",
+        ),
+        (
+            np.savez,
+            "scene",
+            np.frombuffer(f"{BOMB} = 1".encode(), np.uint8),
+            "must have at most 16 names",
+        ),
         (np.savez, "version", np.arange(9_000), "cannot reshape array of size 9000"),
         (np.savez, "version", np.array("9" * 4_000), "its version must be at most"),
     ],
 )
-def test_a_take_that_unpacks_to_more_than_it_is_or_has_a_bomb_for_a_scene_is_refused(save, name, value, said):
+def test_a_take_that_unpacks_to_more_than_it_is_or_has_a_bomb_for_a_scene_is_refused(
+    save, name, value, said
+):
     data = io.BytesIO()
     with np.load(io.BytesIO(take())) as arrays:
         save(data, **{**arrays, name: value})

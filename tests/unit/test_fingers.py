@@ -11,7 +11,12 @@ from digiclay.core.files.tables import parse_tables
 from digiclay.core.model import touch
 from digiclay.core.model.contact import Contact
 from digiclay.core.model.fingertip import Fingertip
-from digiclay.core.model.touch import MOST_FORCE, MOST_INDENTATION, describe_excess, find_indentations
+from digiclay.core.model.touch import (
+    MOST_FORCE,
+    MOST_INDENTATION,
+    describe_excess,
+    find_indentations,
+)
 from digiclay.core.model.trajectory import Path as FingerPath
 from digiclay.core.model.trajectory import Waypoint
 from digiclay.core.scene.assembly import assemble
@@ -51,7 +56,11 @@ def scene(words):
 def test_a_scene_may_have_two_fingers_and_lasts_as_long_as_the_longest_path():
     assert scene(TWO).simulation.duration == 0.7
     thumb, other = scene(TWO).fingers
-    assert (thumb.fingertip.length, thumb.relaxation is None, other.relaxation) == (14e-3, False, None)
+    assert (thumb.fingertip.length, thumb.relaxation is None, other.relaxation) == (
+        14e-3,
+        False,
+        None,
+    )
     assert (thumb.trajectory.interpolation, other.trajectory.interpolation) == ("smooth", "linear")
 
 
@@ -67,9 +76,13 @@ def test_a_setting_names_the_only_finger_of_a_list_as_any_other(tmp_path):
     assert "[[finger]]" not in format_scene(scene(ONE))
     file = tmp_path / "one.toml"
     file.write_text(BED + ONE, encoding="utf-8")
-    (finger,) = load(file, [Setting("fingertip.length", "0.009"), Setting("relaxation", "absent")]).fingers
+    (finger,) = load(
+        file, [Setting("fingertip.length", "0.009"), Setting("relaxation", "absent")]
+    ).fingers
     assert (finger.fingertip.length, finger.relaxation) == (9e-3, None)
-    with pytest.raises(SceneError, match=r"^--set: finger\.2\.contact must begin with .*has one fingertip"):
+    with pytest.raises(
+        SceneError, match=r"^--set: finger\.2\.contact must begin with .*has one fingertip"
+    ):
         load(file, [Setting("finger.2.contact", "{}")])
 
 
@@ -96,7 +109,9 @@ def test_a_setting_is_of_all_fingers_or_of_the_one_it_names(key, value, lengths,
         made = load(file, settings)
         assert tuple(part.length for part in made.list_parts("fingertip")) == lengths
         own = tuple(dict.fromkeys(lengths))
-        assert find_value(made, "fingertip.length", "differs") == (own[0] if len(own) == 1 else "differs")
+        assert find_value(made, "fingertip.length", "differs") == (
+            own[0] if len(own) == 1 else "differs"
+        )
         assert find_value(made, "finger.2.fingertip.length", "") == lengths[1]
     else:
         with pytest.raises(SceneError, match=f"^--(set|vary): {lengths}") as refused:
@@ -111,7 +126,10 @@ def test_a_setting_is_of_all_fingers_or_of_the_one_it_names(key, value, lengths,
         ("[[finger]]\nlength = 1\n", r"finger #1.length must be a known key"),
         ("[[finger]]\n[[finger]]\nfingertip = 3\n", r"finger #2.fingertip must be a section"),
         ("[[finger]]\n[finger.contact]\nshare = -1.0\n", r"finger #1.contact.share must be"),
-        ("[[finger]]\ntrajectory.waypoints = [{ time = 0.0 }]\n", r"finger #1.trajectory.waypoints #1.posit"),
+        (
+            "[[finger]]\ntrajectory.waypoints = [{ time = 0.0 }]\n",
+            r"finger #1.trajectory.waypoints #1.posit",
+        ),
         ("[[finger]]\n[contact]\n", r"contact must be left out where there is \[\[finger\]\]"),
         ("[finger]\n", r"finger must be a list of tables, \[\[finger\]\] \(got an empty section\)"),
     ],
@@ -123,7 +141,9 @@ def test_what_is_wrong_with_a_finger_is_told_with_its_number(words, said):
 
 @pytest.mark.parametrize("number", [0, 33])
 def test_no_finger_and_33_are_refused_in_one_line(number):
-    with pytest.raises(ParameterError, match=rf"^scene\.fingers must be 1 to 32 \(got {number}\)\.$"):
+    with pytest.raises(
+        ParameterError, match=rf"^scene\.fingers must be 1 to 32 \(got {number}\)\.$"
+    ):
         assemble(replace(scene(ONE), fingers=scene(ONE).fingers * number))
 
 
@@ -136,7 +156,9 @@ def test_a_kept_state_of_two_fingers_is_refused():
     header["gathered"] |= {"fingers": [{"reach": None}] * 2, "control": [None, None]}
     head = json.dumps(header).encode()
     two = START + len(head).to_bytes(4, "little") + head + data[len(START) + 4 + length :]
-    with pytest.raises(StateError, match=r"must have the same number of fingers as the bed now, 1 \(got 2\)"):
+    with pytest.raises(
+        StateError, match=r"must have the same number of fingers as the bed now, 1 \(got 2\)"
+    ):
         snapshot.load(system, two)
 
 
@@ -164,7 +186,13 @@ def test_a_finger_driven_through_the_bed_is_remarked_in_the_summary_line_and_no_
     assert through.summary().endswith(f"; {said}")
     # Only what is beyond is named.
     most = (MOST_FORCE, MOST_INDENTATION)
-    given = (most, (1.001 * MOST_FORCE, most[1]), (most[0], 1.001 * most[1]), (476.0, 4e-3), (None, None))
+    given = (
+        most,
+        (1.001 * MOST_FORCE, most[1]),
+        (most[0], 1.001 * most[1]),
+        (476.0, 4e-3),
+        (None, None),
+    )
     assert [describe_excess(*values).count("up to") for values in given] == [0, 1, 1, 2, 0]
 
 
@@ -185,7 +213,9 @@ def test_rows_and_live_states_beyond_the_law_are_marked(depth, tilt, x, stiffnes
     told = result.metrics["max_indentation"], result.metrics["units"]["max_indentation"]
     assert told == (pytest.approx(depths.max(), rel=1e-12), "m")
     # No valve is open, and the underside is an ellipse of 10 and 8 mm.
-    assert depths.max() == pytest.approx(depth - 8e-3 * (1.0 - np.sqrt(1.0 - (x / 10e-3) ** 2)), rel=1e-9)
+    assert depths.max() == pytest.approx(
+        depth - 8e-3 * (1.0 - np.sqrt(1.0 - (x / 10e-3) ** 2)), rel=1e-9
+    )
     wanted = (history["total_force"] > MOST_FORCE) | (depths > MOST_INDENTATION)
     assert wanted.any() == (depth > MOST_INDENTATION) == ("beyond_a_finger" in history)
     np.testing.assert_array_equal(history.get("beyond_a_finger", wanted), wanted)

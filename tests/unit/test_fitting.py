@@ -12,7 +12,13 @@ from digiclay.core.model.actuator import Actuator
 from digiclay.core.model.layout import ARRANGEMENTS, Layout, make_grid
 from digiclay.core.shapes import heightmap
 from digiclay.core.shapes.fitting import fit_given, fit_relief, pack, unpack
-from digiclay.core.shapes.heightmap import average_blocks, make_height_map, read_grid, read_head, read_pixels
+from digiclay.core.shapes.heightmap import (
+    average_blocks,
+    make_height_map,
+    read_grid,
+    read_head,
+    read_pixels,
+)
 from digiclay.core.shapes.mesh_relief import make_shape_mesh
 from digiclay.core.shapes.request import Placement, Shape
 from hypothesis import given
@@ -55,7 +61,12 @@ def relief(cells):
         # Pins 3 mm apart within +- 15.25 mm and +- 6.25 mm.
         "in its own size": ((30.5, 12.5, 5), {"fit": "actual"}, range(4, 9), range(7, 18)),
         # 5 mm wide about (9, -6) mm: one pin, and none of its neighbors 3 mm away.
-        "scaled, moved": ((10, 10, 5), {"fit": "actual", "scale": 0.5, "x": 9e-3, "y": -6e-3}, [4], [15]),
+        "scaled, moved": (
+            (10, 10, 5),
+            {"fit": "actual", "scale": 0.5, "x": 9e-3, "y": -6e-3},
+            [4],
+            [15],
+        ),
     },
 )
 def test_a_fit_says_where_the_shape_lies_in_plan(size, known, rows, columns):
@@ -74,11 +85,18 @@ SLOPE = make_height_map("x.npy", np.linspace(0.0, 7e-3, 12).reshape(3, 4), 1.0)
         (mesh(BALL), {"rise": 4e-3, "foot": 2e-3}, 42e-3, 46e-3),
         (mesh(BALL), {"rise": -12e-3, "foot": 2e-3}, 30e-3, 42e-3),
         (mesh(BALL), {"relief": "stroke"}, REST, STROKE),
-        (box(10, 10, 5), {"relief": "true"}, REST, 59.5e-3),  # 10 mm become 39 mm, 5 mm become 19.5 mm
+        (
+            box(10, 10, 5),
+            {"relief": "true"},
+            REST,
+            59.5e-3,
+        ),  # 10 mm become 39 mm, 5 mm become 19.5 mm
         (SLOPE, {"relief": "true", "fit": "stretch"}, REST, 47e-3),
     ],
 )
-def test_the_relief_goes_from_the_foot_over_the_rise_to_the_strokes_end_or_is_true(what, known, low, high):
+def test_the_relief_goes_from_the_foot_over_the_rise_to_the_strokes_end_or_is_true(
+    what, known, low, high
+):
     cells = laid(what, **known)
     assert (cells.heights.min(), cells.heights.max()) == pytest.approx((low, high), abs=ROUNDING)
     assert cells.too_low + cells.too_high == 0
@@ -102,7 +120,9 @@ def test_placed_a_shape_stands_where_it_says_and_heights_of_a_scene_as_they_are(
 
 def test_what_leaves_the_stroke_is_clipped_and_counted_and_overhangs_are_told():
     row = np.linspace(0.0, 1.0, 25)
-    cells = laid(make_height_map("ramp.png", np.tile(row, (13, 1))), fit="stretch", foot=-50e-3, rise=120e-3)
+    cells = laid(
+        make_height_map("ramp.png", np.tile(row, (13, 1))), fit="stretch", foot=-50e-3, rise=120e-3
+    )
     wanted = REST - 50e-3 + 120e-3 * row
     assert cells.too_low == 13 * np.count_nonzero(wanted < -1e-9) > 0
     assert cells.too_high == 13 * np.count_nonzero(wanted > STROKE + 1e-9) > 0
@@ -137,7 +157,8 @@ LINE = make_shape_mesh(
     "l.stl", np.array([[0.0, 0, 0], [9, 0, 0], [4, 0, 5]]), np.array([[0, 1, 2]]), "z", 1e-3
 )
 BESIDE = (
-    "shape.x, y must leave the shape over the bed (got solid.stl: no pin lies under it). Set shape.fit to"
+    "shape.x, y must leave the shape over the bed (got solid.stl: no pin lies under it). "
+    "Set shape.fit to"
 )
 
 
@@ -165,7 +186,10 @@ def test_what_cannot_be_laid_onto_the_bed_is_refused(what, known, said):
         (pack(np.arange(325.0))[:40], "must be heights packed as text"),
         (pack(np.ones(7)), "must hold the heights of the bed's 13 x 25 cells (got 7 heights)"),
         (pack(np.ones(10**6)), "of the bed's 13 x 25 cells (got more than 325 heights)"),
-        (pack(np.where(np.arange(325) == 9, np.nan, 1.0)), "must be finite numbers (got nan at cell 9)"),
+        (
+            pack(np.where(np.arange(325) == 9, np.nan, 1.0)),
+            "must be finite numbers (got nan at cell 9)",
+        ),
     ],
 )
 def test_a_text_that_holds_other_heights_is_refused(text, said):
@@ -215,13 +239,20 @@ PIXELS = np.random.default_rng(2).uniform(0.0, 1.0, (5, 7))
 )
 def test_a_map_gives_each_pin_the_mean_over_its_square(values, rows, columns, pixel, wanted):
     bed = make_grid(Layout(rows, columns, PITCH))
-    found, known = make_height_map("x", values).tops(bed, middle(*values.shape, pixel)), wanted(bed.x, bed.y)
+    found, known = (
+        make_height_map("x", values).tops(bed, middle(*values.shape, pixel)),
+        wanted(bed.x, bed.y),
+    )
     np.testing.assert_array_equal(found.covered, np.isfinite(known))
     assert np.abs(found.value - known)[found.covered].max() < 1e-10  # rounding of numbers up to 60
 
 
 @given(
-    st.integers(2, 40), st.integers(2, 40), st.integers(1, 9), st.integers(1, 200), st.integers(0, 2**32 - 1)
+    st.integers(2, 40),
+    st.integers(2, 40),
+    st.integers(1, 9),
+    st.integers(1, 200),
+    st.integers(0, 2**32 - 1),
 )
 def test_means_keep_the_sum(rows, columns, block, chunk, seed):
     values = np.random.default_rng(seed).uniform(-1.0, 1.0, (rows, columns))
@@ -270,7 +301,8 @@ def test_a_picture_is_read_as_it_was_written(tmp_path, bits, kind, ending):
     path = tmp_path / f"grün und weiß.{ending}"
     Image.fromarray(values).save(path)
     assert np.array_equal(read_pixels(path), np.flipud(values))
-    # By its brightness, where it is colored: red weighs 0.299 of 255, as in the television standard.
+    # By its brightness, where it is colored: red weighs 0.299 of 255, as in the television
+    # standard.
     Image.fromarray(np.array([[[255] * 3] * 2, [[0] * 3, [255, 0, 0]]], np.uint8)).save(path)
     assert np.abs(read_pixels(path) - [[0, 76.245], [255, 255]]).max() < 1e-4  # 24 bits of 255
 
@@ -355,12 +387,24 @@ def test_a_grid_of_numbers_is_read_as_its_program_writes_it(tmp_path, name, text
     "name, text, said",
     [
         ("a.asc", NORTH_UP, "(got a.asc: no 'nrows' in its head, as an Esri ASCII grid has it)"),
-        ("a.asc", ESRI + NORTH_UP[8:], "(got a.asc: cannot reshape array of size 8 into shape (3,4))"),
+        (
+            "a.asc",
+            ESRI + NORTH_UP[8:],
+            "(got a.asc: cannot reshape array of size 8 into shape (3,4))",
+        ),
         ("a.txt", "", "(got a.txt: loadtxt: input contained no data"),
         ("a.txt", "1 2\n3", "(got a.txt: the number of columns changed from 2 to 1 at row 2)"),
-        ("a.csv", "x,y\n1,2\n", "(got a.csv: could not convert string 'x' to float64 at row 0, column 1.)"),
+        (
+            "a.csv",
+            "x,y\n1,2\n",
+            "(got a.csv: could not convert string 'x' to float64 at row 0, column 1.)",
+        ),
         ("a.csv", "1,,2\n1,2,3\n", "could not convert string '' to float64 at row 0, column 2.)"),
-        ("a.csv", "1 2\n3 nan\n", "must hold finite numbers only, of at most 1e+60 (got a.csv: nan at 1, 1)"),
+        (
+            "a.csv",
+            "1 2\n3 nan\n",
+            "must hold finite numbers only, of at most 1e+60 (got a.csv: nan at 1, 1)",
+        ),
         (
             "a.txt",
             "1 2 3\n" * 100,
@@ -374,33 +418,46 @@ def test_a_text_that_is_no_grid_is_refused_with_its_row(tmp_path, name, text, sa
         read_grid(tmp_path / name)
 
 
-def test_pins_over_no_data_stand_at_the_foot_and_those_beside_are_as_high_as_if_it_ended_there(tmp_path):
+def test_pins_over_no_data_stand_at_the_foot_and_those_beside_are_as_high_as_if_it_ended_there(
+    tmp_path,
+):
     heights = np.tile(np.linspace(1.0, 5.0, 25), (13, 1))
     absent = np.zeros((13, 25), bool)
     absent[3:6, 4:9] = True
-    grid = make_height_map("a.asc", np.ma.array(np.where(absent, -9999.0, heights), mask=absent), 1.0, 20.0)
+    grid = make_height_map(
+        "a.asc", np.ma.array(np.where(absent, -9999.0, heights), mask=absent), 1.0, 20.0
+    )
     cells = laid(grid, fit="stretch", rise=8e-3)
     assert cells.covered == 13 * 25 - 15
     wanted = np.where(absent, 0.0, 2.0 * (heights - 1.0))
     assert np.abs(relief(cells) - wanted).max() < 1e-9
     # Twice as fine, each pin has the mean of the pixels that have data.
-    fine = np.ma.array(np.kron(heights, np.ones((2, 2))), mask=np.kron(absent, np.ones((2, 2), bool)))
+    fine = np.ma.array(
+        np.kron(heights, np.ones((2, 2))), mask=np.kron(absent, np.ones((2, 2), bool))
+    )
     assert (
-        np.abs(relief(laid(make_height_map("a.asc", fine), fit="stretch", rise=8e-3)) - wanted).max() < 1e-9
+        np.abs(
+            relief(laid(make_height_map("a.asc", fine), fit="stretch", rise=8e-3)) - wanted
+        ).max()
+        < 1e-9
     )
 
 
 def test_an_esri_grid_keeps_its_proportions_of_plan_and_height(tmp_path):
     # 100 m x 60 m, 40 m high, in cells of 20 m, which become 15 mm: 75 mm are five of them.
     grid = make_height_map("a.asc", np.tile(np.linspace(0.0, 40.0, 5), (3, 1)), 1.0, 20.0)
-    assert np.ptp(laid(grid, relief="true", fit="cover").heights) == pytest.approx(30e-3, abs=ROUNDING)
+    assert np.ptp(laid(grid, relief="true", fit="cover").heights) == pytest.approx(
+        30e-3, abs=ROUNDING
+    )
     with pytest.raises(ParameterError, match="no pin lies under it"):
         laid(grid, fit="actual", x=90.0)
     with pytest.raises(ParameterError, match="its pixels have no place"):
         laid(grid, fit="placed")
 
 
-def test_a_picture_of_a_hundred_megapixels_is_taken_and_one_of_more_refused_before_it_is_read(tmp_path):
+def test_a_picture_of_a_hundred_megapixels_is_taken_and_one_of_more_refused_before_it_is_read(
+    tmp_path,
+):
     path = tmp_path / "large.png"
     Image.new("L", (10_000, 10_000), 7).save(path, compress_level=1)
     found = make_height_map(path.name, read_pixels(path))
@@ -429,11 +486,15 @@ def hdr(width, height):
 
 @pytest.mark.parametrize("name", ["a.png", "a.jpg", "a.bmp", "a.tif"])
 @pytest.mark.parametrize("mode", ["L", "RGB"])
-def test_the_size_is_the_one_pillow_finds_and_that_of_pictures_only_blender_reads(tmp_path, name, mode):
+def test_the_size_is_the_one_pillow_finds_and_that_of_pictures_only_blender_reads(
+    tmp_path, name, mode
+):
     Image.new(mode, (37, 21)).save(tmp_path / name)
     assert read_head(tmp_path / name).size == (37, 21)
     # A JPEG with other segments before its size.
-    Image.new("RGB", (37, 21)).save(tmp_path / "b.jpg", exif=b"Exif\0\0" + bytes(60_000), progressive=True)
+    Image.new("RGB", (37, 21)).save(
+        tmp_path / "b.jpg", exif=b"Exif\0\0" + bytes(60_000), progressive=True
+    )
     (tmp_path / "b.exr").write_bytes(exr(37, 21))
     (tmp_path / "b.hdr").write_bytes(hdr(37, 21))
     assert {read_head(tmp_path / f"b.{kind}").size for kind in ("jpg", "exr", "hdr")} == {(37, 21)}
@@ -450,7 +511,11 @@ PNG = b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR\0\0\0\x63\0\0\0\x63\x08\0\0\0\0"
         ("huge.exr", exr(2**31 - 1, 40_000), "must have at most 128 million pixels"),
         ("huge.hdr", hdr(10**18 - 1, 10**18 - 1), "must have at most 128 million pixels"),
         # Pillow hands PostScript over to another program: no ending opens a file of another kind.
-        ("a.png", b"%!PS-Adobe-3.0 EPSF-3.0\n%%BoundingBox: 0 0 10 10\n", "not a picture, or cut off"),
+        (
+            "a.png",
+            b"%!PS-Adobe-3.0 EPSF-3.0\n%%BoundingBox: 0 0 10 10\n",
+            "not a picture, or cut off",
+        ),
     ],
 )
 def test_what_is_no_picture_or_a_huge_one_is_refused(tmp_path, name, content, said):

@@ -22,7 +22,11 @@ from tests.scene_files import call
 
 pytestmark = pytest.mark.usefixtures("here")
 
-TABLES = {"layout": {"rows": 5, "columns": 5}, "control": "absent", "simulation": {"duration": "50 ms"}}
+TABLES = {
+    "layout": {"rows": 5, "columns": 5},
+    "control": "absent",
+    "simulation": {"duration": "50 ms"},
+}
 SHORT = {"simulation.duration": 0.3}
 
 
@@ -78,8 +82,11 @@ def test_the_tables_of_a_scene_resolve_to_it(name):
     ],
 )  # fmt: skip
 @pytest.mark.parametrize("source", ["name", "scene"])
-def test_changes_are_those_of_the_command_line_also_of_a_scene_that_is_made(changes, settings, source):
-    # What follows from a method, a preset or an arrangement of pins follows in a scene as in its file.
+def test_changes_are_those_of_the_command_line_also_of_a_scene_that_is_made(
+    changes, settings, source
+):
+    # What follows from a method, a preset or an arrangement of pins follows in a scene as in its
+    # file.
     wanted = load(find("tap"), [Setting(*one.split("=", 1)) for one in settings])
     assert digiclay.scene("tap" if source == "name" else digiclay.scene("tap"), changes) == wanted
 
@@ -93,37 +100,86 @@ def test_changes_are_those_of_the_command_line_also_of_a_scene_that_is_made(chan
         ({"preset": "design"}, {"preset": "paper"}),
     ],
 )
-def test_what_a_scene_has_by_its_arrangement_height_method_or_preset_follows_their_change(tables, changes):
-    # As if the tables had been changed: the share of a pin, the default press, the blister, valve and lag.
-    assert digiclay.scene(digiclay.scene(tables), changes) == digiclay.scene({}, {**tables, **changes})
+def test_what_a_scene_has_by_its_arrangement_height_method_or_preset_follows_their_change(
+    tables, changes
+):
+    # As if the tables had been changed: the share of a pin, the default press, the blister, valve
+    # and lag.
+    assert digiclay.scene(digiclay.scene(tables), changes) == digiclay.scene(
+        {}, {**tables, **changes}
+    )
 
 
-@pytest.mark.parametrize("number", [np.float32(0.25), np.array(0.25), pandas.Series([0.25])[0]], ids=type)
+@pytest.mark.parametrize(
+    "number", [np.float32(0.25), np.array(0.25), pandas.Series([0.25])[0]], ids=type
+)
 def test_numbers_of_numpy_and_pandas_are_numbers_in_tables(number):
     points = [{"time": number, "position": np.array([0.0, 0.0, 0.04])}]
-    scene = digiclay.scene({"control": {"force_setpoint": number}, "trajectory": {"waypoints": points}})
+    scene = digiclay.scene(
+        {"control": {"force_setpoint": number}, "trajectory": {"waypoints": points}}
+    )
     assert scene.control.force_setpoint == scene.simulation.duration == 0.25
 
 
 @pytest.mark.parametrize(
     "content, changes, message",
     [
-        ({"contrl": {}}, None, "contrl must be a known key (got an empty section). Did you mean control?"),
-        ({"valve": {"orifice_diameter": "3 s"}}, {}, "valve.orifice_diameter must be in m or a multiple"),
+        (
+            {"contrl": {}},
+            None,
+            "contrl must be a known key (got an empty section). Did you mean control?",
+        ),
+        (
+            {"valve": {"orifice_diameter": "3 s"}},
+            {},
+            "valve.orifice_diameter must be in m or a multiple",
+        ),
         ("no_such_scene", None, "no_such_scene is neither a file nor a sample"),
         (7, None, "A scene must be tables, a file or a name (got 7)."),
         ({"control": np.array([1, 2])}, None, "control must be a section, [control]"),
-        ({"layout": {"rows": np.array([5, 6])}}, None, "layout.rows must be a whole number (got [5, 6])."),
+        (
+            {"layout": {"rows": np.array([5, 6])}},
+            None,
+            "layout.rows must be a whole number (got [5, 6]).",
+        ),
         ("tap", [1], "Changes must be a table of keys and values (got [1])."),
-        ("tap", {"control.force_gian": 3}, "changes: control.force_gian must be a known key (got 3). Did"),
-        ("tap", {"control": {"force_gain": float("nan")}}, "changes: control.force_gain must be a finite"),
+        (
+            "tap",
+            {"control.force_gian": 3},
+            "changes: control.force_gian must be a known key (got 3). Did",
+        ),
+        (
+            "tap",
+            {"control": {"force_gain": float("nan")}},
+            "changes: control.force_gain must be a finite",
+        ),
         ("tap", {"control.force_gain": None}, "changes: control.force_gain must be a number"),
-        ("tap", {"control.force_gain": "3"}, "changes: control.force_gain must have a unit known here"),
+        (
+            "tap",
+            {"control.force_gain": "3"},
+            "changes: control.force_gain must have a unit known here",
+        ),
         ("tap", {3: 4}, "changes: 3 must be a known key (got 4)"),
-        ("tap", {"control.method": "hybird"}, "changes: control.method must be one of virtual_master, "),
-        ("tap", {"control.method": int}, "int: the class must derive from digiclay.Method (got int)."),
-        ("tap", {"control.method": "no.py:No"}, "no.py cannot be read as a control method: No such file"),
-        ({"control": {"method": "no.py:No"}}, None, "no.py cannot be read as a control method: No such"),
+        (
+            "tap",
+            {"control.method": "hybird"},
+            "changes: control.method must be one of virtual_master, ",
+        ),
+        (
+            "tap",
+            {"control.method": int},
+            "int: the class must derive from digiclay.Method (got int).",
+        ),
+        (
+            "tap",
+            {"control.method": "no.py:No"},
+            "no.py cannot be read as a control method: No such file",
+        ),
+        (
+            {"control": {"method": "no.py:No"}},
+            None,
+            "no.py cannot be read as a control method: No such",
+        ),
     ],
 )
 def test_a_wrong_scene_is_refused_in_one_line(content, changes, message):
@@ -139,7 +195,10 @@ def test_a_wrong_scene_is_refused_in_one_line(content, changes, message):
             lambda scene: scene.with_sections(method="hybrid"),
             "control must be Hybrid with the method hybrid (g",
         ),
-        (lambda scene: replace(scene, control=Mine()), "control must be VirtualMaster with the method v"),
+        (
+            lambda scene: replace(scene, control=Mine()),
+            "control must be VirtualMaster with the method v",
+        ),
         (
             lambda scene: replace(scene, method="mine", control=Mine()),
             "control.method must be one of virtual",
@@ -226,7 +285,9 @@ def test_the_surface_is_exported_by_the_ending_and_compared_with_a_former_one(he
     for ending in ("stl", "glb"):
         assert run.surface().export(f"a.{ending}") == Path(f"a.{ending}")
         assert call(f"export out --format {ending}") == 0
-        assert (here / f"a.{ending}").read_bytes() == (here / "out" / f"surface.{ending}").read_bytes()
+        assert (here / f"a.{ending}").read_bytes() == (
+            here / "out" / f"surface.{ending}"
+        ).read_bytes()
     run.surface().export("a.obj", kind="features")
     with refused_in_a_line(DigiclayError, "^There is no feature"):
         run.surface(former=run.scene.simulation.duration).export("a.obj", kind="features")
@@ -237,14 +298,18 @@ def test_forces_contact_and_losses_are_of_each_finger(done):
     np.testing.assert_array_equal(done.finger_force, done.history["total_force"][:, None])
     (contact,) = done.fingers
     assert contact.losses == 0
-    assert contact.contact_time == pytest.approx(done.metrics["contact_share"] * done.metrics["duration"])
+    assert contact.contact_time == pytest.approx(
+        done.metrics["contact_share"] * done.metrics["duration"]
+    )
     two = digiclay.scene("pinch_crease", {"simulation.duration": 2.0})
     pinch = digiclay.run(two, errors=False)
     assert pinch.finger_force.shape == (len(pinch.history["time"]), 2)
     shares = [one["contact_share"] * pinch.metrics["duration"] for one in pinch.metrics["fingers"]]
     assert [finger.contact_time for finger in pinch.fingers] == pytest.approx(shares)
     lost = digiclay.run(digiclay.scene("slow_press", {"control.force_gain": 1}), errors=False)
-    assert [(one.losses, one.lost_time) for one in lost.fingers] == [(1, lost.metrics["lost"][0]["time"])]
+    assert [(one.losses, one.lost_time) for one in lost.fingers] == [
+        (1, lost.metrics["lost"][0]["time"])
+    ]
     assert lost.fingers[0].lost_time > 1.0
 
 
@@ -266,33 +331,57 @@ def test_scene_and_run_are_shown_in_a_few_lines_and_in_a_notebook_with_the_plot(
     assert ">Scene a&lt;b</caption>" in named._repr_html_()
     assert re.search(r"<tr><th [^>]+>bed</th><td [^>]+>11 x 11 pins", named._repr_html_())
     assert re.search(
-        r'^<table>.*</table><img alt="[^"]+" width="800" src="data:image/png;base64,iVBOR', done._repr_html_()
+        r'^<table>.*</table><img alt="[^"]+" width="800" src="data:image/png;base64,iVBOR',
+        done._repr_html_(),
     )
 
 
 def test_without_matplotlib_there_is_the_table_and_a_line_with_the_extra(done, monkeypatch):
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     assert done._repr_html_().endswith("</table>")
-    with refused_in_a_line(DigiclayError, r"^Plots need matplotlib: run 'pip install .*digiclay\[plots\]'"):
+    with refused_in_a_line(
+        DigiclayError, r"^Plots need matplotlib: run 'pip install .*digiclay\[plots\]'"
+    ):
         done.plot("a.png")
 
 
 @pytest.mark.parametrize(
     "ask, message",
     [
-        (lambda run: run.plot("a.pdf"), "The file of a plot must end with .png or .svg (got a.pdf)."),
+        (
+            lambda run: run.plot("a.pdf"),
+            "The file of a plot must end with .png or .svg (got a.pdf).",
+        ),
         (lambda run: run.plot(None), "A file or folder must be a path (got None)."),
         (lambda run: run.surface().export("a.xyz"), "Unknown mesh format 'xyz': known are stl, "),
         (lambda run: run.surface().export("no/a.stl"), "Cannot write no/a.stl: No such file"),
-        (lambda run: run.surface().export("a.stl", kind="soild"), "Model.kind must be one of solid, "),
-        (lambda run: run.surface().export("a.stl", unit="inch"), "Export.unit must be one of mm, m"),
+        (
+            lambda run: run.surface().export("a.stl", kind="soild"),
+            "Model.kind must be one of solid, ",
+        ),
+        (
+            lambda run: run.surface().export("a.stl", unit="inch"),
+            "Export.unit must be one of mm, m",
+        ),
         (lambda run: run.surface(time=9.0), "time must be between 0 s and 0.3 s (got 9 s)."),
-        (lambda run: run.surface(time=float("nan")), "time must be between 0 s and 0.3 s (got nan s)."),
-        (lambda run: run.surface(former="rest"), "former must be between 0 s and 0.3 s (got 'rest')."),
+        (
+            lambda run: run.surface(time=float("nan")),
+            "time must be between 0 s and 0.3 s (got nan s).",
+        ),
+        (
+            lambda run: run.surface(former="rest"),
+            "former must be between 0 s and 0.3 s (got 'rest').",
+        ),
         (lambda run: run.save(3), "A file or folder must be a path (got 3)."),
-        (lambda run: digiclay.load("none"), "none is not the folder of a run: it has no scene.toml."),
+        (
+            lambda run: digiclay.load("none"),
+            "none is not the folder of a run: it has no scene.toml.",
+        ),
         (lambda run: digiclay.load(None), "A file or folder must be a path (got None)."),
-        (lambda run: digiclay.run("tap"), "scene must be a Scene, as digiclay.scene returns it (got 'tap')."),
+        (
+            lambda run: digiclay.run("tap"),
+            "scene must be a Scene, as digiclay.scene returns it (got 'tap').",
+        ),
         (
             lambda run: digiclay.steps("tap"),
             "scene must be a Scene, as digiclay.scene returns it (got 'tap').",
@@ -354,7 +443,9 @@ def test_a_sweep_is_a_table_with_errors_that_numpy_and_pandas_read(tap):
 
 def test_a_sweep_over_methods_has_their_names_also_of_ones_own(tap):
     write_method(Path())
-    table = digiclay.sweep(tap, {"control.method": ["plastic", "pad.py:SoftPad", Mine]}, "max_total_force")
+    table = digiclay.sweep(
+        tap, {"control.method": ["plastic", "pad.py:SoftPad", Mine]}, "max_total_force"
+    )
     assert list(table["control.method"]) == ["plastic", "soft_pad", "mine"]
     alone = simulate(digiclay.scene(tap, {"control.method": Mine}))
     assert table["max_total_force"][2] == pytest.approx(alone.metrics["max_total_force"], rel=1e-9)
@@ -362,7 +453,9 @@ def test_a_sweep_over_methods_has_their_names_also_of_ones_own(tap):
 
 def test_points_of_one_bed_run_in_one_batch(tap):
     counts = []
-    digiclay.sweep(tap, {"control.force_gain": [1, 2, 3, 4]}, "rfd", lambda *both: counts.append(both))
+    digiclay.sweep(
+        tap, {"control.force_gain": [1, 2, 3, 4]}, "rfd", lambda *both: counts.append(both)
+    )
     assert counts == [(4, 4)]
 
 
@@ -379,20 +472,36 @@ def test_points_that_fail_have_their_reason_and_no_number(tap):
     [
         ({}, ["rfd"], "A sweep must vary at least one key: {key: values} (got {})."),
         (["control.force_gain"], ["rfd"], "A sweep must vary at least one key"),
-        ({"control.force_gain": []}, ["rfd"], "control.force_gain must be varied over at least one value"),
+        (
+            {"control.force_gain": []},
+            ["rfd"],
+            "control.force_gain must be varied over at least one value",
+        ),
         (
             {"control.force_gain": 3},
             ["rfd"],
             "control.force_gain must be varied over a list of values (got 3)",
         ),
-        ({"control.force_gain": "1,2"}, ["rfd"], "control.force_gain must be varied over a list of values"),
-        ({"control.force_gain": [1, 2, 1]}, ["rfd"], "control.force_gain must not have a value twice"),
+        (
+            {"control.force_gain": "1,2"},
+            ["rfd"],
+            "control.force_gain must be varied over a list of values",
+        ),
+        (
+            {"control.force_gain": [1, 2, 1]},
+            ["rfd"],
+            "control.force_gain must not have a value twice",
+        ),
         (
             {"control.force_gain": [1, -2]},
             ["rfd"],
             "sweep: control.force_gain must be at least 0 1/N (got -2",
         ),
-        ({"control.force_gian": [1]}, ["rfd"], "sweep: control.force_gian must be a known key (got 1). Did"),
+        (
+            {"control.force_gian": [1]},
+            ["rfd"],
+            "sweep: control.force_gian must be a known key (got 1). Did",
+        ),
         ({"control.force_gain": range(20_000)}, ["rfd"], "sweep must come to 10000 points at most"),
         (
             {"control.force_gain": [1]},
@@ -400,7 +509,11 @@ def test_points_that_fail_have_their_reason_and_no_number(tap):
             "metrics must be a known metric (got 'rdf'). Did you mean rfd?",
         ),
         ({"control.force_gain": [1]}, None, "metrics must be a list of metrics (got None)."),
-        ({"recorder": ["absent"]}, ["rfd"], "A sweep needs a recorder, and the scene has recorder = 'ab"),
+        (
+            {"recorder": ["absent"]},
+            ["rfd"],
+            "A sweep needs a recorder, and the scene has recorder = 'ab",
+        ),
     ],
 )
 def test_a_sweep_that_cannot_be_is_refused_in_one_line(tap, varied, metrics, message):
@@ -412,9 +525,15 @@ def test_steps_are_the_rows_of_a_run_and_stay_as_they_are(done, tap):
     states = list(digiclay.steps(tap))
     assert len(states) == tap.periods
     for name in ("height", "force"):
-        np.testing.assert_array_equal([getattr(state, name) for state in states], done.history[name][1:])
-    np.testing.assert_allclose([state.finger_forces for state in states], done.finger_force[1:], rtol=1e-12)
-    np.testing.assert_allclose([state.time for state in states], done.history["time"][1:], rtol=1e-12)
+        np.testing.assert_array_equal(
+            [getattr(state, name) for state in states], done.history[name][1:]
+        )
+    np.testing.assert_allclose(
+        [state.finger_forces for state in states], done.finger_force[1:], rtol=1e-12
+    )
+    np.testing.assert_allclose(
+        [state.time for state in states], done.history["time"][1:], rtol=1e-12
+    )
 
 
 def test_tables_name_metrics_methods_and_samples():

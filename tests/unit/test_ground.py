@@ -26,7 +26,9 @@ def seen(target, mode, own=None):
     cells, modes = np.arange(BED.count), np.full(BED.count, mode, np.int8)
     rows = np.zeros((1, BED.count)) if own is None else own[None].copy()
     free = np.zeros(BED.count)
-    return Measurement(BED.compute_basis(cells), target.copy(), free, target.copy(), modes, rows, cells)
+    return Measurement(
+        BED.compute_basis(cells), target.copy(), free, target.copy(), modes, rows, cells
+    )
 
 
 def command(memory, measured, ground="cell"):
@@ -55,7 +57,9 @@ RISEN = seen(np.full(BED.count, 47e-3), Mode.BLISTER, own=np.full(BED.count, 40e
     },
 )
 def test_a_cell_rises_from_its_own_ground(measured, place, height):
-    assert command(master(height=50e-3), measured).target[at(*place)] == pytest.approx(height, abs=1e-9)
+    assert command(master(height=50e-3), measured).target[at(*place)] == pytest.approx(
+        height, abs=1e-9
+    )
     # The paper's ground cuts a ridge at the rim.
     assert command(master(height=50e-3), seen(RIDGE, Mode.HOLD), "edge").target[at(0, 15)] < 42e-3
 
@@ -67,7 +71,9 @@ def test_a_cell_takes_its_commanded_height_for_its_ground_and_what_was_raised_st
         np.testing.assert_array_equal(measured.own[0], RIDGE)
     # It comes up out of a valley of 4 mm, whose bottom it has raised to its top.
     ground, level = 40e-3 - np.where(BED.x < 0.0, 4e-3, 0.0), np.full(BED.count, 39.3e-3)
-    found = command(master(*EAST, height=39.3e-3), touch(seen(level, Mode.BLISTER, own=ground), 1.5, 4.5))
+    found = command(
+        master(*EAST, height=39.3e-3), touch(seen(level, Mode.BLISTER, own=ground), 1.5, 4.5)
+    )
     assert found.target[[at(x, 0) for x in (-3, 0, 3)]] == pytest.approx(39.3e-3, abs=1e-5)
 
 
@@ -144,7 +150,8 @@ def test_on_uneven_ground_that_a_blister_sinks_into_cells_freeze_sooner_and_are_
 @table(
     "change, x, height, touched, cells",
     {
-        # Those far behind, where the slope is below the top, and the one 1 mm behind, within what freezes.
+        # Those far behind, where the slope is below the top, and the one 1 mm behind, within what
+        # freezes.
         "pressed by one that climbs": (-3e-3, 1e-3, 38e-3, 6.0, (-9.0, -6.0, 0.0)),
         "raised, and ahead again": (3e-3, 0.0, 36e-3, 0.0, (6.0,)),
     },
@@ -158,9 +165,12 @@ def test_what_a_blister_has_formed_on_a_slope_stays_frozen(change, x, height, to
 
 def test_on_its_own_ground_a_centroid_that_moves_back_by_little_does_not_reverse_the_direction():
     east = Heading(0.0, 0.0, 1.0, 0.0)
-    back = [update_heading(east, -way, 0.0, 1.5e-3, 6e-3).toward_x for way in (2e-3, 5.9e-3, 6.1e-3)]
+    back = [
+        update_heading(east, -way, 0.0, 1.5e-3, 6e-3).toward_x for way in (2e-3, 5.9e-3, 6.1e-3)
+    ]
     assert back == [1.0, 1.0, -1.0]
-    # A way to the side is a new one, also when it leads back a little: 60 degrees off the way back at least.
+    # A way to the side is a new one, also when it leads back a little: 60 degrees off the way back
+    # at least.
     assert update_heading(east, 0.0, 2e-3, 1.5e-3, 6e-3).toward_y == 1.0
     assert update_heading(east, -0.9e-3, 2e-3, 1.5e-3, 6e-3).toward_y > 0.9
     assert update_heading(east, -1.3e-3, 2e-3, 1.5e-3, 6e-3) == east

@@ -21,7 +21,8 @@ from digiclay_study.indices import (
 )
 from digiclay_study.point_series import Range, Subject
 
-#: Ishigami's function sin x1 + A sin² x2 + B x3⁴ sin x1 on [-π, π]³, and its indices by integration.
+#: Ishigami's function sin x1 + A sin² x2 + B x3⁴ sin x1 on [-π, π]³, and its indices by
+#: integration.
 A, B = 7.0, 0.1
 BY_FIRST, BY_SECOND = 0.5 * (1.0 + B * np.pi**4 / 5.0) ** 2, A**2 / 8.0
 BY_PAIR = B**2 * np.pi**8 * (1.0 / 18.0 - 1.0 / 50.0)
@@ -62,7 +63,9 @@ def test_the_indices_of_ishigami_are_within_their_intervals():
     found = analyze_ishigami(128, 1, second=True)
     assert is_within(found, "first", FIRST)
     assert is_within(found, "total", TOTAL)
-    assert is_within(found, "second", np.array([0.0, BY_PAIR, 0.0]) / VARIANCE, np.triu_indices(3, 1))
+    assert is_within(
+        found, "second", np.array([0.0, BY_PAIR, 0.0]) / VARIANCE, np.triu_indices(3, 1)
+    )
     alone = analyze_ishigami(128, 2, second=False)
     assert list(alone) == ["first", "total"]
     assert is_within(alone, "first", FIRST)
@@ -94,8 +97,14 @@ def test_points_that_no_worker_survives_are_told_and_tried_again(tmp_path):
 
 
 def test_a_design_has_a_block_of_points_a_sample_and_depends_on_its_seed_alone():
-    assert sample_shares(8, 3, 1, second=False).shape == (count_points(8, 3, second=False), 3) == (40, 3)
-    assert sample_shares(8, 3, 1, second=True).shape == (count_points(8, 3, second=True), 3) == (64, 3)
+    assert (
+        sample_shares(8, 3, 1, second=False).shape
+        == (count_points(8, 3, second=False), 3)
+        == (40, 3)
+    )
+    assert (
+        sample_shares(8, 3, 1, second=True).shape == (count_points(8, 3, second=True), 3) == (64, 3)
+    )
     one, same, other = (sample_shares(16, 2, seed, second=False) for seed in (3, 3, 4))
     assert np.array_equal(one, same)
     assert not np.array_equal(one, other)
@@ -110,22 +119,38 @@ def record(rfd, loss=0.0):
     return {"figures": {"rfd": rfd, "contact_loss_share": loss, "contact_share": share}}
 
 
-#: Runs: two that keep the fingertip, one that failed, one without contact, one that loses the fingertip.
-RUNS = [record(0.2), record(0.5, 0.04), {"error": "no memory"}, record(None, None), record(0.01, 0.3)]
+#: Runs: two that keep the fingertip, one that failed, one without contact, one that loses the
+#: fingertip.
+RUNS = [
+    record(0.2),
+    record(0.5, 0.04),
+    {"error": "no memory"},
+    record(None, None),
+    record(0.01, 0.3),
+]
 
 
 @pytest.mark.parametrize(
     "name, usual, values, counts",
     [
         ("rfd", 0.0, [0.2, 0.5, 0.5, 0.5, 0.5], (2, 1)),
-        ("rfd", 0.26, [0.2, 0.5, 0.5, 0.5, 0.01], (2, 0)),  # what the unchanged scene loses is no loss
+        (
+            "rfd",
+            0.26,
+            [0.2, 0.5, 0.5, 0.5, 0.01],
+            (2, 0),
+        ),  # what the unchanged scene loses is no loss
         ("contact_loss_share", 0.0, [0.0, 0.04, 0.3, 0.3, 0.3], (2, 0)),  # the loss keeps its value
         ("contact_share", 0.0, [1.0, 0.96, 0.7, 0.7, 0.7], (2, 0)),  # of which less is worse
     ],
 )
-def test_runs_without_a_value_or_the_fingertip_have_the_worst_of_the_others(name, usual, values, counts):
+def test_runs_without_a_value_or_the_fingertip_have_the_worst_of_the_others(
+    name, usual, values, counts
+):
     found = make_response(name, RUNS, find_excess_losses(RUNS, record(0.1, usual)))
     assert (found.values.tolist(), (found.absent, found.lost)) == (values, counts)
     runs = [record(None), {"error": "There is not enough memory."}]
-    with pytest.raises(OutputError, match=r"has the metric rfd; the first error: There is not enough memory"):
+    with pytest.raises(
+        OutputError, match=r"has the metric rfd; the first error: There is not enough memory"
+    ):
         make_response("rfd", runs, find_excess_losses(runs, record(0.1)))

@@ -65,7 +65,14 @@ def test_as_much_is_simulated_as_time_goes_by():
     assert (counts, clock.factor) == ([0, 20, 2], pytest.approx(0.011, abs=1e-3))
     # The time of an animation counts, whatever the wall's is; backwards, and until it ends.
     clock, counts = Clock(), []
-    for time, moment in ((0.0, None), (0.01, 7.0), (0.5, 7.04), (0.6, 7.04), (0.7, 6.9), (0.71, None)):
+    for time, moment in (
+        (0.0, None),
+        (0.01, 7.0),
+        (0.5, 7.04),
+        (0.6, 7.04),
+        (0.7, 6.9),
+        (0.71, None),
+    ):
         count, clock = periods_due(clock, time, PERIOD, 20, moment)
         counts.append(count)
     assert counts == [0, 2, 8, 0, 20, 2]
@@ -101,7 +108,12 @@ def test_a_machine_too_slow_slows_down_instead_of_stalling():
         "drawing takes all of it: a share of the drawing": (30e-3, LEAST, 15e-3, 45e-3),
         "drawing by software": (0.5, LEAST, 0.25, 0.75),
         "a graphics card, when the hand has let go": (1e-3, RELEASED, 23e-3, 33e-3),
-        "a slow one: as long as the drawing, 15 pictures a second": (1 / 30, RELEASED, 1 / 30, 1 / 15),
+        "a slow one: as long as the drawing, 15 pictures a second": (
+            1 / 30,
+            RELEASED,
+            1 / 30,
+            1 / 15,
+        ),
         "software": (0.5, RELEASED, 0.5, 1.0),
     },
 )
@@ -136,7 +148,9 @@ def test_the_way_goes_from_where_the_finger_was_to_where_it_is_and_stays_where_o
     assert path.shape == (8, 1, 7)
     assert np.array_equal(path[0], start)
     assert_near(path[-1], end, 1e-15)
-    np.testing.assert_allclose(np.diff(path[..., :3], axis=0), [(end - start)[:, :3] / 7] * 7, atol=1e-16)
+    np.testing.assert_allclose(
+        np.diff(path[..., :3], axis=0), [(end - start)[:, :3] / 7] * 7, atol=1e-16
+    )
     places = ([0.0, 0.0, -50.0], [1e9, -1e9, 1e9], [0.01] * 3)
     found = [clamp_pose(np.array([*place, *LEVEL]), 0.1)[:3].tolist() for place in places]
     assert found == [[0.0, 0.0, 0.0], [100.0, -100.0, 100.0], [0.01] * 3]
@@ -168,8 +182,16 @@ def test_a_trace_has_no_more_than_its_rows_goes_back_with_time_and_has_each_cell
         trace = recent_trace.extend(trace, [[float(time), *line]])
     assert (len(trace.rows), trace.time[0]) == (ROWS, 4 * ROWS)
     assert recent_trace.start(1e-4).every * 1e-4 * ROWS >= 10.0  # seconds
-    trace = recent_trace.extend(recent_trace.start(PERIOD), [[float(time), *line] for time in range(10)])
-    assert recent_trace.extend(trace, [[4.0] + [1.0] * 8]).time.tolist() == [0.0, 1.0, 2.0, 3.0, 4.0]
+    trace = recent_trace.extend(
+        recent_trace.start(PERIOD), [[float(time), *line] for time in range(10)]
+    )
+    assert recent_trace.extend(trace, [[4.0] + [1.0] * 8]).time.tolist() == [
+        0.0,
+        1.0,
+        2.0,
+        3.0,
+        4.0,
+    ]
     press = path((0, 0, 0, 41), (0.05, 0, 0, 38))
     *_, state = periods(SYSTEM, [press], begin(SYSTEM), 10)
     held, asked = state.active, SetPoint(0.04, per_cell=True)
@@ -177,7 +199,9 @@ def test_a_trace_has_no_more_than_its_rows_goes_back_with_time_and_has_each_cell
     assert np.isnan(recent_trace.sample(SYSTEM, state, None, ())[2])
     assert np.isnan(recent_trace.sample(SYSTEM, state, asked, ())[2])
     held.mode[:3] = Mode.FORCE_FOLLOW
-    assert recent_trace.sample(SYSTEM, state, asked, ())[2] == pytest.approx(0.12, rel=1e-12)  # rounding
+    assert recent_trace.sample(SYSTEM, state, asked, ())[2] == pytest.approx(
+        0.12, rel=1e-12
+    )  # rounding
 
 
 def test_a_trace_knows_force_set_point_and_heights_of_picked_pins_one_that_stays_picked_its_past():
@@ -187,7 +211,9 @@ def test_a_trace_knows_force_set_point_and_heights_of_picked_pins_one_that_stays
     middle, corner = 312, 0
     assert np.isin([middle, corner], state.active.cells).tolist() == [True, False]
     trace = recent_trace.pick(recent_trace.start(PERIOD), [middle, corner], system.grid.count)
-    trace = recent_trace.extend(trace, [recent_trace.sample(system, state, SetPoint(0.4), trace.pins)])
+    trace = recent_trace.extend(
+        trace, [recent_trace.sample(system, state, SetPoint(0.4), trace.pins)]
+    )
     assert trace.heights.tolist() == [[state.row(0)[middle], state.row(0)[corner]]]
     assert trace.force[0] == pytest.approx(state.row(system.rows.force).sum(), rel=1e-12)
     assert trace.force[0] > 0.1
@@ -269,7 +295,8 @@ def test_what_a_stretch_left_wrong_stays_in_the_errors_of_the_session():
     # A tap within the first stretch, then a rest: the pins keep what was wrong when they were left.
     scene = resolve({"layout": {"rows": 11, "columns": 11}, "simulation": {"stepper": "heun"}})
     down, up = (
-        interpolate_path(*ends, 8) for ends in ((pose(), pose(z=0.037)), (pose(z=0.037), pose(z=0.05)))
+        interpolate_path(*ends, 8)
+        for ends in ((pose(), pose(z=0.037)), (pose(z=0.037), pose(z=0.05)))
     )
     rest = np.repeat(up[-1:], 2 * (STRETCH + PAUSE) + STRETCH * SPREAD, axis=0)
     finger = np.concatenate([down, up[1:], rest])
@@ -365,5 +392,7 @@ def test_a_tick_packs_the_state_once_however_many_periods_it_has(monkeypatch):
     assert later.state.period - session.state.period == 100
     assert len(packed) == 1
     paused = replace(later, paused=True)
-    assert hand.heights(sculpting.advance(paused, hand.pose(2.0, PRESSED), mover.now + 1.0, 100)).size
+    assert hand.heights(
+        sculpting.advance(paused, hand.pose(2.0, PRESSED), mover.now + 1.0, 100)
+    ).size
     assert len(packed) == 1

@@ -12,7 +12,13 @@ from pathlib import Path
 
 import pytest
 from digiclay.core.base.errors import OutputError
-from digiclay.core.files.file_lock import find_host, find_start, hold_lock, hold_record, may_have_made
+from digiclay.core.files.file_lock import (
+    find_host,
+    find_start,
+    hold_lock,
+    hold_record,
+    may_have_made,
+)
 from digiclay.core.files.run_folder import (
     claim_files,
     claim_folder,
@@ -74,10 +80,14 @@ def test_a_folder_that_is_being_written_is_refused_at_once_by_every_command(refu
     assert call("export older --quiet") == 0
 
 
-@pytest.mark.parametrize("line", ["sweep my.toml --vary layout.rows=3,4 --workers 1", "batch jobs.toml"])
+@pytest.mark.parametrize(
+    "line", ["sweep my.toml --vary layout.rows=3,4 --workers 1", "batch jobs.toml"]
+)
 def test_a_second_series_in_one_folder_is_refused_at_once(line, refused):
     write_jobs()
-    finished = f"{line} --prepare" if line.startswith("batch") else line  # nothing is to be simulated
+    finished = (
+        f"{line} --prepare" if line.startswith("batch") else line
+    )  # nothing is to be simulated
     assert call(f"{finished} --out o --quiet") == 0
     with hold_lock(Path("o/.lock"), "no"):
         refused(f"{line} --out o --quiet", REFUSED.format("used"))
@@ -96,7 +106,9 @@ def test_what_a_killed_job_leaves_is_taken_away_by_the_next_and_its_lock_with_it
     call("batch jobs.toml --prepare --quiet")
     scene = Path("jobs/jobs/my/scene.toml")
     short = scene.read_text(encoding="utf-8")
-    hours = re.sub(r"(?m)^duration = \S+", "duration = 1e4", re.sub(r"(?m)^every = 1", "every = 1000", short))
+    hours = re.sub(
+        r"(?m)^duration = \S+", "duration = 1e4", re.sub(r"(?m)^every = 1", "every = 1000", short)
+    )
     scene.write_text(hours, encoding="utf-8")
     with running("job", "jobs/jobs/my", "--quiet", sign="jobs/runs/.my.*.part") as process:
         (part,) = Path("jobs/runs").glob(".my.*.part")
@@ -133,7 +145,10 @@ def test_a_claim_ends_with_its_block_and_leaves_no_folder():
     with claim_folder(Path("a/b/o"), overwrite=False):
         Path("link").symlink_to("a")
         for name in ("a/b/o", "link/../link/b/o"):  # one folder by two names
-            with pytest.raises(OutputError, match="being written"), claim_folder(Path(name), overwrite=False):
+            with (
+                pytest.raises(OutputError, match="being written"),
+                claim_folder(Path(name), overwrite=False),
+            ):
                 pass
         with claim_folder(Path("a/b/other"), overwrite=False):
             pass
@@ -147,7 +162,10 @@ def test_a_claim_ends_with_its_block_and_leaves_no_folder():
     with claim_files([Path("a/a.stl"), Path("a/b.stl")]):
         with claim_files([Path("a/c.stl")]):
             pass
-        with pytest.raises(OutputError, match=r"b\.stl is being written"), claim_files([Path("a/b.stl")]):
+        with (
+            pytest.raises(OutputError, match=r"b\.stl is being written"),
+            claim_files([Path("a/b.stl")]),
+        ):
             pass
     assert names(Path("a")) == ["b"]
 
@@ -212,13 +230,16 @@ def test_a_process_is_known_by_the_time_it_was_started():
     process = start("import time; time.sleep(1000)")
     try:
         since = find_start(process.pid)
-        # The system counts in hundredths of a second from when it was booted, which it knows to a second.
+        # The system counts in hundredths of a second from when it was booted, which it knows to a
+        # second.
         assert before - 2.0 <= since <= time.time() + 2.0
         assert may_have_made(process.pid, since + 1.0)
         assert not may_have_made(process.pid, since - 3600.0)
     finally:
         process.kill()
-        wait_until(lambda: find_start(process.pid) is None)  # although nobody has asked how it ended
+        wait_until(
+            lambda: find_start(process.pid) is None
+        )  # although nobody has asked how it ended
         finish(process)
     assert not may_have_made(process.pid, time.time())
 

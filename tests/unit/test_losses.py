@@ -24,7 +24,10 @@ COMMANDS = {
 def test_losses_are_told_where_there_are_any(name, said, here, capsys):
     words, table = COMMANDS[name]
     points = [(0.0, 0.041), (0.2, 0.037), (0.5, 0.037), (1.5, 0.037 + LIFTS[said])]
-    text = scene_text(13, 13, *points) + 'interpolation = "linear"\n[control]\nmethod = "virtual_master"\n'
+    text = (
+        scene_text(13, 13, *points)
+        + 'interpolation = "linear"\n[control]\nmethod = "virtual_master"\n'
+    )
     (here / "my.toml").write_text(text, encoding="utf-8")
     (here / "jobs.toml").write_text('scenes = ["my.toml"]\nerrors = false\n', encoding="utf-8")
     assert call(f"{words} --out out") == 0
@@ -46,9 +49,13 @@ def test_losses_are_told_where_there_are_any(name, said, here, capsys):
         "never felt": ([], 99.0, []),
     },
 )
-def test_a_finger_is_lost_where_contact_ends_though_it_rises_no_faster_than_a_pin(touching, quick, wanted):
+def test_a_finger_is_lost_where_contact_ends_though_it_rises_no_faster_than_a_pin(
+    touching, quick, wanted
+):
     """At 20 mm/s from the time `quick` on it is at 30 mm/s, where pins rise at 24."""
-    felt = np.any([(start <= TIME) & (end >= TIME) for start, end in touching], axis=0) & (TIME >= 0.0)
+    felt = np.any([(start <= TIME) & (end >= TIME) for start, end in touching], axis=0) & (
+        TIME >= 0.0
+    )
     height = 20e-3 * TIME + 10e-3 * np.maximum(TIME - quick, 0.0)
     found = find_losses(TIME, 0.4 * felt, height, 24e-3)
     # A row is 5 ms.
@@ -75,4 +82,6 @@ def test_a_history_of_a_row_or_two_has_no_losses_unless_contact_ends(rows):
     ],
 )
 def test_losses_are_told_by_finger_where_there_are_any(lost, said):
-    assert describe_losses({"lost": [{"losses": count, "time": time} for count, time in lost]}) == said
+    assert (
+        describe_losses({"lost": [{"losses": count, "time": time} for count, time in lost]}) == said
+    )

@@ -28,7 +28,9 @@ def written(folder, kind):
     path = folder / f"ball.{kind.split('_')[0]}"
     if kind == "3mf":
         mesh_writer.write(
-            [Body("ball", ball.vertices * 1e-3, ball.faces.astype(np.int32), closed=True)], path, "mm"
+            [Body("ball", ball.vertices * 1e-3, ball.faces.astype(np.int32), closed=True)],
+            path,
+            "mm",
         )
     elif kind == "gltf":
         for name, content in ball.export(file_type="gltf").items():
@@ -104,7 +106,9 @@ def test_bytes_beside_a_gltf_are_read_and_materials_and_pictures_are_not_opened(
 
 
 def test_every_format_that_is_read_is_tested_below():
-    assert {f".{kind.partition('_')[0]}" for kind in KINDS} == READERS.keys(), "KINDS, above, must name each"
+    assert {f".{kind.partition('_')[0]}" for kind in KINDS} == READERS.keys(), (
+        "KINDS, above, must name each"
+    )
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -120,7 +124,9 @@ def test_a_file_that_is_cut_off_is_refused_wherever_it_is_cut(tmp_path, kind):
             continue
         if not back.faces.size:  # refused where it becomes a shape
             continue
-        same = np.array_equal(back.faces, whole.faces) and np.array_equal(back.vertices, whole.vertices)
+        same = np.array_equal(back.faces, whole.faces) and np.array_equal(
+            back.vertices, whole.vertices
+        )
         unused = len(back.vertices) - np.unique(back.faces).size
         if not same and not (kind == "obj" and data[:end].endswith(b"\n") and unused > 0):
             taken.append(end)
@@ -187,7 +193,10 @@ def gltf(folder, change=lambda tree: None):
             {"bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3"},
             {"bufferView": 1, "componentType": 5123, "count": 12, "type": "SCALAR"},
         ],
-        "bufferViews": [{"buffer": 0, "byteLength": 48}, {"buffer": 0, "byteOffset": 48, "byteLength": 24}],
+        "bufferViews": [
+            {"buffer": 0, "byteLength": 48},
+            {"buffer": 0, "byteOffset": 48, "byteLength": 24},
+        ],
         "buffers": [inline(places + corners)],
     }
     change(tree)
@@ -203,7 +212,11 @@ def with_uri(uri):
 
 
 def test_nodes_are_turned_shifted_and_stretched_as_trimesh_has_them(tmp_path):
-    parts = {"rotation": [0.1, -0.5, 0.7, 0.5], "scale": [1.0, 2.0, -3.0], "translation": [4.0, 5.0, 6.0]}
+    parts = {
+        "rotation": [0.1, -0.5, 0.7, 0.5],
+        "scale": [1.0, 2.0, -3.0],
+        "translation": [4.0, 5.0, 6.0],
+    }
     inner = np.diag([2.0, 3.0, 0.5, 1.0])
     inner[:3, 3] = 1.0, 2.0, 3.0
     nodes = [{"mesh": 0, "children": [1], **parts}, {"mesh": 0, "matrix": inner.T.ravel().tolist()}]
@@ -229,11 +242,17 @@ def test_strips_and_fans_are_cut_into_triangles(tmp_path, mode, corners):
 
 
 @pytest.mark.parametrize("normalized", [True, False])
-def test_vertices_that_are_quantized_are_read_and_extensions_of_materials_do_not_matter(tmp_path, normalized):
+def test_vertices_that_are_quantized_are_read_and_extensions_of_materials_do_not_matter(
+    tmp_path, normalized
+):
     whole = np.round(PLACES * 1000.0).astype("<i2")
 
     def change(tree):
-        tree["extensionsRequired"] = ["KHR_mesh_quantization", "KHR_materials_unlit", "KHR_texture_basisu"]
+        tree["extensionsRequired"] = [
+            "KHR_mesh_quantization",
+            "KHR_materials_unlit",
+            "KHR_texture_basisu",
+        ]
         tree["accessors"][0].update(componentType=5122, normalized=normalized)
         tree["bufferViews"][0].update(byteLength=32, byteStride=8)
         tree["bufferViews"][1].update(byteOffset=32)
@@ -260,9 +279,14 @@ def test_bytes_from_elsewhere_are_refused(tmp_path, uri):
         read(path)
 
 
-def test_a_pipe_beside_the_gltf_is_not_opened_nor_its_pictures_and_endless_nesting_is_refused(tmp_path):
+def test_a_pipe_beside_the_gltf_is_not_opened_nor_its_pictures_and_endless_nesting_is_refused(
+    tmp_path,
+):
     def change(tree):
-        tree["images"], tree["textures"] = [{"uri": "pipe.bin"}, {"uri": "../../dev/zero"}], [{"source": 0}]
+        tree["images"], tree["textures"] = (
+            [{"uri": "pipe.bin"}, {"uri": "../../dev/zero"}],
+            [{"source": 0}],
+        )
         tree["materials"] = [{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}]
         tree["meshes"][0]["primitives"][0]["material"] = 0
 

@@ -37,7 +37,9 @@ def test_the_top_of_a_terrain_is_what_scipy_interpolates(arrangement, seed):
     plan, z = chance.uniform(-25.0, 25.0, (60, 2)), chance.uniform(-5.0, 5.0, 60)
     cut = Delaunay(plan)
     bed = make_grid(Layout(21, 17, 2e-3, arrangement))
-    found = make_shape_mesh("x", np.column_stack([plan, z]), cut.simplices, "z", 1e-3).tops(bed, IN_PLACE)
+    found = make_shape_mesh("x", np.column_stack([plan, z]), cut.simplices, "z", 1e-3).tops(
+        bed, IN_PLACE
+    )
     wanted = LinearNDInterpolator(cut, z)(bed.x * 1e3, bed.y * 1e3)
     # The rim belongs to either: rounding decides.
     inside = np.isfinite(wanted) & found.covered
@@ -110,7 +112,15 @@ def test_a_mesh_is_known_as_closed_as_trimesh_knows_it(mesh, closed):
 
 def test_three_faces_at_an_edge_are_displayed_all_the_same():
     # Non-manifold: a roof with a keel hanging from its ridge.
-    vertices = [[-9.0, -9, 0], [-9, 9, 0], [9, -9, 0], [9, 9, 0], [0, -9, 5], [0, 9, 5], [0.5, 0, -5]]
+    vertices = [
+        [-9.0, -9, 0],
+        [-9, 9, 0],
+        [9, -9, 0],
+        [9, 9, 0],
+        [0, -9, 5],
+        [0, 9, 5],
+        [0.5, 0, -5],
+    ]
     faces = [[0, 4, 5], [0, 5, 1], [2, 5, 4], [2, 3, 5], [4, 5, 6]]
     found = tops(trimesh.Trimesh(vertices, faces, process=False), side=5)
     assert found.covered.all()
@@ -162,7 +172,8 @@ def test_a_hole_of_a_scan_is_as_high_as_what_is_around_it(arrangement):
     assert not found.overhang.any()
     missed = np.count_nonzero(np.hypot(bed.x * 1e3 - 5.0, bed.y * 1e3 + 8.0) < 4.0)
     assert missed < found.filled < 25
-    # The flattest surface leaves the ground by its curvature, 3 mm / (20 mm)², times a quarter of (5 mm)².
+    # The flattest surface leaves the ground by its curvature, 3 mm / (20 mm)², times a quarter of
+    # (5 mm)².
     assert np.abs(found.value - ground(bed.x * 1e3, bed.y * 1e3)).max() < 0.1
 
 
@@ -186,10 +197,16 @@ def turned(share):
 @pytest.mark.parametrize(
     "mesh, bare",
     [
-        (scan((0.0, 0.0, 12.0)), lambda x, y: np.hypot(x, y) < 11.0),  # more than a twentieth of the pins
+        (
+            scan((0.0, 0.0, 12.0)),
+            lambda x, y: np.hypot(x, y) < 11.0,
+        ),  # more than a twentieth of the pins
         (trimesh.creation.annulus(3.0, 30.0, 10.0), lambda x, y: np.hypot(x, y) < 2.5),
         (scan((-20.0, 0.0, 4.0), size=21.0), lambda x, y: np.abs(x) > 22.0),  # beside a scan
-        (scan((-36.0, 0.0, 4.0)), lambda x, y: np.hypot(x + 36.0, y) < 2.0),  # a bay to the rim of the bed
+        (
+            scan((-36.0, 0.0, 4.0)),
+            lambda x, y: np.hypot(x + 36.0, y) < 2.0,
+        ),  # a bay to the rim of the bed
         (turned(1.0), lambda x, y: x > 99.0),
         (turned(0.85), lambda x, y: x > 99.0),
     ],

@@ -43,7 +43,9 @@ def follow(known, tip, speed=0.0, turn=0.0, count=200):
         under = underside(tip, speed * number * PERIOD - 10e-3, 1e-3, 40e-3, turn)
         here = under < 42e-3
         at = known.measure([found.mean], make_basis(X, Y)[:, here])
-        (found,), _ = known.correct([found], at, under[here], np.full(np.count_nonzero(here), 1e-10))
+        (found,), _ = known.correct(
+            [found], at, under[here], np.full(np.count_nonzero(here), 1e-10)
+        )
     return found
 
 
@@ -86,7 +88,8 @@ def test_a_fingertip_known_too_long_too_narrow_or_round_is_found(known):
     *_, size, along, askew = follow(filter_of(known), Fingertip(), speed=5e-3, turn=0.6).mean
     mean = np.exp(-size) * known.height * 0.5 * (known.length**-2 + known.width**-2)
     curvatures = np.linalg.eigvalsh(mean * np.array([[1.0 - along, -askew], [-askew, 1.0 + along]]))
-    # Of the lowest point: 8 mm over the squares of 10 and 8 mm. Farther off the known one is another body.
+    # Of the lowest point: 8 mm over the squares of 10 and 8 mm. Farther off the known one is
+    # another body.
     assert curvatures == pytest.approx([80.0, 125.0], rel=0.1)
 
 
@@ -113,7 +116,9 @@ def servo_of(cell, dead_time=1e-3):
 
 def test_an_overloaded_pin_is_not_opened_upwards_and_commands_on_their_way_are_allowed_for():
     # A lag of 2 ms takes 2 (1 - exp(-5/2)) ms of a period of 5 ms.
-    assert servo_of(cell_of()).left == pytest.approx((1e-3 + 2e-3 * (1.0 - np.exp(-2.5)),), rel=1e-3)
+    assert servo_of(cell_of()).left == pytest.approx(
+        (1e-3 + 2e-3 * (1.0 - np.exp(-2.5)),), rel=1e-3
+    )
     servo = servo_of(cell_of(valve_lag=None), 12e-3)
     assert servo.left == pytest.approx((5e-3, 5e-3, 2e-3))
     assert servo.span == pytest.approx(2.0 * PERIOD - 2e-3)
@@ -137,7 +142,8 @@ def test_the_opening_gives_the_speed_asked_for_under_load(orifice, force):
     asked = np.array([0.1, 0.4, -0.3, -0.8]) * np.array([limits[1][0]] * 2 + [-limits[0][0]] * 2)
     command = servo.serve(asked * servo.span, limits, load, speeds)
     drop = cell.supply.pressure(command) - cell.actuator.pressure(load)
-    # Interpolation in 129 openings; with the wide orifice the flow turns turbulent, and one step refines it.
+    # Interpolation in 129 openings; with the wide orifice the flow turns turbulent, and one step
+    # refines it.
     assert cell.flow.flow(command, drop) / cell.actuator.area == pytest.approx(asked, rel=0.03)
     assert speeds[0] == pytest.approx(asked)
 
@@ -154,7 +160,8 @@ def test_a_free_pin_comes_to_its_height_without_swinging(dead_time):
         whole, part = divmod(dead_time / PERIOD + 1e-9, 1.0)
         # What the valve lets through in this period: the older command first, then the newer one.
         height = height + PERIOD * (
-            part * queue[int(whole) + 1 if part > 1e-6 else int(whole)] + (1.0 - part) * queue[int(whole)]
+            part * queue[int(whole) + 1 if part > 1e-6 else int(whole)]
+            + (1.0 - part) * queue[int(whole)]
         )
         heights.append(float(height[0]))
     assert heights[-1] == pytest.approx(1e-3, abs=2.0 * BAND)
@@ -187,7 +194,9 @@ def test_of_cells_picked_for_some_fingers_each_finger_has_its_own(wanted):
     assert spread == [[1] * 4 + [3] * 3 + [5] * 2 + [7] * 3, [2] * 4 + [4] * 3 + [6] * 2 + [8] * 3]
 
 
-@pytest.mark.parametrize("asked, force, yields", [(0.4, 0.17, False), (0.4, 0.19, True), (0.6, 0.19, False)])
+@pytest.mark.parametrize(
+    "asked, force, yields", [(0.4, 0.17, False), (0.4, 0.19, True), (0.6, 0.19, False)]
+)
 def test_a_single_pin_gives_way_that_carries_nearly_half_of_the_set_point(asked, force, yields):
     system = assemble(resolve({"control": {"method": "hybrid", "force_setpoint": asked}}))
     controller, count, pin = system.controller, system.grid.count, 312

@@ -24,7 +24,9 @@ PRESSED = replace(DEVICE, blister=None)
 
 ANGLE = np.radians(17.0)
 LINE = np.outer([-1.0, 1.0], [np.cos(ANGLE), np.sin(ANGLE)]) * 30e-3 + [2e-3, -1e-3]
-WAVE = np.column_stack([np.linspace(-30e-3, 30e-3, 200), 12e-3 * np.sin(np.linspace(-3.0, 4.0, 200))])
+WAVE = np.column_stack(
+    [np.linspace(-30e-3, 30e-3, 200), 12e-3 * np.sin(np.linspace(-3.0, 4.0, 200))]
+)
 TURN = np.linspace(-1.5, 4.7, 300)
 PATHS = {
     "a place": LINE[:1],
@@ -54,7 +56,9 @@ def measure_distance(name):
     points = np.column_stack([np.interp(fine, steps, path[:, axis]) for axis in (0, 1)])
     near = np.full(BED.count, np.inf)
     for part in np.array_split(points, 1 + len(points) // 200):
-        near = np.minimum(near, np.hypot(BED.x[:, None] - part[:, 0], BED.y[:, None] - part[:, 1]).min(1))
+        near = np.minimum(
+            near, np.hypot(BED.x[:, None] - part[:, 0], BED.y[:, None] - part[:, 1]).min(1)
+        )
     return near
 
 

@@ -7,7 +7,14 @@ import pytest
 from digiclay.core.base.modes import Mode
 from digiclay.core.control.drive import DriveParameters
 from digiclay.core.control.methods import METHODS
-from digiclay.core.control.orders import Orders, Verb, find_fault, order_periods, place, repeat_order
+from digiclay.core.control.orders import (
+    Orders,
+    Verb,
+    find_fault,
+    order_periods,
+    place,
+    repeat_order,
+)
 from digiclay.core.control.virtual_master import Master, Phase
 from digiclay.core.engine.simulation import begin
 from digiclay.core.model.control_interface import Measurement
@@ -35,7 +42,9 @@ def bed(arrangement="aligned", method="virtual_master", size=13, period=5e-3, *,
     control = "absent" if method == "absent" else {"method": method}
     simulation = {"control_period": period}
     shown = {"shape": {"file": "crater"}} if shape else {}
-    return assemble(resolve({"layout": layout, "control": control, "simulation": simulation, **shown}))
+    return assemble(
+        resolve({"layout": layout, "control": control, "simulation": simulation, **shown})
+    )
 
 
 def rough(system):
@@ -78,7 +87,9 @@ def test_a_spike_sinks_without_swinging_no_faster_than_valves_let_it(period, swi
     state = heighten(system, relief)
     first, spike = state.row(0), int(relief.argmax())
     orders = make_orders(150, 0.0, 0.0, 0.0, RADIUS, 100, verb)
-    heights = np.array([one.row(0) for one in simulate_path(system, state, stay_away(len(orders)), orders)])
+    heights = np.array(
+        [one.row(0) for one in simulate_path(system, state, stay_away(len(orders)), orders)]
+    )
     assert np.diff(heights[:, spike]).max() <= swing
     # No pin leaves the range of the others; all stand still before the wait is over.
     assert heights.min() >= first.min() - BAND
@@ -112,7 +123,9 @@ def test_pins_are_in_the_mode_blister_until_they_arrive_and_are_driven_home_by_t
 def test_a_finger_at_work_elsewhere_stays_under_the_methods_control():
     system, ends = bed(size=21), []
     path = stay_away(80)
-    path[:, 0, :3] = np.column_stack([np.full(81, -15e-3), np.zeros(81), np.linspace(42e-3, 36e-3, 81)])
+    path[:, 0, :3] = np.column_stack(
+        [np.full(81, -15e-3), np.zeros(81), np.linspace(42e-3, 36e-3, 81)]
+    )
     for radius in (0.0, 7e-3):
         relief = np.zeros(system.grid.count)
         relief[system.grid.at(np.array([18e-3]), np.array([18e-3]))] = 5e-3
@@ -299,7 +312,12 @@ FAULTY = [
     f"0.5 0 0 0 {Verb.PLACE:d}",
     f"nan 0 0 0 {Verb.PLACE:d}",
 ]
-SOUND = [f"0 0 0 0 {Verb.PLACE:d}", "0 0 1e-6 0 0", f"1e3 -1e3 1e3 100 {Verb.INVERT:d}", "0 0 0 0 0"]
+SOUND = [
+    f"0 0 0 0 {Verb.PLACE:d}",
+    "0 0 1e-6 0 0",
+    f"1e3 -1e3 1e3 100 {Verb.INVERT:d}",
+    "0 0 0 0 0",
+]
 
 
 def fault_in(rows):
@@ -357,9 +375,12 @@ def order(system, x, y, radius):
 
 
 @pytest.mark.parametrize(
-    "place, radius, held", [((12e-3, -9e-3), 5e-3, None), ((1e-3, 2e-3), 5e-3, 0), ((-3e-3, 1e-3), 60e-3, 1)]
+    "place, radius, held",
+    [((12e-3, -9e-3), 5e-3, None), ((1e-3, 2e-3), 5e-3, 0), ((-3e-3, 1e-3), 60e-3, 1)],
 )
-def test_the_disc_of_a_period_holds_the_methods_and_the_smoothed_one_and_no_more(place, radius, held):
+def test_the_disc_of_a_period_holds_the_methods_and_the_smoothed_one_and_no_more(
+    place, radius, held
+):
     system, memory = bed(), Master(Phase.SHAPING, 2e-3, -1e-3, 40e-3)
     cells, none = np.empty(0, np.intp), np.empty(0)
     basis, own = system.grid.compute_basis(cells), np.empty((0, 0))

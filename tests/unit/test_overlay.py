@@ -17,7 +17,15 @@ from digiclay.overlay.picture import (
     round_axis,
     scale_curve,
 )
-from digiclay.overlay.sections import COMPACT, FULL, TAKEN, Readings, find_room, lay_out, place_label
+from digiclay.overlay.sections import (
+    COMPACT,
+    FULL,
+    TAKEN,
+    Readings,
+    find_room,
+    lay_out,
+    place_label,
+)
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -48,10 +56,15 @@ def said(picture):
 
 @given(COLOR, st.one_of(st.none(), COLOR))
 def test_letters_and_curves_stand_out_from_any_theme(back, ink):
-    chosen = choose_colors(back, ink or back)  # letters of the color of the ground: the worst there is
+    chosen = choose_colors(
+        back, ink or back
+    )  # letters of the color of the ground: the worst there is
     # The guidelines' contrasts, as near as steps of a fortieth of the way to black or white come.
     assert min(contrast(ink, back) for ink in (chosen.ink, chosen.faint)) >= LETTERS - 0.01
-    assert min(contrast(line, back) for line in (*chosen.pins, chosen.set_point, chosen.force)) >= LINES
+    assert (
+        min(contrast(line, back) for line in (*chosen.pins, chosen.set_point, chosen.force))
+        >= LINES
+    )
     assert contrast((0.0, 0.0, 0.0), (1.0, 1.0, 1.0)) == pytest.approx(21.0, rel=1e-12)
 
 
@@ -176,7 +189,10 @@ def test_it_stands_in_the_chosen_corner_of_the_room_that_panels_leave(corner, co
         ({}, "0.35 N | of 0.40 N | 10.0 s | 0.97 x real time"),
         ({"paused": True}, "0.35 N | of 0.40 N | 10.0 s | paused"),
         ({"waiting": True, "set_point": None}, "0.35 N | 10.0 s | waiting"),
-        ({"time": np.empty(0), "force": np.empty(0)}, "no force yet | of 0.40 N | 0.0 s | 0.97 x real time"),
+        (
+            {"time": np.empty(0), "force": np.empty(0)},
+            "no force yet | of 0.40 N | 0.0 s | 0.97 x real time",
+        ),
     ],
 )
 def test_in_short_it_has_two_rows(changes, rows):
@@ -187,13 +203,18 @@ def test_in_short_it_has_two_rows(changes, rows):
 
 def test_in_short_several_fingertips_stand_two_in_a_row_below_and_none_over_another():
     told = session(
-        fingers=tuple((number, LIGHT) for number in (1, 2, 31)), finger_force=np.full((1001, 3), 0.4)
+        fingers=tuple((number, LIGHT) for number in (1, 2, 31)),
+        finger_force=np.full((1001, 3), 0.4),
     )
     picture = lay_out(told, COLORED, ROOM, 1.0, COMPACT, "top_left")
     assert said(picture).endswith("1: 0.40 N | 2: 0.40 N | 31: 0.40 N")
     assert 80.0 < picture.boxes[0].height < 100.0
     one, two, three = [(words.x, words.y) for words in picture.words[-3:]]
-    assert (one[1] == two[1] > three[1], two[0] - one[0] > 70.0, one[0] == three[0]) == (True, True, True)
+    assert (one[1] == two[1] > three[1], two[0] - one[0] > 70.0, one[0] == three[0]) == (
+        True,
+        True,
+        True,
+    )
 
 
 def test_a_curve_shows_its_window_alone_and_the_set_point_is_the_dashed_line_at_its_height():
@@ -240,7 +261,9 @@ def test_numbers_of_fingertips_cover_neither_each_other_nor_a_fingertip(crowd):
     found = move_apart(above, 9.5, balls, np.full(len(balls), 10.0))
     seen = np.isfinite(balls[:, 0])
     assert np.isfinite(found[seen]).all()
-    away = np.linalg.norm(found[seen, None] - np.concatenate([found, balls])[np.tile(seen, 2)], axis=2)
+    away = np.linalg.norm(
+        found[seen, None] - np.concatenate([found, balls])[np.tile(seen, 2)], axis=2
+    )
     np.fill_diagonal(away, np.inf)
     count = int(seen.sum())
     assert away[:, :count].min(initial=np.inf) > 19.0 - 1.0  # half a pixel each is not seen

@@ -42,7 +42,9 @@ def test_a_class_in_memory_runs_as_the_same_one_in_a_file(tap):
     write_method(Path())
     changes = {"control.yield_force": "20 mN"}
     mine = digiclay.run(digiclay.scene(tap, {**changes, "control.method": Mine}), errors=False)
-    filed = digiclay.run(digiclay.scene(tap, {**changes, "control.method": "pad.py:SoftPad"}), errors=False)
+    filed = digiclay.run(
+        digiclay.scene(tap, {**changes, "control.method": "pad.py:SoftPad"}), errors=False
+    )
     np.testing.assert_array_equal(mine.history["height"], filed.history["height"])
     assert np.ptp(mine.history["height"]) > 1e-4
     assert mine.metrics["versions"]["method"].startswith("Mine in memory:")
@@ -66,7 +68,9 @@ def test_a_saved_run_of_a_class_in_memory_says_what_is_missing_and_is_never_relo
         lambda scene: digiclay.scene(scene, {}),
         lambda scene: digiclay.sweep(scene, {"layout.rows": [11]}, "lag"),
     ):
-        with refused_in_a_line(DigiclayError, "^The scene's method mine must be of the code that was loaded"):
+        with refused_in_a_line(
+            DigiclayError, "^The scene's method mine must be of the code that was loaded"
+        ):
             ask(run.scene)
 
 
@@ -92,7 +96,9 @@ print(again.history["height"].tobytes() == run.history["height"].tobytes())
 """
     _, said, wrong = finish(start(code))
     lines = said.splitlines()
-    assert lines[0] == f"None soft_pad soft_pad {digiclay.load('out').history['height'].shape}", wrong
+    assert lines[0] == f"None soft_pad soft_pad {digiclay.load('out').history['height'].shape}", (
+        wrong
+    )
     assert "method: soft_pad, which is not loaded" in said
     assert [line[:35] for line in lines[7:-1]] == ["control.method must be one of virtu"] * 4
     assert lines[-1] == "True"
@@ -103,7 +109,9 @@ def test_a_changed_file_replaces_its_method_and_scenes_of_the_former_code_keep_t
     scene = digiclay.scene(tap, {"control.method": "pad.py:SoftPad"})
     path.write_text(PAD.replace("self.step", "0.5 * self.step"), encoding="utf-8")
     changed = digiclay.scene(tap, {"control.method": "pad.py:SoftPad"})
-    with refused_in_a_line(DigiclayError, "^The scene's method soft_pad must be of the code that was loaded"):
+    with refused_in_a_line(
+        DigiclayError, "^The scene's method soft_pad must be of the code that was loaded"
+    ):
         digiclay.scene(scene, {"layout.rows": 9})
     # A scene of the former code runs with it, and is saved with it.
     runs = [digiclay.run(one, errors=False) for one in (scene, changed)]
@@ -143,4 +151,6 @@ if __name__ == "__main__":
     print(digiclay.run(scene, errors=False).metrics["method"])
 """
     Path("mine.py").write_text(text, encoding="utf-8")
-    assert finish(start("import runpy; runpy.run_path('mine.py', run_name='__main__')"))[1] == "mine\n"
+    assert (
+        finish(start("import runpy; runpy.run_path('mine.py', run_name='__main__')"))[1] == "mine\n"
+    )

@@ -59,7 +59,11 @@ def test_the_code_is_shipped_to_processes_that_have_no_file(here):
         "sys.stdout.buffer.write(run(scene).history['height'].tobytes())"
     )
     done = subprocess.run(
-        [sys.executable, "-c", script], input=packed, capture_output=True, check=True, timeout=TIMEOUT
+        [sys.executable, "-c", script],
+        input=packed,
+        capture_output=True,
+        check=True,
+        timeout=TIMEOUT,
     )
     assert done.stdout == run(scene).history["height"].tobytes()
     remove_method("soft_pad")
@@ -107,7 +111,8 @@ def test_a_copy_of_method_one_gives_its_run_bit_for_bit(here):
     assert own.metrics["losses"] == built_in.metrics["losses"]
 
 
-#: Opens the valves of pressed pins; the other one then raises all it was shown at the root of each view.
+#: Opens the valves of pressed pins; the other one then raises all it was shown at the root of each
+#: view.
 OPEN = f"{PAD.partition('        return')[0]}        orders = Orders(cells.target, -0.2 * down, 3 * down)\n"
 CHEAT = f"""{OPEN.replace("SoftPad", "Cheat")}
         for shown in (*cells, device.grid.x, device.grid.y):
@@ -128,7 +133,9 @@ def test_nothing_shown_leads_to_the_bed_and_openings_are_limited_to_those_of_a_v
     heights = []
     for number, opening in enumerate((-3, -1, 0, 1, 3)):
         orders = f"return memory, Orders(opening=np.full(cells.height.size, {opening}))"
-        text = f"{PAD.partition('        down')[0]}        {orders}\n".replace("SoftPad", f"Pad{number}")
+        text = f"{PAD.partition('        down')[0]}        {orders}\n".replace(
+            "SoftPad", f"Pad{number}"
+        )
         write_method(here, text, "open.py")
         heights.append(run(small(load_method(f"open.py:Pad{number}"))).history["height"].sum())
     assert heights[0] == heights[1] < heights[2] < heights[3] == heights[4]
@@ -137,7 +144,9 @@ def test_nothing_shown_leads_to_the_bed_and_openings_are_limited_to_those_of_a_v
 def test_a_batch_gives_what_the_runs_give_alone_and_a_shape_is_displayed_before(here):
     write_method(here)
     name = load_method("pad.py:SoftPad")
-    scenes = [small(name, f"control.step={step} um", "sensors.force_noise=1 mN") for step in (20, 40, 80)]
+    scenes = [
+        small(name, f"control.step={step} um", "sensors.force_noise=1 mN") for step in (20, 40, 80)
+    ]
     found = {number: result.history["height"].copy() for number, result in run_together(scenes)}
     for number, scene in enumerate(scenes):
         assert_near(found[number], run(scene).history["height"], 1e-12)
@@ -314,23 +323,47 @@ def test_a_scene_never_loads_code_by_itself(here, capsys):
 @pytest.mark.parametrize(
     "text, rule",
     [
-        ("import nothing_of_this_name", "the code must not raise (got ModuleNotFoundError in line 1: No"),
+        (
+            "import nothing_of_this_name",
+            "the code must not raise (got ModuleNotFoundError in line 1: No",
+        ),
         ("x = (", "pad.py: the code must not raise (got SyntaxError in line 1"),
         ("raise SystemExit(3)", "pad.py: the code must not raise (got SystemExit in line 1: 3)"),
-        ("x = 1", "pad.py:SoftPad: the file must have the class SoftPad (it has no control method)."),
-        (PAD.replace("SoftPad", "Pad"), "the file must have the class SoftPad (it has pad.py:Pad)."),
+        (
+            "x = 1",
+            "pad.py:SoftPad: the file must have the class SoftPad (it has no control method).",
+        ),
+        (
+            PAD.replace("SoftPad", "Pad"),
+            "the file must have the class SoftPad (it has pad.py:Pad).",
+        ),
         ("SoftPad = 3", "the class must derive from digiclay.Method (got int)"),
-        (PAD.replace("@dataclass(frozen=True)", "").replace("step: float", "step"), "no type annotation"),
+        (
+            PAD.replace("@dataclass(frozen=True)", "").replace("step: float", "step"),
+            "no type annotation",
+        ),
         (PAD.replace("def command", "def comand"), "must have a function command(self, "),
-        (PAD.replace('unit="m"', 'unit="inch"'), "SoftPad.step must have one of the units m, s, Pa, "),
+        (
+            PAD.replace('unit="m"', 'unit="inch"'),
+            "SoftPad.step must have one of the units m, s, Pa, ",
+        ),
         (PAD.replace("quantity(50e-6", "quantity([1]"), "mutable default"),
-        (PAD.replace("quantity(50e-6", "quantity(None"), "the default of step must be a bool, int, float"),
-        (PAD.replace("quantity(50e-6", "quantity(-1.0"), "the default of step must be above 0 m (got -1 m)"),
+        (
+            PAD.replace("quantity(50e-6", "quantity(None"),
+            "the default of step must be a bool, int, float",
+        ),
+        (
+            PAD.replace("quantity(50e-6", "quantity(-1.0"),
+            "the default of step must be above 0 m (got -1 m)",
+        ),
         (PAD.replace("step: float", "method: float"), "nor be called method, begin"),
         (PAD + "\n    loose: float = 3.0\n", "the field loose must be declared with quantity"),
         (PAD + "\n    rows = -1\n", "rows must be from 0 to 1000 (got -1)"),
         (PAD + "\n    blister = 3\n", "blister must be None or a dictionary of defaults (got int)"),
-        (PAD + '\n    blister = {"radius": -1.0}\n', "blister must hold values of the section [blister]"),
+        (
+            PAD + '\n    blister = {"radius": -1.0}\n',
+            "blister must hold values of the section [blister]",
+        ),
     ],
 )
 def test_a_class_that_is_no_method_is_refused_in_a_line(here, text, rule, capsys):
@@ -344,7 +377,10 @@ def test_a_class_that_is_no_method_is_refused_in_a_line(here, text, rule, capsys
 @pytest.mark.parametrize(
     "word, rule",
     [
-        ("absent.py:Mine", "absent.py cannot be read as a control method: No such file or directory."),
+        (
+            "absent.py:Mine",
+            "absent.py cannot be read as a control method: No such file or directory.",
+        ),
         ("absent.py", "absent.py must be a file and a class in it, such as absent.py:Mine."),
         (":Mine", "must be a file and a class in it"),
         (".:Mine", "cannot be read as a control method: Is a directory."),
@@ -417,7 +453,12 @@ SLOW = bad(
 
 
 def run_quickly(*more):
-    period = ["--set", "simulation.control_period=0.2 ms", "--set", "simulation.physics_step=0.2 ms"]
+    period = [
+        "--set",
+        "simulation.control_period=0.2 ms",
+        "--set",
+        "simulation.physics_step=0.2 ms",
+    ]
     return main(["run", "tap", "--method", "bad.py:Bad", *period, "--quiet", *more])
 
 
@@ -432,7 +473,9 @@ def test_a_method_that_is_too_slow_is_refused(here, capsys):
 def test_one_slow_call_is_no_slow_method(here):
     once = SLOW.replace("while", "while memory == 0 and").replace("return memory", "return 1")
     write_method(
-        here, once.replace("def command", "begin = lambda self, device: 0\n    def command"), "bad.py"
+        here,
+        once.replace("def command", "begin = lambda self, device: 0\n    def command"),
+        "bad.py",
     )
     assert run_quickly("--set", "simulation.duration=0.008", "--no-errors", "--out", "r") == 0
 
@@ -440,12 +483,21 @@ def test_one_slow_call_is_no_slow_method(here):
 @pytest.mark.parametrize(
     "commands, rule",
     [
-        ("seen.target, seen.mode, seen.height * 0 + 1.5", "must return commands from -1 to 1 (got 1.5)."),
-        ("seen.target, seen.mode + 9, seen.height * 0", "must return mode as codes of Mode, from 0 to 7"),
+        (
+            "seen.target, seen.mode, seen.height * 0 + 1.5",
+            "must return commands from -1 to 1 (got 1.5).",
+        ),
+        (
+            "seen.target, seen.mode + 9, seen.height * 0",
+            "must return mode as codes of Mode, from 0 to 7",
+        ),
         ("seen.target, None, seen.height * 0", "must return mode of the shape ("),
         ("None, seen.mode, seen.height * 0", "must return target of the shape ("),
         ("seen.height.sort() or 3", "sort array is read-only"),
-        ("seen.target, seen.height", "must return three results, target, mode and command (got 2 results)"),
+        (
+            "seen.target, seen.height",
+            "must return three results, target, mode and command (got 2 results)",
+        ),
         (
             "seen.target, seen.mode, seen.own.__setitem__(0, np.nan) or seen.height * 0",
             "rows as finite numbers",

@@ -20,13 +20,16 @@ from tests.assemble import assert_near
 
 #: Heights of the strokes over the bed at rest, m: a ridge, a valley.
 RIDGE, VALLEY = 8e-3, -6e-3
-#: Corners of a stroke in pitches: there, and back at a sharp angle; and rows and columns of the bed.
+#: Corners of a stroke in pitches: there, and back at a sharp angle; and rows and columns of the
+#: bed.
 CORNERS, SIZE = ((-12.0, -6.0), (12.0, 0.0), (-12.0, 6.0)), (34, 46)
-#: Largest force on the fingertip, N; Method II holds one on each pin, together 1.3 N at rest on "paper".
+#: Largest force on the fingertip, N; Method II holds one on each pin, together 1.3 N at rest on
+#: "paper".
 MOST_FORCE, OF_METHOD_II = 1.0, 2.0
 #: Largest share of a drag without contact, and rms by which heights along it may vary, m.
 MOST_ABSENT, MOST_RMS = 0.02, 0.6e-3
-#: How far above the pins a stroke begins, m, how fast it comes down and leaves, m/s, and its rest, s.
+#: How far above the pins a stroke begins, m, how fast it comes down and leaves, m/s, and its rest,
+#: s.
 ABOVE, DOWN, AWAY, REST = 2e-3, 0.1, 0.4, 0.3
 
 
@@ -50,14 +53,19 @@ class Led:
 def make_device(method, bed, preset):
     """Return a scene of a method on pins of a bed of `BEDS`, just enough for a stroke."""
     (rows, columns), kind = SIZE, BEDS[bed]
-    return make_scene(preset, Layout(rows=rows, columns=columns, pitch=kind.pitch), method, kind.share)
+    return make_scene(
+        preset, Layout(rows=rows, columns=columns, pitch=kind.pitch), method, kind.share
+    )
 
 
 def find_stated(scene, system):
     """Return what the method of a scene states for strokes from a bed at rest."""
     tracking = find_tracking(scene, system)
     assert tracking is not None  # the methods here form a blister
-    drag, push = tracking.limit_drag(RIDGE, pressed=False), tracking.limit_drag(-VALLEY, pressed=True)
+    drag, push = (
+        tracking.limit_drag(RIDGE, pressed=False),
+        tracking.limit_drag(-VALLEY, pressed=True),
+    )
     return replace(tracking, drag=drag, push=push)
 
 
@@ -98,7 +106,9 @@ def lay_stroke(rest, tracking, height, corners, period):
     steps = np.linalg.norm(np.diff(corners, axis=0), axis=1)
     speed = (tracking.drag if raised else tracking.push) * period
     way = np.concatenate([np.zeros(len(z)), np.arange(speed, steps.sum(), speed), [steps.sum()]])
-    up = np.arange(top, rest + abs(height) + 0.1 * tracking.speed, max(AWAY, 5.0 * tracking.speed) * period)
+    up = np.arange(
+        top, rest + abs(height) + 0.1 * tracking.speed, max(AWAY, 5.0 * tracking.speed) * period
+    )
     pressing, dragging, resting = len(z), len(way) - len(z), np.full(round(REST / period), up[-1])
     height_of = np.concatenate([z, np.full(dragging, top), up, resting])
     knots = np.concatenate([[0.0], np.cumsum(steps)])
@@ -137,25 +147,31 @@ def test_pins_follow_at_the_stated_pace(method, bed, preset):
 )
 def test_a_pace_that_is_too_fast_is_seen_to_fail(raised, height):
     system = assemble(DESIGN)
-    assert not lead(DESIGN, system, replace(find_stated(DESIGN, system), **raised), height).is_followed(
-        "hybrid"
-    )
+    assert not lead(
+        DESIGN, system, replace(find_stated(DESIGN, system), **raised), height
+    ).is_followed("hybrid")
 
 
 def test_what_is_made_for_hands_is_led_at_100_mm_a_second_and_a_method_of_one_s_own_carefully():
     tracking = find_tracking(DESIGN, assemble(DESIGN))
     assert min(tracking.drag, tracking.push) >= 0.1
-    assert tracking.limit_drag(50e-3, pressed=False) == tracking.drag  # the skirt is there at any height
+    assert (
+        tracking.limit_drag(50e-3, pressed=False) == tracking.drag
+    )  # the skirt is there at any height
     assert ControlParameters().pace == Pace()
     assert Pace().press == 20e-3
 
 
 def test_pins_stay_where_a_stroke_of_method_iii_has_left_them():
     bed = BEDS["design"]
-    scene = make_scene(bed.preset, Layout(rows=30, columns=50, pitch=bed.pitch), bed.method, bed.share)
+    scene = make_scene(
+        bed.preset, Layout(rows=30, columns=50, pitch=bed.pitch), bed.method, bed.share
+    )
     session, _ = begin_session(1, "", scene, np.array([0.0, 0.0, 0.05, *LEVEL]))
     moves = tuple((float(at), 1e-3 * at, 0.0) for at in range(-15, 16))
-    stroke = PointerStroke(brush="lower", depth=4e-3, moves=tuple((at + 15.0, x, y) for at, x, y in moves))
+    stroke = PointerStroke(
+        brush="lower", depth=4e-3, moves=tuple((at + 15.0, x, y) for at, x, y in moves)
+    )
     *_, session = play_strokes(session, (stroke,))
     left = session.state.row(0).copy()
     later = follow_finger(session, session.pose, 60).state.row(0)
@@ -164,8 +180,8 @@ def test_pins_stay_where_a_stroke_of_method_iii_has_left_them():
     assert later.max() <= scene.actuator.rest_height + 2e-6
 
 
-# More than twice the stated speed through a valley 12 mm deep: without yielding 351 kN. How deep it gets
-# before is chance, so one speed has more than its neighbors.
+# More than twice the stated speed through a valley 12 mm deep: without yielding 351 kN. How deep it
+# gets before is chance, so one speed has more than its neighbors.
 @pytest.mark.parametrize("push, most", [(0.22, 50.0), (0.24, 50.0), (0.25, 500.0)])
 def test_pins_give_way_under_a_fingertip_that_is_not_where_it_is_taken_to_be(push, most):
     system = assemble(DESIGN)

@@ -32,7 +32,16 @@ from digiclay_paper.evidence import (
 from digiclay_paper.figures_session import draw_heights
 from digiclay_paper.paper_figures import COLUMNS, NAMED, curves, letter, table
 from digiclay_paper.relief_sections import LIMITS, asked_for, sections
-from digiclay_paper.results import AS_IT_IS, SESSION, WAYS, Dragged, Located, Results, Session, Swing
+from digiclay_paper.results import (
+    AS_IT_IS,
+    SESSION,
+    WAYS,
+    Dragged,
+    Located,
+    Results,
+    Session,
+    Swing,
+)
 from digiclay_paper.scenes import METHODS
 from digiclay_paper.simulations import GAUSSIAN, NO_RISE, STAGGERED, WINDOWS, located, sessions
 
@@ -72,7 +81,10 @@ def test_a_fingertip_that_a_method_loses_is_named_with_the_method():
 
 def test_the_oscillation_is_all_of_the_papers_only_at_the_gain_of_its_session():
     swings = results(*CALM_THEN_WILD)
-    assert swings.onset(500.0) == (5.0, 50.0)  # between the last calm gain and the first that swings
+    assert swings.onset(500.0) == (
+        5.0,
+        50.0,
+    )  # between the last calm gain and the first that swings
     assert results(*CALM_THEN_WILD[:2]).onset(500.0) == (5.0, None)
     assert results(*CALM_THEN_WILD[2:]).onset(500.0) == (None, 50.0)
     assert not Swing(2.0, 500.0, 0.5, None, None).sustained  # a slow drift
@@ -86,11 +98,17 @@ def test_the_oscillation_is_all_of_the_papers_only_at_the_gain_of_its_session():
     assert onset(swings).verdict == "holds"
 
 
-@pytest.mark.parametrize("height, said", [(1.6, "holds"), (1.4, "holds in part"), (None, "holds in part")])
+@pytest.mark.parametrize(
+    "height, said", [(1.6, "holds"), (1.4, "holds in part"), (None, "holds in part")]
+)
 def test_deviations_count_in_each_of_the_papers_windows(height, said):
-    once, twice = (dict.fromkeys((*DEVIATIONS, *WINDOWED, "set_point"), value) for value in (1.0, 2.0))
+    once, twice = (
+        dict.fromkeys((*DEVIATIONS, *WINDOWED, "set_point"), value) for value in (1.0, 2.0)
+    )
     known = results().printed[FIRST]
-    one, two = (known._replace(metrics=each, windows=dict.fromkeys(WINDOWS, each)) for each in (once, twice))
+    one, two = (
+        known._replace(metrics=each, windows=dict.fromkeys(WINDOWS, each)) for each in (once, twice)
+    )
     two.windows["valley alone"] = twice | {"height_deviation": height}
     found = dict(zip(METHODS, (one, two), strict=True))
     assert deviations(replace(results(), printed=found, session=found)).verdict == said
@@ -107,7 +125,8 @@ def test_only_a_finger_a_pin_could_follow_is_lost_without_intention(speed, times
     assert find_unintended_losses(done) == pytest.approx(times)
 
 
-#: A lift of 10 mm/s at its fastest: Method I follows it, Method II's cells rise at 8.7 mm/s at the most.
+#: A lift of 10 mm/s at its fastest: Method I follows it, Method II's cells rise at 8.7 mm/s at the
+#: most.
 LIFTED = """\
 [layout]
 rows = 13
@@ -140,7 +159,9 @@ def test_a_session_a_method_loses_the_finger_in_is_run_again_slowly_enough(lost)
     assert [lost.session[method].lost for method in METHODS] == [[], []]
     claim = carried_out(lost)
     assert claim.verdict == "holds in part"
-    assert f"Method II: finger lost at {lost.printed['cell_states'].lost[0]:.2f} s" in claim.measured
+    assert (
+        f"Method II: finger lost at {lost.printed['cell_states'].lost[0]:.2f} s" in claim.measured
+    )
     assert "lifts at up to 10.0 mm/s, and Method II follows a lift of 6.0 mm/s" in claim.why
     assert "run again 2.1 times as long: Method I never lost, Method II never lost" in claim.why
     # It is drawn with the same cells and scales for both methods.
@@ -221,7 +242,12 @@ def escaped(point):
 
 @pytest.mark.parametrize(
     "near, known, verdict",
-    [(0.1, 0.1, "holds"), (0.1, 0.2, "holds in part"), (0.2, 0.3, "differs"), (None, 0.2, "differs")],
+    [
+        (0.1, 0.1, "holds"),
+        (0.1, 0.2, "holds in part"),
+        (0.2, 0.3, "differs"),
+        (None, 0.2, "differs"),
+    ],
 )
 def test_a_search_radius_has_to_halve_the_scatter_with_and_without_thresholds(near, known, verdict):
     found = [
@@ -230,7 +256,9 @@ def test_a_search_radius_has_to_halve_the_scatter_with_and_without_thresholds(ne
     ]  # fmt: skip
     claim = radius(Results(located=found))
     assert claim.verdict == verdict
-    assert claim.why.endswith("lost with and without the radius: 1 mN, no such thresholds: 7 and 0 times.")
+    assert claim.why.endswith(
+        "lost with and without the radius: 1 mN, no such thresholds: 7 and 0 times."
+    )
 
 
 def test_a_search_radius_lowers_the_scatter_of_noisy_sensors_and_thresholds_do_as_well():
@@ -239,7 +267,8 @@ def test_a_search_radius_lowers_the_scatter_of_noisy_sensors_and_thresholds_do_a
     assert quiet.scatter == pytest.approx(0.0, abs=1e-9)  # rounding in places of millimeters
     near, everywhere = (located(1e-3, one, thresholds=False).scatter for one in (None, 1.0))
     known = located(1e-3, 1.0, thresholds=True).scatter
-    # Noise of the 61 cells in reach, or of the 21 within 8 mm, with arms in proportion: 0.18 and 0.06 mm.
+    # Noise of the 61 cells in reach, or of the 21 within 8 mm, with arms in proportion: 0.18 and
+    # 0.06 mm.
     assert 0.0 < near < 0.5 * everywhere
     assert 0.0 < known < 0.5 * everywhere
 
@@ -247,7 +276,9 @@ def test_a_search_radius_lowers_the_scatter_of_noisy_sensors_and_thresholds_do_a
 @pytest.mark.parametrize("variant", [STAGGERED, GAUSSIAN])
 def test_a_variant_holds_where_it_is_followed_as_the_scene_is(variant):
     same = {"it_I": EASY, "it_II": BAD, f"{variant}_I": EASY, f"{variant}_II": BAD}
-    assert varied(variant, drags(**same)).verdict == "holds"  # what fails anyway says nothing of the variant
+    assert (
+        varied(variant, drags(**same)).verdict == "holds"
+    )  # what fails anyway says nothing of the variant
     worse = varied(variant, drags(**same | {"it_II": EASY}))
     assert worse.verdict == "holds in part"
     assert "Not so: Method II, in the surface." in worse.why
@@ -266,7 +297,8 @@ def test_panels_are_lettered_and_their_named_curves_are_the_data():
         two.set_gid(NAMED)
     letter(figure)
     assert [axes.get_title(loc="left") for axes in figure.axes] == ["(a) left", "(b)"]
-    # No unnamed curve, no line across the panel, nothing that is no number; named places have their names.
+    # No unnamed curve, no line across the panel, nothing that is no number; named places have their
+    # names.
     lines = table(curves(figure)).splitlines()
     named = ["b,b,0,,in the surface,", "b,b,2,,a valley,"]
     assert lines == [",".join(COLUMNS), "a,K_f low,1,time (s),3,force (N)", *named]
@@ -313,8 +345,9 @@ def at(bare, x, y):
 
 
 def test_the_flank_asked_for_is_that_of_the_profile_and_the_claim_names_the_sections_missed():
-    # 12 mm beside the ridge. Method I: flat to 6, down at 15 mm. Method II: flat to 3, down at 12 mm
-    # from the outermost cell under the finger; a disc of 16 cells reaches 3 (sqrt(16/pi) - 0.5) mm.
+    # 12 mm beside the ridge. Method I: flat to 6, down at 15 mm. Method II: flat to 3, down at 12
+    # mm from the outermost cell under the finger; a disc of 16 cells reaches 3 (sqrt(16/pi) - 0.5)
+    # mm.
     reach = 3.0 * (np.sqrt(16.0 / np.pi) - 0.5)
     for method, count, share in ((FIRST, 8, 3.0 / 9.0), (SECOND, 16, reach / 9.0)):
         one = session(method, count)
@@ -358,7 +391,10 @@ def test_a_raised_rim_is_no_mound_and_a_crease_with_a_hump_no_valley(bare):
     over = asked_for(bare)
     over[at(bare, 15, -21)] = MOUND + 1.5e-3
     (one,) = (one for one in sections(formed(bare, over)) if one.name == mound[0])
-    assert (one.rms < LIMITS.rms * one.relief, one.largest < LIMITS.largest * one.relief) == (True, True)
+    assert (one.rms < LIMITS.rms * one.relief, one.largest < LIMITS.largest * one.relief) == (
+        True,
+        True,
+    )
     assert not one.meets(LIMITS)
     # 9 mm to the left of the mound's middle and 3 mm off the ridge, where no section goes.
     over = asked_for(bare)

@@ -29,7 +29,11 @@ def _drag(rows, columns, arrangement):
     place = make_grid(Layout(rows=rows, columns=columns, arrangement=arrangement)).positions
     reach = place[:, 0].max()
     fingertip = np.zeros((201, 7))
-    fingertip[:, 0], fingertip[:, 2], fingertip[:, 3] = np.interp(time, [1, 9], [-reach, reach]), 0.05, 1.0
+    fingertip[:, 0], fingertip[:, 2], fingertip[:, 3] = (
+        np.interp(time, [1, 9], [-reach, reach]),
+        0.05,
+        1.0,
+    )
     touching = (time > 1.0) & (time < 9.0)
     near = np.exp(-np.sum((fingertip[:, None, :2] - place) ** 2, axis=2) / 0.004**2)
     force = 0.4 * touching[:, None] * near / near.sum(axis=1, keepdims=True)
@@ -131,7 +135,9 @@ def test_a_set_point_is_drawn_of_each_cell_and_without_one_neither_it_nor_a_devi
 
 def test_the_surface_is_to_scale_and_shows_the_final_heights_and_the_path(surface):
     case, relief, plan = drag(), axes(surface, "relief"), axes(surface, "map")
-    extent = [np.ptp(limits) for limits in (relief.get_xlim(), relief.get_ylim(), relief.get_zlim())]
+    extent = [
+        np.ptp(limits) for limits in (relief.get_xlim(), relief.get_ylim(), relief.get_zlim())
+    ]
     ratio = relief._box_aspect / np.array(extent)
     assert_allclose(ratio, ratio[0], rtol=1e-9)  # the same mm on all three axes
     assert plan.get_aspect() == 1.0
@@ -152,7 +158,9 @@ def test_the_relief_is_in_the_middle_of_its_room_and_as_large(rows, columns, sha
     seen = relief.figure.transFigure.inverted().transform(relief.transData.transform(flat))
     below, above = np.reshape(ROOM, (2, 2)) - [seen.min(axis=0), seen.max(axis=0)]
     assert_near(below, -above, 1e-9)
-    assert above.min() == pytest.approx(0.0, abs=1e-3)  # a size is that of another zoom, but for rounding
+    assert above.min() == pytest.approx(
+        0.0, abs=1e-3
+    )  # a size is that of another zoom, but for rounding
 
 
 def test_both_pictures_are_written_at_their_size(tmp_path, session):
@@ -162,7 +170,9 @@ def test_both_pictures_are_written_at_their_size(tmp_path, session):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["session.png", "surface.png"]
     # A picture with something on it: a white one of this size has 10 kB.
     assert min(path.stat().st_size for path in tmp_path.iterdir()) > 40_000
-    with pytest.raises(OutputError, match=r"^Cannot write \S+session\.png: No such file or directory\.$"):
+    with pytest.raises(
+        OutputError, match=r"^Cannot write \S+session\.png: No such file or directory\.$"
+    ):
         save(session, tmp_path / "missing" / "session.png")
 
 
@@ -174,7 +184,10 @@ def test_a_single_row_or_column_has_a_session_and_no_surface(tmp_path, shape):
     assert not list(tmp_path.iterdir())
     if shape == (1, 1):  # a session of one row as well
         case = {name: value if name == "position" else value[:1] for name, value in case.items()}
-    assert save(plots.session_figure(case, SetPoint(0.4)), tmp_path / "session.png").stat().st_size > 40_000
+    assert (
+        save(plots.session_figure(case, SetPoint(0.4)), tmp_path / "session.png").stat().st_size
+        > 40_000
+    )
 
 
 def test_matplotlib_is_not_imported_before_it_is_needed_and_it_is_said_what_to_install():
@@ -214,7 +227,10 @@ def test_numbers_of_one_axis_are_a_line_from_left_to_right_with_units_and_words_
 def test_two_axes_are_a_heat_map_labeled_with_units():
     values = np.array([[0.1, 0.2], [0.3, 0.4], [0.5, np.nan]])
     axes, scale = sweep_figure([ONE, TWO], "rfd", values).axes
-    assert (axes.get_xlabel(), axes.get_ylabel()) == ("control.force_gain (1/N)", "layout.pitch (mm)")
+    assert (axes.get_xlabel(), axes.get_ylabel()) == (
+        "control.force_gain (1/N)",
+        "layout.pitch (mm)",
+    )
     assert scale.get_ylabel() == "rfd (N)"
     drawn = axes.collections[0].get_array().reshape(2, 3)
     assert_array_equal(drawn.filled(np.nan), values.T)
@@ -226,7 +242,9 @@ def test_a_metric_nobody_has_is_drawn_as_missing_at_every_point(columns):
     nothing = np.full([len(one.values) for one in columns], np.nan)
     picture = sweep_figure(columns, "rfd", nothing)
     picture.canvas.draw()
-    crosses = sum(len(line.get_xdata()) for line in picture.axes[0].get_lines() if line.get_marker() == "x")
+    crosses = sum(
+        len(line.get_xdata()) for line in picture.axes[0].get_lines() if line.get_marker() == "x"
+    )
     assert crosses + sum(text.get_text() == "×" for text in picture.axes[0].texts) == nothing.size
 
 
@@ -263,7 +281,9 @@ def test_a_figure_of_several_fingertips_has_force_cell_and_path_of_each():
     assert (force.get_xlabel(), force.get_ylabel()) == ("time (s)", "force (N)")
     assert (words(heights), words(force)) == (["1", "2"], ["set point 0.2 N", "in contact"])
     # The color of a cell is that of its fingertip, which is over it in the middle of its contact.
-    assert [line.get_color() for line in heights.get_lines()] == [line.get_color() for line in lines[:2]]
+    assert [line.get_color() for line in heights.get_lines()] == [
+        line.get_color() for line in lines[:2]
+    ]
     reached = case["position"][plots.session_cells(case)]
     halfway = [case["fingertip"][row, finger, :2] for finger, row in enumerate((40, 50))]
     assert_near(reached, halfway, 2.2e-3)  # half a diagonal of a cell

@@ -2,7 +2,13 @@
 
 import numpy as np
 import pytest
-from digiclay.core.model.fingertip import LEVEL, Fingertip, compute_forms, compute_underside, make_matrices
+from digiclay.core.model.fingertip import (
+    LEVEL,
+    Fingertip,
+    compute_forms,
+    compute_underside,
+    make_matrices,
+)
 from digiclay.core.model.layout import Layout, make_grid
 from digiclay.core.surface.pointing import (
     find_contact_outline,
@@ -35,17 +41,23 @@ def test_a_ray_from_above_meets_each_pin_on_its_top(arrangement, size):
 
 
 @example(turn=5e-324, slope=-1.0, x=0.0, y=0.0)
-@given(st.floats(-3.1, 3.1), st.floats(-1.5, -0.05), st.floats(-0.015, 0.015), st.floats(-0.012, 0.012))
+@given(
+    st.floats(-3.1, 3.1), st.floats(-1.5, -0.05), st.floats(-0.015, 0.015), st.floats(-0.012, 0.012)
+)
 def test_a_ray_goes_through_no_more_than_the_corner_of_a_pin_before_it_meets_one(turn, slope, x, y):
     cells, height = bed("staggered")
-    direction = np.array([np.cos(turn) * np.cos(slope), np.sin(turn) * np.cos(slope), np.sin(slope)])
+    direction = np.array(
+        [np.cos(turn) * np.cos(slope), np.sin(turn) * np.cos(slope), np.sin(slope)]
+    )
     origin = np.array([x, y, 0.04]) - 0.3 * direction
     found = intersect_surface(cells, height, origin, direction)
     assert found[2] <= height.max() + 1e-12
     # Looked at a hundred times as finely, over the bed alone.
     way = np.linspace(0.0, np.linalg.norm(found - origin), 20_000)
     points = origin + way[:, None] * direction
-    over = (np.abs(points[:, 0]) < np.abs(cells.x).max()) & (np.abs(points[:, 1]) < np.abs(cells.y).max())
+    over = (np.abs(points[:, 0]) < np.abs(cells.x).max()) & (
+        np.abs(points[:, 1]) < np.abs(cells.y).max()
+    )
     sunk = over & (points[:, 2] < height[cells.at(points[:, 0], points[:, 1])] - 1e-9)
     edges = np.flatnonzero(np.diff(np.concatenate([[0], sunk.astype(int), [0]])))
     longest = max((edges[1::2] - edges[::2]).max(initial=0) - 1, 0) * way[1] * np.cos(slope)
@@ -74,7 +86,9 @@ def test_a_ray_along_the_bed_meets_the_side_of_the_first_pin_that_stands_out():
     cells, _ = bed()
     height, cell = np.full(cells.count, 0.04), 5 * 15 + 7
     height[cell] = 0.06
-    found = intersect_surface(cells, height, np.array([-1.0, cells.y[cell], 0.05]), np.array([1.0, 0.0, 0.0]))
+    found = intersect_surface(
+        cells, height, np.array([-1.0, cells.y[cell], 0.05]), np.array([1.0, 0.0, 0.0])
+    )
     # To a quarter of a pitch of the pin's side.
     assert found[0] == pytest.approx(cells.x[cell] - 1.5e-3, abs=0.76e-3)
 
@@ -103,13 +117,16 @@ def test_every_place_lies_on_the_ray_through_where_it_is_seen(lens):
 def test_the_ground_is_the_mean_of_pins_in_reach_and_a_high_pin_raises_a_line_by_a_sixth():
     cells, height = bed()
     near = np.hypot(cells.x - 1e-3, cells.y) <= 5e-3
-    assert find_ground_height(cells, height, 1e-3, 0.0, 5e-3) == pytest.approx(height[near].mean(), rel=1e-12)
+    assert find_ground_height(cells, height, 1e-3, 0.0, 5e-3) == pytest.approx(
+        height[near].mean(), rel=1e-12
+    )
     assert find_ground_height(cells, height, 9.0, 9.0, 5e-3) == height[-1]
     cells = make_grid(Layout())
     height = np.full(cells.count, 0.04)
     height[cells.at(np.zeros(1), np.zeros(1))] += 0.012
     places = np.array([(0.0, 0.0), (0.05, 0.0), (-1.0, 2.0), (1e3, -1e3)])
-    # The weight of the middle of a normal distribution over squares of one standard deviation: 1 / (2 pi).
+    # The weight of the middle of a normal distribution over squares of one standard deviation: 1 /
+    # (2 pi).
     risen = drape(cells, height, places)[:, 2] - 0.04
     assert risen == pytest.approx([0.012 / (2 * np.pi), 0.0, 0.0, 0.0], rel=0.02, abs=1e-12)
 

@@ -47,7 +47,11 @@ def test_the_tension_of_a_press_is_found_and_its_underside_as_uncertain_as_the_f
     # The tension is taken as linear within 5 ms, while it grows exponentially; a filter takes 4 ms.
     assert observe(forces, own) == pytest.approx(own[1:], rel=0.01, abs=2e-3)
     depth, step = np.array([0.5e-3, 2e-3]), 1e-8
-    slope = CONTACT.share * (CONTACT.tension(depth + step) - CONTACT.tension(depth - step)) / (2.0 * step)
+    slope = (
+        CONTACT.share
+        * (CONTACT.tension(depth + step) - CONTACT.tension(depth - step))
+        / (2.0 * step)
+    )
     _, deviation = PULP.find_underside(np.zeros(2), CONTACT.tension(depth), 1e-3)
     assert deviation == pytest.approx(1e-3 / slope, rel=1e-6)
 
@@ -70,7 +74,8 @@ def test_a_predicted_force_comes_and_relieved_pulp_keeps_the_expected_tension():
     assert observe(forces, np.full(own.size, 9.0))[-1] < 2.0
 
 
-# From force to height: the top whose predicted forces add up, and the heights ahead of the fingertip
+# From force to height: the top whose predicted forces add up, and the heights ahead of the
+# fingertip
 
 #: Nine cells under a fingertip of 8 mm radius at 40 mm.
 DISTANCE = np.array([0.0, 3.0, 3.0, 3.0, 3.0, 4.24, 4.24, 4.24, 4.24]) * 1e-3
@@ -123,7 +128,9 @@ def test_several_fingertips_have_the_tops_that_each_has_alone():
     "raised, top, expected", [(True, 55e-3, [55e-3, 53e-3]), (False, 30e-3, [30e-3, 32e-3])]
 )
 def test_led_cells_stand_no_farther_from_the_top_than_they_may(raised, top, expected):
-    cells = Reach(40e-3, raised, np.array([1.0, 0.5, 0.0]), np.array([0.0, 2e-3, 20e-3]), np.empty((2, 3)))
+    cells = Reach(
+        40e-3, raised, np.array([1.0, 0.5, 0.0]), np.array([0.0, 2e-3, 20e-3]), np.empty((2, 3))
+    )
     assert cells.form_heights(top) == pytest.approx([*expected, 40e-3])
 
 
@@ -143,7 +150,9 @@ SKIRT = LeadProfile(level=7.5e-3, rise=20e-3, fall=20e-3, skirt=40e-3)
         "a skirt ahead, for its speed": (SKIRT, 17.5e-3, 1.0, 0.0, 5e-3),
     },
 )
-def test_a_pin_stands_as_far_from_the_top_as_it_can_still_rise(profile, distance, ahead, speed, drop):
+def test_a_pin_stands_as_far_from_the_top_as_it_can_still_rise(
+    profile, distance, ahead, speed, drop
+):
     slopes = profile.find_slopes(speed, raised=True)
     found = profile.find_drop(np.array([distance]), np.array([ahead]), *slopes)
     assert found == pytest.approx([drop])
@@ -154,7 +163,8 @@ def test_the_disc_reaches_farther_than_pins_are_led_and_holds_those_led_before()
     assert LEAD.find_reach(-10e-3, 40e-3) == pytest.approx(7.5e-3 + 20e-3)
     blister = LedBlister(BlisterRule(Blister(), -0.05, 0.02, 1e-3), SKIRT, 10e-3)
     memory = Follower(Phase.SHAPING, top=50e-3, edge=40e-3)
-    # 10 mm above the surface the skirt leads pins 20 mm around the level ring, 2 mm more are commanded.
+    # 10 mm above the surface the skirt leads pins 20 mm around the level ring, 2 mm more are
+    # commanded.
     assert blister.find_disc(memory) == pytest.approx((0.0, 0.0, 29.5e-3))
     assert blister.find_disc(memory._replace(top=40e-3)) == pytest.approx((0.0, 0.0, 20.5e-3))
     far = memory._replace(led_x=40e-3, led_radius=10e-3)

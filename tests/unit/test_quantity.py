@@ -54,7 +54,10 @@ def test_a_valid_value_has_the_type_of_its_default(given, field, kind, value):
         ({"length": 10.0}, "Lever.length must be below 10 m (got 10 m)."),
         ({"length": math.nan}, "Lever.length must be a finite number (got nan m)."),
         ({"length": -math.inf}, "Lever.length must be a finite number (got -inf m)."),
-        ({"length": 10**400}, "Lever.length must be a finite number (got a whole number of 401 digits)."),
+        (
+            {"length": 10**400},
+            "Lever.length must be a finite number (got a whole number of 401 digits).",
+        ),
         ({"length": "long"}, "Lever.length must be a number (got 'long')."),
         ({"length": True}, "Lever.length must be a number (got True)."),
         ({"length": None}, "Lever.length must be a number (got None)."),
@@ -68,7 +71,10 @@ def test_a_valid_value_has_the_type_of_its_default(given, field, kind, value):
         ({"length": np.float64(-1.0)}, "Lever.length must be above 0 m (got -1 m)."),
         ({"teeth": np.float32(3.5)}, "Lever.teeth must be a whole number (got 3.5)."),
         ({"length": np.bool_(True)}, "Lever.length must be a number (got True)."),
-        ({"length": np.datetime64("2020")}, "Lever.length must be a number (got datetime.date(2020, 1, 1))."),
+        (
+            {"length": np.datetime64("2020")},
+            "Lever.length must be a number (got datetime.date(2020, 1, 1)).",
+        ),
         ({"notches": []}, "Lever.notches must be a list of numbers (got [])."),
         ({"notches": (0.1, -0.2)}, "Lever.notches must be at least 0 m (got -0.2 m)."),
         ({"notches": (0.1, "x")}, "Lever.notches must be a number (got 'x')."),

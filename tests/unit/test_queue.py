@@ -37,11 +37,13 @@ def begin(name):
     return sculpting.begin_session(7, "Bed", scene, above)[0]
 
 
-#: Strokes of one session: brush, height or depth, m, path, m, and images. The last valley is pressed with
-#: more than `motion.FIRM`, at which the fingertip waits for the pins.
+#: Strokes of one session: brush, height or depth, m, path, m, and images. The last valley is
+#: pressed with more than `motion.FIRM`, at which the fingertip waits for the pins.
 DRAWN = {
     "a mirrored ring": [(Brush.RAISE, 3e-3, lay_ring((4e-3, 0.0), (12e-3, 5e-3)), "X")],
-    "across the mirror": [(Brush.RAISE, 3e-3, np.linspace([-12e-3, -7e-3], [15e-3, 8e-3], 20), "X")],
+    "across the mirror": [
+        (Brush.RAISE, 3e-3, np.linspace([-12e-3, -7e-3], [15e-3, 8e-3], 20), "X")
+    ],
     "a valley from the flank of another one": [
         (Brush.RAISE, 12e-3, np.array([[11.5e-3, 4.9e-3], [-10.5e-3, 0.2e-3]]), "NONE"),
         (Brush.LOWER, 8e-3, np.array([[-17.1e-3, 8.0e-3], [1.1e-3, 8.2e-3]]), "NONE"),
@@ -62,7 +64,9 @@ def draw(name):
     scene = make_scene("design", Layout(41, 41, 1.5e-3), "hybrid", 0.5)
     session, _ = sculpting.begin_session(7, "Bed", scene, np.array([0.0, 0.0, 46e-3, *LEVEL]))
     for brush, amount, path, symmetry in DRAWN[name]:
-        session, number = queue_stroke(session, start(0, *path[0], amount, make_images(symmetry), brush))
+        session, number = queue_stroke(
+            session, start(0, *path[0], amount, make_images(symmetry), brush)
+        )
         session = change_stroke(session, number, partial(lay_path, points=path))
     return session
 
@@ -123,7 +127,9 @@ def form(part, queue):
     lean = (0.3, 0.2) if queue == LEANING else (0.0, 0.0)
     for number, (brush, amount, path, symmetry) in enumerate(QUEUES[queue], 1):
         places = 1e-3 * np.array(path)
-        stroke = start(number, *places[0], 1e-3 * amount, make_images(symmetry, 3), brush, lean=lean)
+        stroke = start(
+            number, *places[0], 1e-3 * amount, make_images(symmetry, 3), brush, lean=lean
+        )
         session = replace(session, strokes=(*session.strokes, lay_path(stroke, places)))
     before = heights(session).copy()
     ghost = find_ghosts(session.strokes, find_device(session), before)[-1].nominal.height

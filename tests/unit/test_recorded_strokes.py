@@ -66,7 +66,9 @@ def test_a_stroke_has_its_own_fingertip_and_a_brush_without_its_blister_is_refus
 
 def test_a_file_gives_its_strokes(tmp_path):
     path = tmp_path / "two.toml"
-    path.write_text(f'bed = "paper"\n{STROKE}depth = "2 mm"\n{STROKE}brush = "level"\n', encoding="utf-8")
+    path.write_text(
+        f'bed = "paper"\n{STROKE}depth = "2 mm"\n{STROKE}brush = "level"\n', encoding="utf-8"
+    )
     recorded = read_strokes(path)
     assert (recorded.name, recorded.bed, len(recorded.strokes)) == ("two", "paper", 2)
     assert (recorded.strokes[0].depth, recorded.strokes[1].kind) == (2e-3, Brush.LEVEL)
@@ -85,7 +87,10 @@ def test_a_file_gives_its_strokes(tmp_path):
         ("[[stroke]]\nmoves = []", r"stroke #1\.moves must be a list"),
         ("[[stroke]]\nmoves = [[0, 0]]", r"stroke #1\.moves must be lists of time, x and y"),
         ("[[stroke]]\nmoves = [[0, nan, 0]]", r"stroke #1\.moves must be lists of time, x and y"),
-        ("[[stroke]]\nmoves = [[0, 1, 0], [-1, 0, 0]]", r"stroke #1\.moves must begin at 0 s .*\(got -1 s\)"),
+        (
+            "[[stroke]]\nmoves = [[0, 1, 0], [-1, 0, 0]]",
+            r"stroke #1\.moves must begin at 0 s .*\(got -1 s\)",
+        ),
         ("[[stroke]]\nmoves = [[2, 0, 0]]", r"stroke #1\.moves must begin at 0 s .*\(got 2 s\)"),
         ("[[stroke", r"line 1"),
         (None, "cannot be read"),

@@ -38,4 +38,6 @@ def test_a_part_that_is_not_there_is_refused(film, told):
 
 
 def test_a_turntable_goes_round_once_without_showing_the_first_frame_twice():
-    np.testing.assert_allclose(np.degrees(Turntable(frames=4).angles()), [0, 90, 180, 270], atol=1e-12)
+    np.testing.assert_allclose(
+        np.degrees(Turntable(frames=4).angles()), [0, 90, 180, 270], atol=1e-12
+    )

@@ -54,7 +54,9 @@ def test_the_arrays_of_a_history_are_the_declared_ones_and_are_read_again(finger
     sizes = {"t": 41, "n": 12, "f": fingers}
     assert {name: array.shape for name, array in done.history.items()} == {
         name: tuple(
-            sizes.get(axis) or int(axis) for axis in declared.axes.split(", ") if axis != "f" or fingers > 1
+            sizes.get(axis) or int(axis)
+            for axis in declared.axes.split(", ")
+            if axis != "f" or fingers > 1
         )
         for name, declared in HISTORY_ARRAYS.items()
         if fingers > 1 or name != "finger_force"
@@ -98,9 +100,15 @@ def test_without_control_no_force_is_deviated_from_and_what_fits_into_no_memory_
 
 def test_the_summary_is_one_line_with_times_and_rfd(result):
     made = Result(
-        result.scene, result.history, 40, 0.05, {**result.metrics, "rfd": 0.0612, "beyond_a_finger": ""}
+        result.scene,
+        result.history,
+        40,
+        0.05,
+        {**result.metrics, "rfd": 0.0612, "beyond_a_finger": ""},
     )
-    made.metrics.update(simulated=26.0, real_time_factor=21.6, rfd_jnd_least=0.567, rfd_jnd_most=1.02)
+    made.metrics.update(
+        simulated=26.0, real_time_factor=21.6, rfd_jnd_least=0.567, rfd_jnd_most=1.02
+    )
     made.metrics.update(run_time=1.204, height_error=1.2e-6, force_error=7e-4)
     assert made.summary() == (
         "26.0 s simulated in 1.2 s (21.6 x real time), RFD 0.061 N (0.57 to 1 JND), "
@@ -161,7 +169,10 @@ def fill(folder, word):
 
 
 def test_a_folder_appears_with_all_that_was_written_and_not_before_nor_after_a_failure(tmp_path):
-    with pytest.raises(ZeroDivisionError), write_folder(tmp_path / "a" / "b", overwrite=False) as staged:
+    with (
+        pytest.raises(ZeroDivisionError),
+        write_folder(tmp_path / "a" / "b", overwrite=False) as staged,
+    ):
         raise ZeroDivisionError((staged / "x").touch())
     assert list(tmp_path.iterdir()) == []
     with write_folder(tmp_path / "a" / "b", overwrite=False) as staged:
@@ -196,7 +207,9 @@ def test_an_older_run_is_replaced_when_asked_and_stays_when_the_new_one_fails(tm
         ("file", "file/run", False, "cannot be made"),
     ],
 )
-def test_a_folder_that_could_not_be_used_is_refused_before_any_work(tmp_path, there, out, overwrite, message):
+def test_a_folder_that_could_not_be_used_is_refused_before_any_work(
+    tmp_path, there, out, overwrite, message
+):
     (tmp_path / there).parent.mkdir(exist_ok=True)
     (tmp_path / there).touch()
     with pytest.raises(OutputError, match=message):
@@ -245,7 +258,9 @@ def recorded(every, periods, stop=None):
         last = after(start, period)
         recording.observe(last)
     arrays = recording.finish(last.period)
-    return {name: (array if array.ndim == 1 else array[:, 0]).tolist() for name, array in arrays.items()}
+    return {
+        name: (array if array.ndim == 1 else array[:, 0]).tolist() for name, array in arrays.items()
+    }
 
 
 @pytest.mark.parametrize(
@@ -254,7 +269,8 @@ def recorded(every, periods, stop=None):
         # The first row is the state before the session, any other one that at its time.
         ((1, 3), "height", [0.04, 101.0, 102.0, 103.0]),
         ((1, 3), "force", [0.0, 201.0, 202.0, 203.0]),
-        # A command or a mode is in the row its period starts with; after the last row nothing is commanded.
+        # A command or a mode is in the row its period starts with; after the last row nothing is
+        # commanded.
         ((1, 3), "command", [301.0, 302.0, 303.0, 0.0]),
         ((1, 3), "mode", [1, 2, 3, 3]),
         # Every second period makes a row, and so does the end.
@@ -276,10 +292,15 @@ def test_there_are_as_many_rows_as_were_announced(every):
 
 def test_a_written_history_is_read_back_bit_for_bit_and_smaller_than_its_arrays(tmp_path):
     rng, path = np.random.default_rng(1), tmp_path / "history.npz"
-    history = {"height": rng.normal(size=(5, 7)), "mode": rng.integers(0, 8, (5, 7)).astype(np.int8)}
+    history = {
+        "height": rng.normal(size=(5, 7)),
+        "mode": rng.integers(0, 8, (5, 7)).astype(np.int8),
+    }
     write(history, path)
     with np.load(path, allow_pickle=False) as read:
-        assert [name for name, array in history.items() if not np.array_equal(read[name], array)] == []
+        assert [
+            name for name, array in history.items() if not np.array_equal(read[name], array)
+        ] == []
     heights = np.full((500, 400), 0.04)
     write({"height": heights}, path)
     # A bed at rest is the same row over and over: anything but a few per cent is not deflated.
@@ -303,14 +324,20 @@ def test_a_history_fits_to_the_byte_or_is_refused_with_the_least_thinning_that_f
         "recorder.every must be at least 7 for the history to fit into 20 GB of free memory "
         "(got 1: 5201 rows of 1000000 cells are 135 GB)."
     )
-    assert [fits(Recorder(every), 1_000_000, 5200, 20_000_000_000) for every in (6, 7)] == [False, True]
-    with pytest.raises(ParameterError, match=r"^layout.rows \* columns must be few enough for 1 GB"):
+    assert [fits(Recorder(every), 1_000_000, 5200, 20_000_000_000) for every in (6, 7)] == [
+        False,
+        True,
+    ]
+    with pytest.raises(
+        ParameterError, match=r"^layout.rows \* columns must be few enough for 1 GB"
+    ):
         refuse_what_cannot_fit(Recorder(1000), ROWS, 20_000_000, 100, 1_000_000_000)
     # Less than this could not have started the interpreter that runs the test.
     assert measure_available_memory() > 10_000_000
 
 
-#: Two beds, of which the larger has so many more cells: what is taken once falls out of the difference.
+#: Two beds, of which the larger has so many more cells: what is taken once falls out of the
+#: difference.
 SIDES, MORE = (100, 150), 150**2 - 100**2
 
 
@@ -339,7 +366,8 @@ def measured_and_estimated(**changes):
 @table(
     "changes, least, most",
     {
-        # All of it is arrays whose lengths are known; of what is taken once a little depends on the finger.
+        # All of it is arrays whose lengths are known; of what is taken once a little depends on the
+        # finger.
         "I": ({"recorder": "absent"}, 0.95, 1.05),
         "Method I": ({"recorder": "absent", "control": {"method": "cell_states"}}, 0.95, 1.05),
         # Temporary arrays are as many as numpy happens to need.
@@ -355,7 +383,9 @@ def test_a_cell_takes_as_many_bytes_as_is_said(changes, least, most):
 def test_a_row_of_a_cell_takes_as_many_bytes_as_is_said():
     history = run(resolve({"simulation": {"duration": 0.05}})).history
     rows, cells = history["height"].shape
-    kept = sum(array.nbytes for array in history.values() if array.shape == (rows, cells)) / (rows * cells)
+    kept = sum(array.nbytes for array in history.values() if array.shape == (rows, cells)) / (
+        rows * cells
+    )
     told = [count_bytes_needed(Recorder(), Rows(2, 2), 1000, periods) for periods in (500, 501)]
     # One byte more stands for what the metrics need, which is a truth value.
     assert (told[1] - told[0]) / 1000 == kept + 1

@@ -23,8 +23,12 @@ def binary_ply(order, end, extra):
     head = ASCII.replace("ascii", f"binary_{'big' if order == '>' else 'little'}_endian").replace(
         "float", "double"
     )
-    head += FACES.replace("face 2", f"face 2{chr(10)}property ushort material" if extra else "face 2")
-    data = head.replace("\n", end).encode() + b"".join(struct.pack(f"{order}3d", *place) for place in PLACE)
+    head += FACES.replace(
+        "face 2", f"face 2{chr(10)}property ushort material" if extra else "face 2"
+    )
+    data = head.replace("\n", end).encode() + b"".join(
+        struct.pack(f"{order}3d", *place) for place in PLACE
+    )
     for face in POLYGONS:
         data += struct.pack(f"{order}H", 7) if extra else b""
         data += struct.pack(f"{order}B{len(face)}i", len(face), *face)
@@ -32,8 +36,12 @@ def binary_ply(order, end, extra):
 
 
 def text_stl(faces, name="a"):
-    corners = ("".join(" vertex {} {} {}\n".format(*PLACE[corner]) for corner in face) for face in faces)
-    loops = "".join(f"facet normal 0 0 1\nouter loop\n{each}endloop\nendfacet\n" for each in corners)
+    corners = (
+        "".join(" vertex {} {} {}\n".format(*PLACE[corner]) for corner in face) for face in faces
+    )
+    loops = "".join(
+        f"facet normal 0 0 1\nouter loop\n{each}endloop\nendfacet\n" for each in corners
+    )
     return f"solid {name}\n{loops}endsolid {name}\n"
 
 
@@ -86,7 +94,9 @@ def test_whatever_way_a_scan_is_written_it_is_the_same_three_triangles(tmp_path,
     (tmp_path / name).write_bytes(content if isinstance(content, bytes) else content.encode())
     found = read(tmp_path / name)
     corners = found.vertices[found.faces]
-    assert sorted(corners.tolist()) == sorted([list(map(float, PLACE[i])) for i in face] for face in CUT)
+    assert sorted(corners.tolist()) == sorted(
+        [list(map(float, PLACE[i])) for i in face] for face in CUT
+    )
 
 
 @pytest.mark.parametrize(

@@ -21,7 +21,11 @@ from tests.assemble import table
 
 def test_an_empty_file_is_a_whole_scene_that_presses_once_and_a_written_one_names_everything():
     scene = resolve({})
-    assert (scene.layout.rows, scene.layout.pitch, scene.valve.orifice_diameter) == (25, 3e-3, 0.5e-3)
+    assert (scene.layout.rows, scene.layout.pitch, scene.valve.orifice_diameter) == (
+        25,
+        3e-3,
+        0.5e-3,
+    )
     assert tuple(name for name in SECTIONS if scene.section(name) is None) == UNASKED
     scene = resolve({"actuator": {"rest_height": 0.03}})
     assert 0.0 < min(point.position[2] for point in scene.section("trajectory").waypoints) < 0.03
@@ -29,7 +33,12 @@ def test_an_empty_file_is_a_whole_scene_that_presses_once_and_a_written_one_name
     assert resolve({"trajectory": {"waypoints": points}}).simulation.duration == 0.7
     scene = resolve({name: {} for name in UNASKED})
     tables = tomllib.loads(format_scene(scene))
-    missing = [(name, key) for name in PARTS for key in vars(scene.section(name)) if key not in tables[name]]
+    missing = [
+        (name, key)
+        for name in PARTS
+        for key in vars(scene.section(name))
+        if key not in tables[name]
+    ]
     assert missing == []
 
 
@@ -67,7 +76,8 @@ def test_periods_cover_the_duration_and_steps_the_period_without_one_more_by_rou
     lasting = [resolve({"simulation": {"duration": d, **sizes}}) for d in (0.3, 0.31, 1e-3)]
     counts = [scene.periods for scene in lasting]
     assert counts == [3, 4, 1]
-    # 0.3 / 0.1 is 2.9999999999999996 and 0.7 / 0.1 is 6.999999999999999; 0.6 / 0.2 is 2.9999999999999996.
+    # 0.3 / 0.1 is 2.9999999999999996 and 0.7 / 0.1 is 6.999999999999999; 0.6 / 0.2 is
+    # 2.9999999999999996.
     assert [Simulation(n * 0.1, 0.1).steps for n in range(1, 11)] == list(range(1, 11))
     longest = (5e-3, 1e-2, 1e-3, 2e-3, 4.9e-3, 5e-6)
     steps = [Simulation(control_period=5e-3, physics_step=size).steps for size in longest]
@@ -139,7 +149,10 @@ def test_what_is_wrong_is_said_in_one_line_of_a_sane_length(table, said):
 SCENES = {
     "default": {},
     "with nothing that can be left out": dict.fromkeys(OPTIONAL, "absent"),
-    "of awkward numbers": {"valve": {"stroke": 0.1 + 0.2e-16}, "fluid": {"viscosity": 1 / 3 * 1e-5}},
+    "of awkward numbers": {
+        "valve": {"stroke": 0.1 + 0.2e-16},
+        "fluid": {"viscosity": 1 / 3 * 1e-5},
+    },
     "of awkward texts": {"name": 'a "b" \\ é 漢', "description": "two\nlines\tand a tab"},
     "with a turning finger": {
         "trajectory": {
@@ -150,9 +163,14 @@ SCENES = {
             ],
         }
     },
-    "with every kind of sensor": {"sensors": {"force_noise": "0.5 mN", "height_noise": "5 um", "delay": 1}},
+    "with every kind of sensor": {
+        "sensors": {"force_noise": "0.5 mN", "height_noise": "5 um", "delay": 1}
+    },
     "with an observer": {"sensors": {"observer": "valve"}},
-    "hexagonal and viscous": {"preset": "viscous", "layout": {"arrangement": "hexagonal", "rows": 3}},
+    "hexagonal and viscous": {
+        "preset": "viscous",
+        "layout": {"arrangement": "hexagonal", "rows": 3},
+    },
 }
 
 

@@ -78,7 +78,18 @@ def test_noise_drawn_ahead_is_that_of_its_period_and_cells_in_any_order(seed):
     shape = np.shape(seed)
     drawn = NoiseAhead(seed, 1.0, 1.0)
     some = [2, 7]
-    asked = [(4, 9), (4, 30), (5, 9), (19, 30), (20, 30), (19, 30), (4, 30), (4, 31), (5, some), (5, 9)]
+    asked = [
+        (4, 9),
+        (4, 30),
+        (5, 9),
+        (19, 30),
+        (20, 30),
+        (19, 30),
+        (4, 30),
+        (4, 31),
+        (5, some),
+        (5, 9),
+    ]
     for period, cells in asked:
         numbers = np.arange(cells) if isinstance(cells, int) else np.array(cells)
         numbers = np.broadcast_to(numbers.reshape(-1, *[1] * len(shape)), (len(numbers), *shape))
@@ -101,7 +112,9 @@ def test_readings_noise_and_all_are_the_nearest_whole_steps_and_a_step_of_zero_r
     assert force.tolist() == [0.25, 0.5, 0.0]
     assert height.tolist() == [0.25, 0.0, 1.0]
     assert Quantized(PerfectSensors(), 0.0, 0.125).measure(seen, 0)[0] is seen.force
-    sensors = assemble(sample("slow_press", "sensors.force_noise=5 mN", "sensors.force_step=1 mN")).sensors
+    sensors = assemble(
+        sample("slow_press", "sensors.force_noise=5 mN", "sensors.force_step=1 mN")
+    ).sensors
     force, _ = sensors.measure(show([0.02] * 9, [0.04] * 9), 1)
     assert_array_equal(force, np.rint(force / 1e-3) * 1e-3)
     assert np.unique(force).size > 3
@@ -110,7 +123,10 @@ def test_readings_noise_and_all_are_the_nearest_whole_steps_and_a_step_of_zero_r
 @pytest.mark.parametrize("step", [0.0, 1.0, 4.0, 7.5])
 def test_no_force_reads_above_the_floor_of_five_standard_deviations_and_half_a_step(step):
     floor = Sensing(force_noise=1.0, force_step=step).force_floor
-    assert (floor, Sensing(force_step=step).force_floor) == (pytest.approx(5.0 + step / 2, abs=1e-12), 0.0)
+    assert (floor, Sensing(force_step=step).force_floor) == (
+        pytest.approx(5.0 + step / 2, abs=1e-12),
+        0.0,
+    )
     sensors = Quantized(Noisy(PerfectSensors(), 1.0, 0.0, 5), step, 0.0)
     nothing = show([0.0] * CELLS, [0.04] * CELLS)
     read = max(float(sensors.measure(nothing, period)[0].max()) for period in range(PERIODS))
@@ -141,7 +157,9 @@ def test_readings_are_late_by_whole_periods_and_begin_with_that_of_the_start(lat
 
 
 @pytest.mark.parametrize("late", [1, 3])
-@pytest.mark.parametrize("gap", [(6,), (6, 7), (6, 7, 8), (6, 7, 8, 9, 10, 11, 12), (1, 2), (1, 6, 9)])
+@pytest.mark.parametrize(
+    "gap", [(6,), (6, 7), (6, 7, 8), (6, 7, 8, 9, 10, 11, 12), (1, 2), (1, 6, 9)]
+)
 def test_a_cell_that_took_no_part_while_nothing_changed_is_read_as_if_it_had(late, gap):
     level, truths = 40e-3, []
     for i in range(20):
@@ -178,8 +196,8 @@ def scene(waypoints=PRESS, **sections):
         "layout": {"rows": 1, "columns": 1},
         "control": "absent",
         "sensors": {"observer": "valve"},
-        # The observer is judged here, not the integration: at the default step a run's own force is off by
-        # more than the readings are, as is shown below.
+        # The observer is judged here, not the integration: at the default step a run's own force is
+        # off by more than the readings are, as is shown below.
         "simulation": {"physics_step": 1e-3},
     }
     return resolve({**table, "trajectory": {"waypoints": list(waypoints)}, **sections})
@@ -213,7 +231,9 @@ def pulled_down(period):
 
 
 def down_and_up(period):
-    return 0.6 * math.cos(2.0 * math.pi * period / 80.0 + math.pi / 2) + (0.25 if period > 60 else 0.15)
+    return 0.6 * math.cos(2.0 * math.pi * period / 80.0 + math.pi / 2) + (
+        0.25 if period > 60 else 0.15
+    )
 
 
 def half_way(force):
@@ -248,8 +268,8 @@ def test_the_force_on_a_pressed_moving_pin_is_found_to_three_millinewtons(sectio
     _, coarse = watched(scene(**sections, simulation={}), down_and_up)
     known = well_open(down_and_up)
     assert np.ptp(true[known]) > 0.05, "hardly a force to be found"
-    # The finger loads the pin by some 0.1 N in 100 ms: within a period the force changes by up to 10 mN,
-    # and a mean weighted with the conductance lies off the middle by a part of that.
+    # The finger loads the pin by some 0.1 N in 100 ms: within a period the force changes by up to
+    # 10 mN, and a mean weighted with the conductance lies off the middle by a part of that.
     assert np.abs(np.array([read, coarse]) - half_way(true))[:, known].max() < 3e-3
 
 
@@ -260,15 +280,16 @@ def test_the_force_is_found_where_the_flow_is_turbulent():
     assert true[PRESSED].min() > 0.02, "the finger hardly presses"
     # The force's change within a period, as above; the flow's regime is settled to 0.1 mN.
     assert np.abs(read - half_way(true))[PRESSED].max() < 3e-3
-    # At the default step 18 mN off at the ends of the steps, 5 mN in the means that are read: the valve's law
-    # is kept over the whole step, the force at its end is what the heights left of it.
+    # At the default step 18 mN off at the ends of the steps, 5 mN in the means that are read: the
+    # valve's law is kept over the whole step, the force at its end is what the heights left of it.
     own, coarse = watched(scene(FALL, **NARROW, simulation={}), pulled_down, 75)
     assert np.abs(coarse - half_way(true))[PRESSED].max() < 0.5 * np.abs(own - true)[PRESSED].max()
 
 
 @pytest.mark.parametrize(
     "inexact, most",
-    # The simulation averages the flow over 1 ms steps, the observer over the period: 18 µN between them.
+    # The simulation averages the flow over 1 ms steps, the observer over the period: 18 µN between
+    # them.
     [({}, 5e-5), ({"height_noise": 1e-6}, 0.0), ({"height_step": 5e-6}, 0.0)],
 )
 def test_an_unloaded_pin_reads_no_force_and_no_reading_is_below_zero(inexact, most):
@@ -283,16 +304,19 @@ def test_the_last_estimate_is_held_while_the_valve_is_shut_at_a_stop_or_of_a_bed
     assert true[-1] - true[64] > 0.05, "the force does not change"
     assert read[64] > 0.05
     assert np.unique(read[64:]).size == 1
-    # At an end stop too: an open valve and no motion would otherwise mean that the finger holds the high
-    # reservoir, 157 mN. It rises the millimeter in 15 periods.
+    # At an end stop too: an open valve and no motion would otherwise mean that the finger holds the
+    # high reservoir, 157 mN. It rises the millimeter in 15 periods.
     assert (
         watched(
-            scene(over_middle((0.0, 0.15), (0.6, 0.15)), actuator={"rest_height": 99e-3}), lambda period: 0.8
+            scene(over_middle((0.0, 0.15), (0.6, 0.15)), actuator={"rest_height": 99e-3}),
+            lambda period: 0.8,
         )[1].max()
         < 1e-3
     )
     # Its valves are shut, and stay shut: there is nothing to tell the force from.
-    history = run(resolve({"layout": {"rows": 11, "columns": 11}, "sensors": {"observer": "valve"}})).history
+    history = run(
+        resolve({"layout": {"rows": 11, "columns": 11}, "sensors": {"observer": "valve"}})
+    ).history
     assert history["total_force"].max() > 1.0
     assert np.ptp(history["height"]) == 0.0
 
@@ -313,7 +337,9 @@ def test_coarse_late_or_noisy_heights_cost_the_observer_what_the_flow_says():
     error = np.abs(read(height_step=1e-6) - exact)[known]
     assert 0.05 * loading(1e-6, 0.4) < error.max() <= loading(1e-6, 0.4)
     assert_array_equal(read(delay=3)[3:], exact[:-3])
-    exact, noisy = (watched(sensed_by(height_noise=noise), lambda period: 0.4)[1] for noise in (0.0, 1e-7))
+    exact, noisy = (
+        watched(sensed_by(height_noise=noise), lambda period: 0.4)[1] for noise in (0.0, 1e-7)
+    )
     # Some hundred readings: their standard deviation is known to 7 %, and neighbors share a height.
     assert abs(np.std((noisy - exact)[10:]) / (math.sqrt(2.0) * loading(1e-7, 0.4)) - 1.0) < 0.3
 

@@ -45,7 +45,9 @@ def test_scenes_with_any_signs_in_their_names_are_jobs_with_safe_names_of_their_
     jobs = Path("jobs.toml")
     write_text(jobs, f"scenes = {json.dumps(names)}")
     made = read_jobs(jobs).jobs
-    assert [job.scene and job.scene.simulation.duration for job in made] == [*range(1, len(names) + 1)]
+    assert [job.scene and job.scene.simulation.duration for job in made] == [
+        *range(1, len(names) + 1)
+    ]
     assert len({job.name for job in made}) == len(names)
     assert all(re.fullmatch(r"[\w+][\w.+-]*", job.name) for job in made)
     write_text(Path("a\nb.toml"), "")
@@ -73,7 +75,11 @@ def test_any_text_makes_a_name_that_every_file_system_takes(text):
 
 
 @given(
-    st.lists(st.sampled_from(["a", "A", "a-2", "a-2-2", "ä", "a\u0308", "a b", "a_b", ".", "a.", "x" * 300]))
+    st.lists(
+        st.sampled_from(
+            ["a", "A", "a-2", "a-2-2", "ä", "a\u0308", "a b", "a_b", ".", "a.", "x" * 300]
+        )
+    )
 )
 @example(["x" * 300 + end for end in ("a", "b", "b")])
 def test_no_two_names_are_alike_and_a_name_of_its_own_is_kept(texts):
@@ -90,7 +96,9 @@ def test_scenes_by_odd_paths_are_done_and_nothing_is_written_outside(here, capsy
     for name in ("scene.toml", "MY.toml"):
         write_text(Path(name), SCENE)
     absolute = str(here.parent / "scene.toml")
-    jobs = jobs_file(f'scenes = ["../scene.toml", "scene.toml", "MY.toml", "my.toml", {absolute!r}]\n{QUICK}')
+    jobs = jobs_file(
+        f'scenes = ["../scene.toml", "scene.toml", "MY.toml", "my.toml", {absolute!r}]\n{QUICK}'
+    )
     assert main(["batch", str(jobs), "--out", "o", "--quiet"]) == 2
     assert "scenes must not name the same thing twice" in capsys.readouterr().err
     before = set(here.parent.rglob("*"))
@@ -114,7 +122,12 @@ def jobs_file(said):
 @pytest.mark.parametrize("folder", ["jobs", "runs", "logs", "runs/my"])
 def test_a_link_that_leads_out_of_the_batchs_folder_is_refused(folder, here, refused):
     (here / "away").mkdir()
-    assert main(["batch", str(jobs_file('scenes = ["my.toml"]')), "--out", "o", "--prepare", "--quiet"]) == 0
+    assert (
+        main(
+            ["batch", str(jobs_file('scenes = ["my.toml"]')), "--out", "o", "--prepare", "--quiet"]
+        )
+        == 0
+    )
     link = here / "o" / folder
     shutil.rmtree(link, ignore_errors=True)
     link.symlink_to(here / "away")
@@ -162,7 +175,11 @@ def test_a_run_of_a_folder_by_an_odd_path_has_the_folders_name(word):
     shutil.copy("my.toml", "scene.toml")
     assert main(["run", word, "--quiet", "--no-errors"]) == 0
     assert Path("work/metrics.json").is_file()
-    assert run_folder.find_name(Path("/scene.toml")) == run_folder.find_name(Path("...toml")) == "scene"
+    assert (
+        run_folder.find_name(Path("/scene.toml"))
+        == run_folder.find_name(Path("...toml"))
+        == "scene"
+    )
     assert not os.path.lexists("metrics.json")
 
 
@@ -205,7 +222,9 @@ def test_a_series_that_found_the_disk_full_goes_on_when_there_is_room(name, size
 
 @pytest.mark.parametrize("name", COMMANDS)
 @pytest.mark.parametrize("content", ["", '{\n "digiclay": "0.1', "[]", None])
-def test_a_description_that_cannot_be_read_counts_as_none_where_nothing_is_done(name, content, here):
+def test_a_description_that_cannot_be_read_counts_as_none_where_nothing_is_done(
+    name, content, here
+):
     # What an older version, or a machine that lost its power, left of a full disk.
     for folder in ("points",) if name == "sweep" else ("jobs", "runs", "logs"):
         (here / "o" / folder).mkdir(parents=True)
@@ -263,6 +282,13 @@ def test_another_series_and_what_is_no_folder_are_refused(here):
     with open_series(here / "o", KIND, {"a": 1}, refuse):  # nothing is there to be refused
         pass
     (here / "file").touch()
-    for path, why in (("o", r"found \{'a': 1\}"), ("file", "file is a file"), ("file/o", "cannot be used")):
-        with pytest.raises(OutputError, match=why), open_series(here / path, KIND, {"a": 2}, refuse):
+    for path, why in (
+        ("o", r"found \{'a': 1\}"),
+        ("file", "file is a file"),
+        ("file/o", "cannot be used"),
+    ):
+        with (
+            pytest.raises(OutputError, match=why),
+            open_series(here / path, KIND, {"a": 2}, refuse),
+        ):
             pass

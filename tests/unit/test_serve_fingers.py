@@ -55,7 +55,10 @@ BAD = {
     "two numbers": ([(2, [0.0, 0.0])], "Finger 2: pose must be 3 numbers"),
     "text": ([(2, ["a", 0.0, 0.0])], "Finger 2: pose must be numbers"),
     "a turn of length 0": ([(2, [0.0] * 7)], "Finger 2: pose must have a quaternion of length 1"),
-    "two with one identity": ([(2, [*PLACE]), (2, [*PLACE])], "Finger 2: pose must be the only one"),
+    "two with one identity": (
+        [(2, [*PLACE]), (2, [*PLACE])],
+        "Finger 2: pose must be the only one",
+    ),
     "no identity": ([(None, [*PLACE])], "Finger None: pose.identity must be a whole number"),
     "a negative identity": ([(-1, [*PLACE])], "Finger -1: pose.identity must be a whole number"),
     "two are wrong": ([(2, [math.inf] * 3), (-1, [*PLACE])], "And 1 more."),
@@ -156,7 +159,9 @@ def test_fingertips_of_a_quest_are_in_axes_of_the_bed_whatever_the_place_in_the_
     assert_allclose(tips(lines(wrist="1.2502, 0.0635, -0.746" + WRIST[22:])), found, atol=1e-12)
     # A hand that is not turned: Unity's x, z, y are the bed's x, y, z.
     plain = tips(lines(wrist="0, 0, 0, 0, 0, 0, 1"))
-    assert_allclose(np.diff(plain, axis=0), np.diff(JOINTS[[4, 8, 12, 16, 20]], axis=0)[:, [0, 2, 1]])
+    assert_allclose(
+        np.diff(plain, axis=0), np.diff(JOINTS[[4, 8, 12, 16, 20]], axis=0)[:, [0, 2, 1]]
+    )
     # Turned by 90 degrees about Unity's y, clockwise from above, its fingers point to the right.
     turned = tips(lines(wrist="0, 0, 0, 0, 0.7071, 0, 0.7071"))
     assert_allclose(turned[:, :2], plain[:, [1, 0]] * [1.0, -1.0], atol=1e-4)
@@ -165,7 +170,9 @@ def test_fingertips_of_a_quest_are_in_axes_of_the_bed_whatever_the_place_in_the_
 
 def test_the_left_hand_is_the_mirrored_right_one():
     x, y, z, a, b, c, w = (float(word) for word in WRIST.split(","))
-    mirrored = lines("Left", ", ".join(map(str, (-x, y, z, a, -b, -c, w))), JOINTS * [-1.0, 1.0, 1.0])
+    mirrored = lines(
+        "Left", ", ".join(map(str, (-x, y, z, a, -b, -c, w))), JOINTS * [-1.0, 1.0, 1.0]
+    )
     assert_allclose(tips(mirrored), tips(lines()) * [-1.0, 1.0, 1.0], atol=1e-12)
     assert list(take(mirrored, lines()).fingers(1.0)) == list(range(10))
 
@@ -235,7 +242,8 @@ def touch(*fingers):
 def point(*fingers):
     """Return a frame of TUIO 2.0 with pressure."""
     pointers = [
-        osc("/tuio2/ptr", one, 1, 0, x, y, 0.0, 0.0, 0.01, pressure) for one, x, y, pressure in fingers
+        osc("/tuio2/ptr", one, 1, 0, x, y, 0.0, 0.0, 0.01, pressure)
+        for one, x, y, pressure in fingers
     ]
     ends = osc("/tuio2/alv", *(one for one, *_ in fingers))
     return bundle(osc("/tuio2/frm", 1, 0, 0, "me"), *pointers, ends)
@@ -248,10 +256,14 @@ def test_a_pads_corners_are_the_beds_and_pressure_is_depth():
     old = PAD.take(touch((4, 0.0, 0.0), (5, 1.0, 0.25)), 1.0).fingers(1.0)
     assert list(old) == [4, 5]
     assert_near([*old.values()], [[-0.04, 0.04, 0.035], [0.04, 0.02, 0.035]], 1e-9)
-    new = PAD.take(point((4, 0.5, 1.0, 1.0), (5, 0.0, 0.0, 0.25), (6, 0.0, 0.0, 0.0)), 1.0).fingers(1.0)
+    new = PAD.take(point((4, 0.5, 1.0, 1.0), (5, 0.0, 0.0, 0.25), (6, 0.0, 0.0, 0.0)), 1.0).fingers(
+        1.0
+    )
     assert list(new) == [4, 5, 6]
     # The last one only just touches.
-    assert_near([*new.values()], [[0.0, -0.04, 0.03], [-0.04, 0.04, 0.0375], [-0.04, 0.04, 0.04]], 1e-9)
+    assert_near(
+        [*new.values()], [[0.0, -0.04, 0.03], [-0.04, 0.04, 0.0375], [-0.04, 0.04, 0.04]], 1e-9
+    )
     light = PAD.take(point((6, 0.0, 0.0, 0.0)), 1.0)
     assert light.fingers(1.0)[6][2] == pytest.approx(0.035)  # a pad without pressure: half
     light = light.take(point((6, 0.0, 0.0, 0.5)), 1.1).take(point((6, 0.0, 0.0, 0.0)), 1.2)
@@ -290,12 +302,18 @@ def test_a_datagram_that_is_none_is_refused_and_changes_nothing(data):
         ("--from quest --token=a-token-of-tests", "invalid choice"),
         ("--to http://x:1 --token=a-token-of-tests --play empty", "--to must be ws://HOST:PORT"),
         ("--to ws://x:1:2 --token=a-token-of-tests --play empty", "--to must be ws://HOST:PORT"),
-        ("--to ws://127.0.0.1:1 --token=a-token-of-tests --play empty", "No server at ws://127.0.0.1:1"),
+        (
+            "--to ws://127.0.0.1:1 --token=a-token-of-tests --play empty",
+            "No server at ws://127.0.0.1:1",
+        ),
         ("--size 0 --token=a-token-of-tests", "--size must be above 0 and at most 1000 mm (got 0)"),
         ("--depth=-3 --token=a-token-of-tests", "--depth must be above 0"),
         ("--play missing --token=a-token-of-tests", "must be a recording"),
         ("--play bad --token=a-token-of-tests", "must be a recording"),
-        ("--record bad --to osc://127.0.0.1:1 --port 9123 --token=a-token-of-tests", "File exists: bad"),
+        (
+            "--record bad --to osc://127.0.0.1:1 --port 9123 --token=a-token-of-tests",
+            "File exists: bad",
+        ),
         ("--record new --to ws://127.0.0.1:1/ --token=a-token-of-tests", "has ended"),
     ],
 )

@@ -123,7 +123,9 @@ LONG = 0.1
 
 @pytest.mark.parametrize("restless", [True, False])
 def test_a_new_pose_begins_its_period_early_by_one(restless, clock):
-    session = begin_session(resolve({**SMALL, "trajectory": WAIT, "simulation": {"control_period": LONG}}))
+    session = begin_session(
+        resolve({**SMALL, "trajectory": WAIT, "simulation": {"control_period": LONG}})
+    )
     doors = Asked(clock, restless=restless)
     _, figures = run_session(session, doors, None, 1.0, doors.stopped, print)
     (_, before), *shown = doors.shown
@@ -223,7 +225,11 @@ def test_the_ceiling_is_each_fingers():
         frame = make_frame(session)
         each = [force for _, force, _ in frame.fingers]
         assert max(each) <= 0.2 * (1.0 + 1e-12)  # rounding
-        assert frame.total_force == pytest.approx(sum(each)) == pytest.approx(frame.forces.sum(), rel=1e-5)
+        assert (
+            frame.total_force
+            == pytest.approx(sum(each))
+            == pytest.approx(frame.forces.sum(), rel=1e-5)
+        )
         assert each[2] == 0.0
     assert frame.flags & Flag.FORCE_LIMITED
     assert each[0] == pytest.approx(0.2)
@@ -318,7 +324,10 @@ def test_the_first_part_replaces_the_takes_in_a_folder_and_nothing_else(tmp_path
     held = ["mine.npz", "take_001_part_00007.npz", "take_004.npz"]
     for name in held:
         (tmp_path / name).write_text("old", encoding="utf-8")
-    with pytest.raises(OutputError, match="replace the take in it with --overwrite"), PartWriter(tmp_path):
+    with (
+        pytest.raises(OutputError, match="replace the take in it with --overwrite"),
+        PartWriter(tmp_path),
+    ):
         pass
     for part in (None, taken(pressed(recorded(), 3))):
         assert left(tmp_path) == held
@@ -363,7 +372,9 @@ def test_a_token_comes_from_the_option_the_environment_or_chance(monkeypatch):
 
 def test_only_the_same_token_is_the_right_one_and_one_that_is_none_is_refused_and_not_shown():
     wrong = ("", "a-token-of-test", "a-token-of-testss", None, 7, b"a-token-of-tests", "\ud800")
-    assert [is_token(one, "a-token-of-tests") for one in ("a-token-of-tests", *wrong)] == [True] + [False] * 7
+    assert [is_token(one, "a-token-of-tests") for one in ("a-token-of-tests", *wrong)] == [True] + [
+        False
+    ] * 7
     for token in ("", "short", "with a space", "x" * 129, "umlaut-ä-ä-ä"):
         with pytest.raises(OutputError, match=r"--token must have 8 to 128") as caught:
             choose_token(token)

@@ -13,10 +13,11 @@ from digiclay.core.shapes.request import Placement, Shape
 from digiclay.core.surface.formed import Formed
 
 ARRANGEMENTS = ("aligned", "staggered", "hexagonal")
-#: mm. In the middle of a bed the last ones have no place that is a round number, in binary or in decimals.
+#: mm. In the middle of a bed the last ones have no place that is a round number, in binary or in
+#: decimals.
 PITCHES = (3.0, 2.3, 2.54)
-#: A float32 of 50 mm is 2 nm off at most, and beside a pin a slope of 20 moves the height by 20 times that;
-#: pins are rounded to 0.1 µm.
+#: A float32 of 50 mm is 2 nm off at most, and beside a pin a slope of 20 moves the height by 20
+#: times that; pins are rounded to 0.1 µm.
 EXACT = 1e-7
 
 
@@ -39,7 +40,9 @@ def test_a_formed_bed_comes_back_cell_by_cell(tmp_path, arrangement, format):
     path = tmp_path / f"formed{find_suffix(format)}"
     for pitch, kind in zip(PITCHES, ("solid", "surface", "pins"), strict=True):
         cells, formed = bed(pitch, arrangement)
-        back = read_back(cells, formed, Model(kind=kind), path, format, "m" if pitch == 2.3 else "mm")
+        back = read_back(
+            cells, formed, Model(kind=kind), path, format, "m" if pitch == 2.3 else "mm"
+        )
         assert (back.covered, back.overhanging) == (cells.count, 0), kind
         assert np.abs(back.heights - formed.height).max() < EXACT, kind
 
@@ -70,13 +73,18 @@ def test_an_obj_comes_back_from_any_axes(tmp_path, up, forward, header):
     if header:
         path.write_text(header + path.read_text()[path.read_text().index("\n") :])
     shape = Shape(file=str(path), fit="placed", unit="mm")
-    assert np.abs(fit_relief(shape, read(shape), cells, Actuator()).heights - formed.height).max() < EXACT
+    assert (
+        np.abs(fit_relief(shape, read(shape), cells, Actuator()).heights - formed.height).max()
+        < EXACT
+    )
 
 
 @pytest.mark.parametrize("up, forward", [("z", "-z"), ("w", ""), ("y", "up")])
 def test_axes_that_make_no_sense_are_refused(tmp_path, up, forward):
     with pytest.raises(ParameterError, match=r"^Export\.(up|forward) must be "):
-        write(make_bodies(bed(3.0, "aligned")[1], Model()), tmp_path / "x.obj", up=up, forward=forward)
+        write(
+            make_bodies(bed(3.0, "aligned")[1], Model()), tmp_path / "x.obj", up=up, forward=forward
+        )
     assert not list(tmp_path.iterdir())
 
 
@@ -85,7 +93,9 @@ def test_a_rim_of_six_digits_still_covers_the_outer_pins(arrangement):
     cells, formed = bed(2.3, arrangement)
     (body,) = make_bodies(formed, Model(kind="surface"))
     rounded = np.array([[float(f"{value * 1e3:.6g}") for value in row] for row in body.vertices])
-    tops = make_shape_mesh("x", rounded, body.faces, "z", 1e-3).tops(cells, Placement(1e-3, 1e-3, 0.0, 0.0))
+    tops = make_shape_mesh("x", rounded, body.faces, "z", 1e-3).tops(
+        cells, Placement(1e-3, 1e-3, 0.0, 0.0)
+    )
     assert tops.covered.all()
     # 50 nm off, at a slope of up to 20.
     assert np.abs(tops.value * 1e-3 - formed.height).max() < 2e-6

@@ -20,9 +20,13 @@ def test_a_number_of_six_digits_typed_is_that_number_in_si(digits, exponent, uni
     assert to_si(float(np.float32(to_shown(meant, power))), power) == meant
 
 
-@given(value=some.floats(allow_nan=False, allow_infinity=False), power=some.sampled_from([-5, -3, 0, 3, 6]))
+@given(
+    value=some.floats(allow_nan=False, allow_infinity=False),
+    power=some.sampled_from([-5, -3, 0, 3, 6]),
+)
 def test_the_number_shown_is_the_si_value_rounded_once(value, power):
-    # One rounding is half a unit of the last place; what is too large or too small for a float may end.
+    # One rounding is half a unit of the last place; what is too large or too small for a float may
+    # end.
     there = to_shown(value, power)
     if math.isfinite(there) and abs(there) > 1e-300:
         assert math.isclose(there, value * 10.0**power, rel_tol=4e-16)

@@ -38,7 +38,8 @@ def test_a_square_of_pins_is_cut_between_the_two_ends_that_are_level(corner):
 
 
 def test_a_ridge_is_not_cut_across():
-    # Pins 1 and 2, on a diagonal, are the ridge; 0 and 3 are level too, but low: the higher one wins.
+    # Pins 1 and 2, on a diagonal, are the ridge; 0 and 3 are level too, but low: the higher one
+    # wins.
     faces = make_skin(pins(2, 2), [0.04, 0.05, 0.05, 0.04], 2, 2)
     assert all({1, 2} <= set(face) for face in faces.tolist())
 
@@ -54,7 +55,9 @@ def test_shifted_rows_are_joined_by_the_shorter_diagonal_whatever_the_heights():
 
 
 def test_pins_that_do_not_fill_their_rows_are_refused():
-    with pytest.raises(ParameterError, match=r"^Surface\.position must fill rows of 4 pins \(got 11 pins"):
+    with pytest.raises(
+        ParameterError, match=r"^Surface\.position must fill rows of 4 pins \(got 11 pins"
+    ):
         find_grid_shape(pins(3, 4)[:-1])
 
 
@@ -64,14 +67,49 @@ BROKEN = np.where(np.arange(18).reshape(9, 2) == 9, np.nan, pins(3, 3))
 @pytest.mark.parametrize(
     "place, height, shape, said",
     [
-        (BROKEN, np.full(9, 0.04), (3, 3), r"^Surface\.position must be finite \(got nan at cell 4\)\.$"),
-        (pins(3, 3), np.full(8, 0.04), (3, 3), r"each of the 3 x 3 pins \(got 8 values at 9 positions\)\.$"),
-        (pins(3, 3)[[0, 1, 2, 6, 4, 5, 3, 7, 8]], np.full(9, 0.04), (3, 3), "must order the pins row by row"),
+        (
+            BROKEN,
+            np.full(9, 0.04),
+            (3, 3),
+            r"^Surface\.position must be finite \(got nan at cell 4\)\.$",
+        ),
+        (
+            pins(3, 3),
+            np.full(8, 0.04),
+            (3, 3),
+            r"each of the 3 x 3 pins \(got 8 values at 9 positions\)\.$",
+        ),
+        (
+            pins(3, 3)[[0, 1, 2, 6, 4, 5, 3, 7, 8]],
+            np.full(9, 0.04),
+            (3, 3),
+            "must order the pins row by row",
+        ),
         (pins(1, 1), [0.04], (1, 1), r"at least 2 x 2 pins, in rows along x \(got 1 x 1\)\.$"),
-        (pins(1, 9), np.full(9, 0.04), (1, 9), r"at least 2 x 2 pins, in rows along x \(got 1 x 9\)\.$"),
-        (pins(9, 1), np.full(9, 0.04), (9, 1), r"at least 2 x 2 pins, in rows along x \(got 9 x 1\)\.$"),
-        (pins(2, 2), [0, 0, np.nan, 0], (2, 2), r"^Surface\.height must be finite \(got nan at cell 2\)"),
-        (pins(2, 2), [0, 0, 0, -np.inf], (2, 2), r"^Surface\.height must be finite \(got -inf at cell 3\)"),
+        (
+            pins(1, 9),
+            np.full(9, 0.04),
+            (1, 9),
+            r"at least 2 x 2 pins, in rows along x \(got 1 x 9\)\.$",
+        ),
+        (
+            pins(9, 1),
+            np.full(9, 0.04),
+            (9, 1),
+            r"at least 2 x 2 pins, in rows along x \(got 9 x 1\)\.$",
+        ),
+        (
+            pins(2, 2),
+            [0, 0, np.nan, 0],
+            (2, 2),
+            r"^Surface\.height must be finite \(got nan at cell 2\)",
+        ),
+        (
+            pins(2, 2),
+            [0, 0, 0, -np.inf],
+            (2, 2),
+            r"^Surface\.height must be finite \(got -inf at cell 3\)",
+        ),
     ],
 )
 def test_pins_that_carry_no_skin_are_refused(place, height, shape, said):
@@ -131,7 +169,9 @@ def test_a_bed_without_bridges_has_the_volume_of_its_prisms(arrangement):
     thickness = 1e-3 * heights.min() - 0.01
     vertices, faces, _ = make_pins_solid(formed(heights, 4, 5, arrangement), thickness)
     prisms = (heights * 1e-3 - 0.01).sum() * layout.pitch * layout.row_spacing
-    assert trimesh.Trimesh(vertices, faces, process=False).volume == pytest.approx(prisms, rel=1e-12)
+    assert trimesh.Trimesh(vertices, faces, process=False).volume == pytest.approx(
+        prisms, rel=1e-12
+    )
 
 
 def test_squares_that_meet_at_a_corner_are_joined_and_differences_no_file_can_hold_make_no_wall():
@@ -142,11 +182,16 @@ def test_squares_that_meet_at_a_corner_are_joined_and_differences_no_file_can_ho
     assert_allclose(np.abs(between), BRIDGE * 3e-3, rtol=1e-9)
     high = {0, 3}
     met = made.twin >= 0
-    assert any({int(p), int(o)} == high for p, o in zip(made.pin[met], made.pin[made.twin[met]], strict=True))
+    assert any(
+        {int(p), int(o)} == high
+        for p, o in zip(made.pin[met], made.pin[made.twin[met]], strict=True)
+    )
     heights = 40.0 + np.array([0.0, 1e-6, 2e-5, 0.0, 5.0, 5.0])
     vertices, faces, _ = make_pins_solid(formed(heights, 2, 3))
     corners = vertices[faces].astype(np.float32)
-    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    area = np.linalg.norm(
+        np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
+    )
     assert area.min() > 1e-8  # m²; a wall of the least step would have 3e-10
 
 
@@ -184,14 +229,17 @@ def test_the_bilinear_skin_of_an_aligned_bed_is_scipys():
 
 @pytest.mark.parametrize("mirrored", [False, True])
 @pytest.mark.parametrize("arrangement", ["staggered", "hexagonal"])
-def test_the_bilinear_skin_of_a_shifted_bed_is_flat_on_the_triangles_of_delaunay(arrangement, mirrored):
+def test_the_bilinear_skin_of_a_shifted_bed_is_flat_on_the_triangles_of_delaunay(
+    arrangement, mirrored
+):
     formed = bed(arrangement)
     place = formed.position * (-1.0 if mirrored else 1.0, 1.0)
     sheet = covered(over(place, formed.height), "bilinear", 4)
     # In mm, because of Delaunay's own tolerances.
     known = LinearNDInterpolator(Delaunay(place * 1e3), formed.height)(sheet.position * 1e3)
     compared = np.isfinite(known)
-    # At the zig-zag ends the hull has triangles that the bed has not, but no point of ours lies in them.
+    # At the zig-zag ends the hull has triangles that the bed has not, but no point of ours lies in
+    # them.
     assert compared.mean() > 0.95
     assert_near(sheet.height[compared], known[compared], 1e-12)
 
@@ -199,7 +247,8 @@ def test_the_bilinear_skin_of_a_shifted_bed_is_flat_on_the_triangles_of_delaunay
 @pytest.mark.parametrize("arrangement", ARRANGEMENTS)
 def test_the_smooth_skin_is_scipys_monotone_splines_along_and_then_across_the_rows(arrangement):
     sheet, x, y, height = covered_rows(arrangement, "smooth", 3)
-    # Beside the zig-zag ends of a shifted bed the skin is held between the pins, which SciPy's is not.
+    # Beside the zig-zag ends of a shifted bed the skin is held between the pins, which SciPy's is
+    # not.
     within = (sheet.position[:, 0] >= x[:, 0].max()) & (sheet.position[:, 0] <= x[:, -1].min())
     points = np.flatnonzero(within)[::7]
     assert len(points) > 50
@@ -215,7 +264,10 @@ def test_a_spline_may_have_its_knots_anywhere(falling, count):
     random = np.random.default_rng(5)
     knot = np.sort(random.uniform(0.0, 1.0, count))[:: -1 if falling else 1]
     # Some run level for a while, some rise and fall.
-    value, at = random.integers(-2, 3, size=(count, 30)) * 1.0, np.linspace(knot.min(), knot.max(), 101)
+    value, at = (
+        random.integers(-2, 3, size=(count, 30)) * 1.0,
+        np.linspace(knot.min(), knot.max(), 101),
+    )
     order = np.argsort(knot)
     known = PchipInterpolator(knot[order], value[order])(at)
     assert_near(interpolate_monotone(knot, value, at), known, 1e-12)
@@ -226,8 +278,8 @@ def test_a_spline_may_have_its_knots_anywhere(falling, count):
 def test_a_skin_is_nowhere_above_or_below_the_pins_about_it(skin, arrangement):
     formed = bed(arrangement, rows=6, columns=6, seed=4)
     sheet = covered(formed, skin, 4)
-    # The pins of the own cell and the cells beside it: a line between two shifted rows has its neighbors
-    # in either of them.
+    # The pins of the own cell and the cells beside it: a line between two shifted rows has its
+    # neighbors in either of them.
     away = np.linalg.norm(sheet.position[:, None] - formed.position, axis=2)
     near = away <= 1.6 * formed.pitch
     lowest = np.where(near, formed.height, np.inf).min(axis=1)
@@ -284,11 +336,14 @@ def test_inside_the_bed_it_is_the_skin_of_the_exports(kind):
     instant, parts, margin = at_rest(9, 8), 4, 2
     height = rough(instant)
     shape = 8 * parts + 1 + 2 * margin, 7 * parts + 1 + 2 * margin
-    live = interpolate(make_lattice(instant, parts), height, kind)[: shape[0] * shape[1]].reshape(shape)
+    live = interpolate(make_lattice(instant, parts), height, kind)[: shape[0] * shape[1]].reshape(
+        shape
+    )
     formed = over(instant.position, height)
     exported = skins.interpolate_skin(formed, height, kind, parts, 1e-3)
     inside = live[margin:-margin, margin:-margin]
-    # The two end the slopes at the outermost pins differently, which the next pin inside feels no more.
+    # The two end the slopes at the outermost pins differently, which the next pin inside feels no
+    # more.
     cut = slice(parts, -parts)
     known = exported.reshape(inside.shape)[cut, cut]
     assert_near(inside[cut, cut], known, 1e-12)

@@ -42,7 +42,15 @@ def same(first, second):
 
 def packed_parts(state):
     held = state.active
-    arrays = (state.rows, state.modes, state.aged, held.cells, held.block, held.mode, held.quadratic_basis)
+    arrays = (
+        state.rows,
+        state.modes,
+        state.aged,
+        held.cells,
+        held.block,
+        held.mode,
+        held.quadratic_basis,
+    )
     rest = (state.period, state.peak, held.near, held.reach, held.control, held.peak, held.until)
     kept = []
     memory = flatten(state.memory, kept)
@@ -188,7 +196,9 @@ def test_pins_at_their_ends_are_taken_up_and_a_memory_of_no_number_of_the_world_
     assert set(State._fields) == {"period", "rows", "modes", "aged", "peak", "active", "memory"}
     system = system_of("hybrid")
     state = run(system, begin(system), 70)
-    state.active.block[system.rows.controlled, 1] = -1e91  # pulp of Method III: the logarithm is NaN
+    state.active.block[
+        system.rows.controlled, 1
+    ] = -1e91  # pulp of Method III: the logarithm is NaN
     with pytest.raises(StateError, match="no state can have"):
         load(system, dump(system, state))
 
@@ -231,7 +241,9 @@ class Outer(NamedTuple):
 
 
 def test_a_memory_comes_back_in_its_types_with_its_arrays():
-    memory = Outer(Color.BLUE, Inner(-math.inf, np.bool_(True)), np.array([[0.1, 2.0]]), np.int64(7))
+    memory = Outer(
+        Color.BLUE, Inner(-math.inf, np.bool_(True)), np.array([[0.1, 2.0]]), np.int64(7)
+    )
     arrays = []
     text = flatten(memory, arrays)
     back = rebuild(Outer(Color.RED, Inner(-math.inf), np.zeros((0, 2))), text, arrays)
@@ -260,6 +272,8 @@ def test_a_memory_of_another_structure_is_refused(kept_memory):
 def test_a_memory_with_a_count_that_is_none_is_refused(count):
     arrays = [np.zeros((0, 2))]
     template = Outer(Color.RED, Inner(), arrays[0])
-    assert rebuild(template, ["Outer", 1, ["Inner", 0.0, False], {"array": 0}, 3], arrays).count == 3
+    assert (
+        rebuild(template, ["Outer", 1, ["Inner", 0.0, False], {"array": 0}, 3], arrays).count == 3
+    )
     with pytest.raises(StateError, match="memory of the controller must be a Outer"):
         rebuild(template, ["Outer", 1, ["Inner", 0.0, False], {"array": 0}, count], arrays)

@@ -48,10 +48,14 @@ def test_every_sample_shape_fits_a_bed_without_clipping_and_every_mesh_is_closed
 def test_a_mesh_is_the_same_shape_in_every_format(tmp_path, kind):
     solid = trimesh.creation.icosphere(subdivisions=3, radius=10.0)
     path = tmp_path / f"Ein Körper mit Blank.{kind}"
-    unit = 1e-3 if kind == "glb" else 1.0  # a GLB is in meters, y up; an OBJ that says nothing is y up
+    unit = (
+        1e-3 if kind == "glb" else 1.0
+    )  # a GLB is in meters, y up; an OBJ that says nothing is y up
     turned = solid.vertices[:, [0, 2, 1]] * [1, 1, -1] if kind in ("glb", "obj") else solid.vertices
     if kind == "3mf":
-        mesh_writer.write([Body("ball", turned * 1e-3, solid.faces.astype(np.int32), closed=True)], path)
+        mesh_writer.write(
+            [Body("ball", turned * 1e-3, solid.faces.astype(np.int32), closed=True)], path
+        )
     else:
         trimesh.Trimesh(turned * unit, solid.faces, process=False).export(path)
     bare = read(Shape(file=str(path)))
@@ -74,8 +78,16 @@ np.save(OBJECTS, np.array([{}, {}], dtype=object), allow_pickle=True)
         ("rubbish.stl", b"rubbish" * 30, "must "),
         ("empty.obj", b"# nothing\n", "must "),
         ("points.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\n", "must "),
-        ("nan.obj", b"v 0 0 0\nv 1 nan 0\nv 0 1 0\nf 1 2 3\n", "must have vertices that are finite numbers"),
-        ("half.ply", b"ply\nformat ascii 1.0\nelement vertex 3\n", "must be a PLY file that can be read"),
+        (
+            "nan.obj",
+            b"v 0 0 0\nv 1 nan 0\nv 0 1 0\nf 1 2 3\n",
+            "must have vertices that are finite numbers",
+        ),
+        (
+            "half.ply",
+            b"ply\nformat ascii 1.0\nelement vertex 3\n",
+            "must be a PLY file that can be read",
+        ),
         ("half.glb", b"glTF\x02\0\0\0\xff\0\0\0", "must be whole"),
         ("notes.doc", b"hello", "must be a mesh, a picture or an array"),
         ("notes.txt", b"hello", "must be a grid of numbers that can be read"),

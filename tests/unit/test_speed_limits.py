@@ -46,7 +46,8 @@ GOOD = Follows(speed=0.015, losses=0, loss_share=0.0, lag=1e-3, rfd=0.1)
 
 
 @pytest.mark.parametrize(
-    "bad", [{"losses": 1}, {"loss_share": 0.01}, {"lag": 3.1e-3}, {"rfd": 0.21}, {"lag": float("inf")}]
+    "bad",
+    [{"losses": 1}, {"loss_share": 0.01}, {"lag": 3.1e-3}, {"rfd": 0.21}, {"lag": float("inf")}],
 )
 def test_each_part_of_the_criterion_can_fail_a_finger(bad):
     assert GOOD.meets(Criterion())
@@ -54,7 +55,9 @@ def test_each_part_of_the_criterion_can_fail_a_finger(bad):
 
 
 @pytest.mark.parametrize(
-    "drag, height", [(Drag(), None), (Drag(press=4e-3, height=-4e-3), 36e-3)], ids=["ridge", "as deep"]
+    "drag, height",
+    [(Drag(), None), (Drag(press=4e-3, height=-4e-3), 36e-3)],
+    ids=["ridge", "as deep"],
 )
 def test_a_drag_goes_straight_and_level_at_its_speed(drag, height):
     path, start, end = drag.path(12e-3, 40e-3)
@@ -70,7 +73,9 @@ def test_a_lift_is_as_fast_as_it_says_at_its_fastest_and_a_bed_narrower_than_the
     moments = np.linspace(start, end, 2001)
     speed = np.gradient(path.trajectory().poses(moments)[:, 2], moments)
     assert speed.max() == pytest.approx(8e-3, rel=1e-3)  # differences over 1/2000 of the way
-    with pytest.raises(ParameterError, match=r"^layout\.columns must make the bed at least as wide"):
+    with pytest.raises(
+        ParameterError, match=r"^layout\.columns must make the bed at least as wide"
+    ):
         track(device(columns=9), Drag(), 10e-3)
 
 

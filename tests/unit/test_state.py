@@ -17,7 +17,9 @@ def test_a_copy_a_row_and_the_modes_share_no_array_with_a_state_that_has_active_
     pressed = record(system, path((0, 0, 0, 41), (0.2, 0, 0, 37)), 40).last
     copy = pressed.copy()
     pairs = [(getattr(pressed, name), getattr(copy, name)) for name in ("rows", "modes", "aged")]
-    pairs += [(getattr(pressed.active, name), getattr(copy.active, name)) for name in ("block", "mode")]
+    pairs += [
+        (getattr(pressed.active, name), getattr(copy.active, name)) for name in ("block", "mode")
+    ]
     assert [np.shares_memory(*pair) for pair in pairs] == [False] * 5
     cells = pressed.active.cells
     assert cells.size
@@ -28,7 +30,8 @@ def test_a_copy_a_row_and_the_modes_share_no_array_with_a_state_that_has_active_
 
 
 @pytest.mark.parametrize(
-    "absent, rows", [(("",), 5), (("valve_lag",), 4), (("relaxation",), 2), (("valve_lag", "relaxation"), 1)]
+    "absent, rows",
+    [(("",), 5), (("valve_lag",), 4), (("relaxation",), 2), (("valve_lag", "relaxation"), 1)],
 )
 def test_a_part_that_is_left_out_owns_no_row(absent, rows):
     system = one_cell(dead_time=0.0, **dict.fromkeys(filter(None, absent)))

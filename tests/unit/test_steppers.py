@@ -20,8 +20,8 @@ COUNT = 4000
 def integrated(e, bow, slip, decay, pulp):
     """Return the load's part of the way, and the mean of max(exp(e) - 1, 0), by the midpoint rule.
 
-    Without load the way is the parabola e + slip s + 6 bow s (1 - s), whose mean lies `bow` above the
-    straight line between its ends; a load acts where exp(e) is above `pulp`.
+    Without load the way is the parabola e + slip s + 6 bow s (1 - s), whose mean lies `bow` above
+    the straight line between its ends; a load acts where exp(e) is above `pulp`.
     """
     push = mean = 0.0
     ds = 1.0 / COUNT
@@ -59,13 +59,17 @@ def test_a_cell_that_touches_by_a_rounding_error_at_the_start_meets_the_finger_t
     [(-1.0, 2.0, 1.5, 1.0), (-0.5, 2.0, 0.8, 1.4), (0.8, -2.0, 1.5, 1.0), (1.2, -2.5, 0.7, 1.3)],
 )
 def test_a_cell_that_meets_or_leaves_on_a_straight_way_is_solved_exactly(e, slip, decay, pulp):
-    # The sum's own error is of second order in its steps, of first at the one that holds the instant.
-    assert solved(e, 0.0, slip, decay, pulp) == pytest.approx(integrated(e, 0.0, slip, decay, pulp), abs=3e-6)
+    # The sum's own error is of second order in its steps, of first at the one that holds the
+    # instant.
+    assert solved(e, 0.0, slip, decay, pulp) == pytest.approx(
+        integrated(e, 0.0, slip, decay, pulp), abs=3e-6
+    )
 
 
 @pytest.mark.parametrize("share", [0.3, 0.5, 0.7])
 def test_a_bend_raises_the_way_by_its_mean_over_the_loaded_part(share):
-    # Met after 1 - share of a straight way: the parabola's mean over the rest is bow share (3 - 2 share).
+    # Met after 1 - share of a straight way: the parabola's mean over the rest is bow share (3 - 2
+    # share).
     slip, decay, bow = 0.5, 0.2, 0.005
     e = -(1.0 - share) * slip
     gained = solved(e, bow, slip, decay, 1.0)[0] - solved(e, 0.0, slip, decay, 1.0)[0]
@@ -79,8 +83,11 @@ def test_a_bend_raises_the_way_by_its_mean_over_the_loaded_part(share):
     [(-0.002, 0.015, 0.1), (-0.01, 0.02, 0.1), (0.01, -0.01, -0.05), (0.03, -0.05, -0.1)],
 )
 def test_a_bend_beyond_the_threshold_does_not_exchange_meeting_and_leaving(e, bow, slip):
-    # Of second order in the bend, which is as large as what is left of the way; exchanged it is 4e-2.
-    assert solved(e, bow, slip, 1.0, 1.0) == pytest.approx(integrated(e, bow, slip, 1.0, 1.0), abs=2e-3)
+    # Of second order in the bend, which is as large as what is left of the way; exchanged it is
+    # 4e-2.
+    assert solved(e, bow, slip, 1.0, 1.0) == pytest.approx(
+        integrated(e, bow, slip, 1.0, 1.0), abs=2e-3
+    )
 
 
 @pytest.mark.parametrize("exponent", [-9000.0, 5.0, 290.0])
@@ -153,15 +160,23 @@ def test_a_cell_thrown_off_is_given_up_and_a_finger_pushes_a_pin_no_deeper_than_
     # 1 mm deep at the end of the period: f_d b/m (e^(m x) - 1), and no contact at the start.
     _, force = put(Setter(39e-3), [[41e-3], [38e-3]], [40e-3], step=5e-3)
     assert force[0] == pytest.approx(0.34 * 250.0 / 2000.0 * np.expm1(2.0), rel=1e-9)
-    # It leaves the pins. Its way is a parabola, its mean `bow` above its chord and its middle 1.5 times that.
-    # The valves are open to the high reservoir; a bend of the way without load would take the pins far down.
-    cases = [(0.5, 0.6, 0.0, 0.5), (0.5, 0.6, -0.4, 0.8), (0.5, 1.8, -0.8, 0.8), (0.3, 1.0, -1.0, 1.3)]
+    # It leaves the pins. Its way is a parabola, its mean `bow` above its chord and its middle 1.5
+    # times that. The valves are open to the high reservoir; a bend of the way without load would
+    # take the pins far down.
+    cases = [
+        (0.5, 0.6, 0.0, 0.5),
+        (0.5, 0.6, -0.4, 0.8),
+        (0.5, 1.8, -0.8, 0.8),
+        (0.3, 1.0, -1.0, 1.3),
+    ]
     exponent, lift, bow, deepest = np.array(cases).T
     one, weights, loaded = np.ones(4), np.full((1, 4), 1e3), np.zeros(4, dtype=bool)
     cell, openings = one_cell().cell, np.ones((1, 4))
     pressure = cell.supply.pressure(openings)
     paths = exponent, 9.0 * one, bow, lift
-    start = closed_form.StepStart(cell, openings, pressure, weights, *paths, relaxed=one, idle=loaded)
+    start = closed_form.StepStart(
+        cell, openings, pressure, weights, *paths, relaxed=one, idle=loaded
+    )
     rise, _, _ = closed_form.find_loaded_path(2000.0, 1e6, 1.0, start)
     assert_allclose(rise, -deepest / 2000.0, rtol=1e-12)
 
@@ -170,7 +185,8 @@ def test_a_cell_thrown_off_is_given_up_and_a_finger_pushes_a_pin_no_deeper_than_
     "height, under, start, left",
     [
         (15e-3, 15e-3, 40e-3, 15e-3),  # pushed as far as the finger comes
-        # A hundredth of the stroke is allowed; an open valve lowers it by less than a millimeter in 5 ms.
+        # A hundredth of the stroke is allowed; an open valve lowers it by less than a millimeter in
+        # 5 ms.
         (15e-3, 20e-3, 40e-3, np.inf),
         (45e-3, 38e-3, 40e-3, np.inf),  # it rises faster than an open valve lets it
         (-30e-3, -1e-3, 5e-3, 0.0),  # pressed onto its stop
@@ -197,9 +213,13 @@ STROKE, WAY = CELL.actuator.stroke, find_speeds(CELL).rise * 5e-3
     ],
 )
 def test_richardsons_extrapolation_keeps_to_where_a_pin_can_be(coarse, fine, period, under, height):
-    reach = find_speeds(CELL).reach(np.full((1, 1), 40e-3), np.full((3, 1, 1), under), np.array([period]))
+    reach = find_speeds(CELL).reach(
+        np.full((1, 1), 40e-3), np.full((3, 1, 1), under), np.array([period])
+    )
     fines, coarses = (np.full((CELL.rows + 1, 1, 1), value) for value in (fine, coarse))
     extrapolate(CELL, fines, coarses, reach)
     assert fines[0, 0, 0] == pytest.approx(height, rel=1e-12)
-    assert (fines[CELL.pulp_rows] == max(fine + (fine - coarse) / 3.0, 0.0)).all()  # no filter pulls
+    assert (
+        fines[CELL.pulp_rows] == max(fine + (fine - coarse) / 3.0, 0.0)
+    ).all()  # no filter pulls
     assert fines[CELL.rows] == fine  # commands on their way are not extrapolated

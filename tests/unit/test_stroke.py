@@ -7,7 +7,14 @@ import numpy as np
 import pytest
 from digiclay.core.model.fingertip import LEVEL, Fingertip, make_matrices
 from digiclay.core.model.layout import Layout, make_grid
-from digiclay.press.pointer import CURVE_ITEMS, FULL_TILT, begin_button, find_lean, find_share, read_event
+from digiclay.press.pointer import (
+    CURVE_ITEMS,
+    FULL_TILT,
+    begin_button,
+    find_lean,
+    find_share,
+    read_event,
+)
 from digiclay.sessions import sculpting
 from digiclay.sessions.sculpting import drop_strokes, find_stroke, queue_stroke
 from digiclay.strokes import motion
@@ -73,7 +80,9 @@ def lead(stroke, at, chunk=4000, bed=HEIGHT, creep=0.0):
     while not stroke.done and (len(part) > 1 or len(poses) == 1) and len(poses) < 4000:
         bed = bed + creep
         if stroke.parts:
-            stroke, part = motion.follow_images(stroke, DEVICE, bed, poses[-1], chunk, PERIOD, forces)
+            stroke, part = motion.follow_images(
+                stroke, DEVICE, bed, poses[-1], chunk, PERIOD, forces
+            )
         else:
             stroke, part = motion.follow(stroke, DEVICE, bed, poses[-1][0], chunk, PERIOD)
             part = np.repeat(part[:, None], len(at), axis=1)
@@ -103,11 +112,15 @@ def test_the_finger_goes_along_the_whole_path_however_quick_the_hand(moves):
     assert np.diff(down[:, 0]).max() <= motion.DRAG * PERIOD + 1e-12
 
 
-@pytest.mark.parametrize("shown", [1, 3, 11, 20], ids=lambda count: f"{count} of 21 places drawn first")
+@pytest.mark.parametrize(
+    "shown", [1, 3, 11, 20], ids=lambda count: f"{count} of 21 places drawn first"
+)
 @pytest.mark.parametrize("chunk", [1, 7, 4000], ids=lambda count: f"{count} periods at a time")
 @pytest.mark.parametrize("fingers", [1, 2])
 @pytest.mark.parametrize("away", [0.0, 20e-3], ids=["from the axis", "apart"])
-def test_the_way_follows_from_the_path_alone_and_is_never_ahead_of_the_hand(away, fingers, chunk, shown):
+def test_the_way_follows_from_the_path_alone_and_is_never_ahead_of_the_hand(
+    away, fingers, chunk, shown
+):
     whole, at = (
         release(line(images=make_images("X", center=(-away, 0.0)))),
         waiting(fingers),
@@ -115,7 +128,8 @@ def test_the_way_follows_from_the_path_alone_and_is_never_ahead_of_the_hand(away
     part = begin(replace(whole, samples=whole.samples[:shown], held=True))
     part, first = lead(part, at, chunk)
     assert not part.done
-    # Each goes along its image no further than the hand has drawn; with one finger the second one waits.
+    # Each goes along its image no further than the hand has drawn; with one finger the second one
+    # waits.
     assert (first[:, 0, 0] + away).max() <= whole.samples[shown - 1].x + away
     assert (-first[:, -1, 0] - away).max() <= whole.samples[shown - 1].x + away
     assert fingers == 2 or part.parts[1].reached == 0
@@ -165,7 +179,9 @@ def test_one_that_waits_comes_down_although_pins_creep_up():
     assert lead(stroke, waiting(2), 1, creep=5e-9)[0].done
 
 
-@pytest.mark.parametrize("bed, lowest, end", [(HEIGHT, 36e-3, 59e-3), (HEIGHT * 0 + 1e-3, 0.0, None)])
+@pytest.mark.parametrize(
+    "bed, lowest, end", [(HEIGHT, 36e-3, 59e-3), (HEIGHT * 0 + 1e-3, 0.0, None)]
+)
 def test_a_click_presses_no_deeper_than_the_floor_and_ends_above_all_pins(bed, lowest, end):
     stroke, poses = path(release(start(1, 0.01, 0.005, 4e-3)), bed=bed)
     assert stroke.done
@@ -185,10 +201,22 @@ IMAGES = {
     "x": (make_images("X"), lambda z: [z, -z.conjugate()]),
     "y": (make_images("Y"), lambda z: [z, z.conjugate()]),
     "both": (make_images("XY"), lambda z: [z, -z.conjugate(), -z, z.conjugate()]),
-    "across the diagonal": (make_images("X", angle=-math.pi / 4), lambda z: [z, 1j * z.conjugate()]),
-    "about a line at x = 5 mm": (make_images("X", center=(5e-3, 9.0)), lambda z: [z, 10e-3 - z.conjugate()]),
-    "three turns": (make_images("RADIAL", 3), lambda z: [z * np.exp(2j * np.pi * k / 3) for k in range(3)]),
-    "a turn about (2, 1) mm": (make_images("RADIAL", 2, (2e-3, 1e-3)), lambda z: [z, 4e-3 + 2e-3j - z]),
+    "across the diagonal": (
+        make_images("X", angle=-math.pi / 4),
+        lambda z: [z, 1j * z.conjugate()],
+    ),
+    "about a line at x = 5 mm": (
+        make_images("X", center=(5e-3, 9.0)),
+        lambda z: [z, 10e-3 - z.conjugate()],
+    ),
+    "three turns": (
+        make_images("RADIAL", 3),
+        lambda z: [z * np.exp(2j * np.pi * k / 3) for k in range(3)],
+    ),
+    "a turn about (2, 1) mm": (
+        make_images("RADIAL", 2, (2e-3, 1e-3)),
+        lambda z: [z, 4e-3 + 2e-3j - z],
+    ),
 }
 
 
@@ -207,7 +235,9 @@ def test_the_finger_goes_along_the_path_and_along_each_of_its_images(name):
 
 
 def test_a_finger_slows_down_above_the_highest_pin_below_it():
-    beside = np.where(CELLS.x > 5e-3, 0.050, 0.040)  # 1 mm beyond where the surface below the finger counts
+    beside = np.where(
+        CELLS.x > 5e-3, 0.050, 0.040
+    )  # 1 mm beyond where the surface below the finger counts
     _, poses = path(release(start(1, 0.0, 0.0, 4e-3)), bed=beside)
     z = poses[:, 2]
     cells = np.hypot(CELLS.x, CELLS.y) < 8e-3
@@ -215,7 +245,9 @@ def test_a_finger_slows_down_above_the_highest_pin_below_it():
     touch = float((beside[cells] - gap).max())
     down = -np.diff(z) / PERIOD
     assert motion.APPROACH < down.max() <= motion.DESCEND * (1.0 + 1e-6)
-    assert down[z[:-1] <= touch + motion.CLEARANCE].max() == pytest.approx(motion.APPROACH, rel=1e-6)
+    assert down[z[:-1] <= touch + motion.CLEARANCE].max() == pytest.approx(
+        motion.APPROACH, rel=1e-6
+    )
     assert down[z[:-1] <= touch + 1e-9].max() <= motion.PRESS + 1e-9
 
 
@@ -291,7 +323,9 @@ def test_a_pen_that_is_jerked_turns_the_finger_no_faster_than_a_hand_to_its_aim(
 @pytest.mark.parametrize("name", ["none", "both", "three turns"])
 def test_the_finger_leans_with_the_pen_on_each_image_and_ends_as_it_began(name):
     images = IMAGES[name][0]
-    stroke, poses = path(release(line(images=images, lean=(0.4, 0.2))), np.array([*AT[:3], *TWISTED]))
+    stroke, poses = path(
+        release(line(images=images, lean=(0.4, 0.2))), np.array([*AT[:3], *TWISTED])
+    )
     assert stroke.done
     assert_array_equal(poses[-1, 3:], TWISTED)
     down = pressed(poses)
@@ -396,9 +430,12 @@ def is_up(begins, *events):
     return found
 
 
-@pytest.mark.parametrize("kind", ["TIMER", "TIMER_REPORT", "TIMER_JOBS", "MOUSEMOVE", "INBETWEEN_MOUSEMOVE"])
+@pytest.mark.parametrize(
+    "kind", ["TIMER", "TIMER_REPORT", "TIMER_JOBS", "MOUSEMOVE", "INBETWEEN_MOUSEMOVE"]
+)
 def test_the_release_of_the_stroke_before_is_not_that_of_this_one(kind):
-    # Timers of Blender, such as that of a message in the status bar, and copied moves name it all along.
+    # Timers of Blender, such as that of a message in the status bar, and copied moves name it all
+    # along.
     copied = [(kind, UP), ("TIMER", UP)] * 3
     assert not any(is_up(("PRESS", UP), *copied))
 
@@ -428,7 +465,8 @@ STROKES = {
         ("TIMER", HOME),
         ("MOUSEMOVE", UP),
     ),
-    # A drag is a move: it names the press itself, and a move copied from Blender's record what was before.
+    # A drag is a move: it names the press itself, and a move copied from Blender's record what was
+    # before.
     "a stroke begun by a drag learns from a timer what was before": (
         ("CLICK_DRAG", DOWN),
         ("MOUSEMOVE", UP),
@@ -448,4 +486,6 @@ LEFT_PRESSED = ("leave it pressed", "what was before")
 @pytest.mark.parametrize("words", STROKES)
 def test_a_release_is_told_by_what_later_events_name(words):
     begins, *events = STROKES[words]
-    assert is_up(begins, *events) == [False] * (len(events) - 1) + [not words.endswith(LEFT_PRESSED)]
+    assert is_up(begins, *events) == [False] * (len(events) - 1) + [
+        not words.endswith(LEFT_PRESSED)
+    ]

@@ -16,7 +16,17 @@ from tests.scene_files import SCENE, command, read_text, rows, timeless, write_t
 pytest.importorskip("SALib", reason="digiclay[study] is not installed")
 
 GAINS = command("--vary control.position_gain=100:1000:log --vary control.force_gain=1:10")
-STUDY = ["study", "my.toml", *GAINS, "--samples", "8", "--workers", "1", "--metric", "rfd,lag,max_cell_force"]
+STUDY = [
+    "study",
+    "my.toml",
+    *GAINS,
+    "--samples",
+    "8",
+    "--workers",
+    "1",
+    "--metric",
+    "rfd,lag,max_cell_force",
+]
 QUIET = [*STUDY, "--quiet", "--out", "out"]
 
 
@@ -39,7 +49,9 @@ def files(folder):
     }
 
 
-def test_a_study_leaves_tables_a_page_and_a_plot_and_every_point_is_the_run_with_its_settings(whole):
+def test_a_study_leaves_tables_a_page_and_a_plot_and_every_point_is_the_run_with_its_settings(
+    whole,
+):
     left = {path.name for path in whole.iterdir() if not path.name.startswith(".")}
     assert left == {"indices.csv", "indices.png", "points", "points.csv", "study.json", "study.md"}
     # Two parameters of first and total order, and a pair; a press in the middle has no lag.
@@ -75,7 +87,10 @@ KEYS = (("control.position_gain", "1/m"), ("control.force_gain", "1/N"))
 
 def test_the_command_of_the_page_runs_points_that_are_missing_and_all_is_as_before(whole, here):
     shutil.copytree(whole, here / "again")
-    for path in [*sorted((here / "again" / "points").iterdir())[3::4], here / "again" / "indices.csv"]:
+    for path in [
+        *sorted((here / "again" / "points").iterdir())[3::4],
+        here / "again" / "indices.csv",
+    ]:
         path.unlink()
     page = read_text(whole / "study.md")
     command = next(line for line in page.splitlines() if line.startswith("    digiclay study"))
@@ -85,7 +100,9 @@ def test_the_command_of_the_page_runs_points_that_are_missing_and_all_is_as_befo
 
 def test_runs_that_fail_are_counted_and_leave_no_hole_in_the_indices(here):
     # A bed of 3 x 4 has no room for a recording of a million seconds.
-    durations = command("--vary simulation.duration=0.08,0.1,1e6 --vary control.position_gain=100:1000")
+    durations = command(
+        "--vary simulation.duration=0.08,0.1,1e6 --vary control.position_gain=100:1000"
+    )
     options = "--samples 4 --workers 1 --metric rfd --quiet --out out"
     assert main(["study", "my.toml", *durations, *options.split()]) == 0
     found = rows(here / "out" / "points.csv")
@@ -96,7 +113,9 @@ def test_runs_that_fail_are_counted_and_leave_no_hole_in_the_indices(here):
 
 
 @pytest.mark.parametrize("fingers, batches", [(1, True), (2, False)])
-def test_the_time_a_study_takes_is_less_in_batches_where_there_are_some(fingers, batches, here, capsys):
+def test_the_time_a_study_takes_is_less_in_batches_where_there_are_some(
+    fingers, batches, here, capsys
+):
     bed, _, path = SCENE.partition("[trajectory]")
     fingers_of = "".join(f"[[finger]]\n[finger.trajectory]{path}" for _ in range(fingers))
     write_text(here / "my.toml", bed + fingers_of)
@@ -127,10 +146,19 @@ def test_other_outputs_can_be_had_of_a_finished_study_and_one_that_no_run_has_is
         (f"--samples {'9' * 99}", "digiclay study: argument --samples: must be a power of two"),
         ("--samples 4096", "--samples must come to 10000 points at most (got 16384 points)."),
         ("--seed 0", "digiclay study: argument --seed: must be a whole number from 1 to"),
-        ("--vary control.force_gain=1:2", "--vary control.force_gain must be given once (got 2 times)."),
+        (
+            "--vary control.force_gain=1:2",
+            "--vary control.force_gain must be given once (got 2 times).",
+        ),
         ("--metric rdf", "--metric must be a known metric (got 'rdf')."),
-        ("--set recorder=absent", "Metrics need a recorder, and the scene has recorder = 'absent'."),
-        ("--set simulation.duration=1e6", "The unchanged scene fails: recorder.every must be at least"),
+        (
+            "--set recorder=absent",
+            "Metrics need a recorder, and the scene has recorder = 'absent'.",
+        ),
+        (
+            "--set simulation.duration=1e6",
+            "The unchanged scene fails: recorder.every must be at least",
+        ),
         ("", "A study needs at least two --vary"),
         ("--method no", "--method: control.method must be one of"),
     ],
@@ -150,12 +178,17 @@ def test_a_folder_of_another_study_is_refused(whole, here, refused):
         (["--second", "--set", "layout.pitch=2.9 mm"], "with another scene"),
         ([], "orders first, second"),
     ):
-        refused([*QUIET, *change], f"out holds another study ({said}): choose another folder with --out.\n")
+        refused(
+            [*QUIET, *change],
+            f"out holds another study ({said}): choose another folder with --out.\n",
+        )
     assert files(here / "out") == before
 
 
 @pytest.mark.parametrize("command, library", [("study", "SALib"), ("tune", "optuna")])
-def test_a_missing_library_is_told_with_the_extra_that_has_it(command, library, monkeypatch, refused):
+def test_a_missing_library_is_told_with_the_extra_that_has_it(
+    command, library, monkeypatch, refused
+):
     monkeypatch.setitem(sys.modules, library, None)  # as Python marks what cannot be imported
     said = f"digiclay {command} needs {library}: run 'pip install digiclay[study]'.\n"
     refused([command, "my.toml", *GAINS, "--out", "out"], said)
@@ -197,14 +230,26 @@ def test_a_parameter_is_given_once_with_the_values_it_can_have():
     [
         ("a.b", "--vary must be KEY=LOW:HIGH, KEY=LOW:HIGH:log or KEY=A,B,C (got 'a.b')."),
         ("a.b=3", "--vary a.b must be LOW:HIGH, LOW:HIGH:log or at least two different values A,B"),
-        ("a.b=1:2:5", "--vary a.b must be LOW:HIGH or LOW:HIGH:log, without a count (got '1:2:5')."),
+        (
+            "a.b=1:2:5",
+            "--vary a.b must be LOW:HIGH or LOW:HIGH:log, without a count (got '1:2:5').",
+        ),
         ("a.b=2:1", "--vary a.b must have LOW below HIGH (got '2:1')."),
-        ("a.b=2:2", "--vary a.b must have two different finite numbers at LOW and HIGH (got '2:2')."),
+        (
+            "a.b=2:2",
+            "--vary a.b must have two different finite numbers at LOW and HIGH (got '2:2').",
+        ),
         ("control.force_gian=1:2", "--vary: control.force_gian must be a known key (got 1.0)."),
         ("control=1:2", "--vary: control must be"),
         ("control.force_gain=-1:2", "--vary control.force_gain must be at least 0 1/N (got -1)."),
-        ("control.force_gain=1:1e12", "--vary control.force_gain must be at most 1e+09 1/N (got 1e+12)."),
-        ("layout.rows=11:12.5", "--vary layout.rows must have whole numbers at LOW and HIGH (got 12.5)."),
+        (
+            "control.force_gain=1:1e12",
+            "--vary control.force_gain must be at most 1e+09 1/N (got 1e+12).",
+        ),
+        (
+            "layout.rows=11:12.5",
+            "--vary layout.rows must have whole numbers at LOW and HIGH (got 12.5).",
+        ),
         ("layout.pitch=2 N:3 N", "--vary layout.pitch must be in m or a multiple of it (got 2 N)."),
         ("blister.profile=1:2", "--vary blister.profile must"),
         ("blister.profile=cone,con", "--vary: blister.profile must be one of"),

@@ -53,7 +53,9 @@ def league(tmp_path_factory):
 
 def test_the_folder_holds_plots_and_tables_with_a_row_a_trial_that_differs_by_seed(league):
     files = {path.name for path in league.iterdir() if not path.name.startswith(".")}
-    wanted = "index.html league.csv trajectories.csv results.csv rfd.svg measures.svg suite.json points"
+    wanted = (
+        "index.html league.csv trajectories.csv results.csv rfd.svg measures.svg suite.json points"
+    )
     assert files == set(wanted.split())
     _, rows = read_table(league / "results.csv")
     assert [(row["method"], row["trajectory"], row["seed"]) for row in rows] == [
@@ -63,7 +65,9 @@ def test_the_folder_holds_plots_and_tables_with_a_row_a_trial_that_differs_by_se
     assert len({row["rfd (N)"] for row in rows}) == 4
     # Errors are estimated with the first seed; the league has the largest.
     assert [row["height_error (m)"] != "" for row in rows] == [True, False] * 2
-    errors = {row["method"]: float(row["height_error (m)"]) for row in rows if row["height_error (m)"]}
+    errors = {
+        row["method"]: float(row["height_error (m)"]) for row in rows if row["height_error (m)"]
+    }
     # The league holds means and Student's intervals of the results.
     _, ranks = read_table(league / "league.csv")
     assert [row["rank"] for row in ranks] == ["1", "2"]
@@ -76,18 +80,21 @@ def test_the_folder_holds_plots_and_tables_with_a_row_a_trial_that_differs_by_se
         assert float(row["rfd, half width (N)"]) == pytest.approx(half)
 
 
-def test_tables_and_page_name_their_origin_and_no_other_suite_goes_there(league, refused, monkeypatch):
+def test_tables_and_page_name_their_origin_and_no_other_suite_goes_there(
+    league, refused, monkeypatch
+):
     identity = json.loads(read_text(league / "suite.json"))["scenes"]
     comments, _ = read_table(league / "league.csv")
     page = read_text(league / "index.html")
     command = "digiclay compare my.toml --suite --methods virtual_master,hybrid"
     for text in ("\n".join(comments), page):
-        assert [word for word in (identity, command, "seeds 1 to 2", "noise 2 mN") if word not in text] == []
+        assert [
+            word for word in (identity, command, "seeds 1 to 2", "noise 2 mN") if word not in text
+        ] == []
     assert 'src="rfd.svg"' in page
     monkeypatch.chdir(league.parent)
-    said = (
-        f"league holds another suite (4 trials, digiclay {__version__}): choose another folder with --out.\n"
-    )
+    said = f"league holds another suite (4 trials, digiclay {__version__}): "
+    said += "choose another folder with --out.\n"
     refused([*SHORT, "--methods", "hybrid", "--out", "league", "--quiet"], said)
 
 
@@ -141,7 +148,9 @@ def test_an_interval_is_student_s_and_one_value_has_none():
     assert find_interval([None, math.inf]) is None
 
 
-@pytest.mark.parametrize("value, shown", [(1652.4, "1650"), (390.1, "390"), (0.0186, "0.0186"), (32.0, "32")])
+@pytest.mark.parametrize(
+    "value, shown", [(1652.4, "1650"), (390.1, "390"), (0.0186, "0.0186"), (32.0, "32")]
+)
 def test_a_cost_above_a_millisecond_has_no_exponent(value, shown):
     assert show_digits(value) == shown
 
@@ -170,19 +179,29 @@ def test_the_league_counts_worse_trajectories_and_random_drags_as_one():
 def test_every_trajectory_can_be_placed_and_judged_and_random_drags_follow_their_seed():
     scene = resolve({"control": {"method": "virtual_master"}})
     names = list_trajectories(GROUPS, 3)
-    assert [name for name in names if name.startswith(RANDOM)] == ["random-1", "random-2", "random-3"]
+    assert [name for name in names if name.startswith(RANDOM)] == [
+        "random-1",
+        "random-2",
+        "random-3",
+    ]
     placed = {name: place_trial(scene, name)[0] for name in names}
     assert all(one.recorder for name, one in placed.items() if "limit" not in name)
     assert draw_drags(2) == draw_drags(3)[:2]
     assert set(list_paths()) < set(GROUPS)
-    # The fingertip leaves the bed at the end of every path, so that pins come to their final heights.
+    # The fingertip leaves the bed at the end of every path, so that pins come to their final
+    # heights.
     for name in ("ridge-15", "dead-stop", "random-1"):
         assert placed[name].trajectories()[0].poses(np.array([1e3]))[0, 2] > 75e-3
 
 
 @pytest.mark.parametrize(
     "name, fingers, nearest",
-    [("two-hands", 2, 24e-3), ("pinch", 2, 12e-3), ("crossing", 2, 11e-3), ("five-fingers", 5, 18.5e-3)],
+    [
+        ("two-hands", 2, 24e-3),
+        ("pinch", 2, 12e-3),
+        ("crossing", 2, 11e-3),
+        ("five-fingers", 5, 18.5e-3),
+    ],
 )
 def test_fingers_of_a_trajectory_come_as_near_as_it_says(name, fingers, nearest):
     placed, _ = place_trial(resolve({}), name)
@@ -194,7 +213,9 @@ def test_fingers_of_a_trajectory_come_as_near_as_it_says(name, fingers, nearest)
 
 
 def test_a_trial_of_several_fingers_is_judged_by_the_worst():
-    scene = resolve({"layout": {"rows": 15, "columns": 25}, "control": {"method": "virtual_master"}})
+    scene = resolve(
+        {"layout": {"rows": 15, "columns": 25}, "control": {"method": "virtual_master"}}
+    )
     placed, measure = place_trial(scene, "two-hands")
     short = replace(placed, simulation=replace(placed.simulation, duration=4.0))
     both = measure(short, None)["figures"]
@@ -225,7 +246,9 @@ def test_a_phase_is_judged_alone_and_a_method_that_counts_nothing_itself_loses_t
 
 
 def test_a_relief_of_two_fingers_is_that_of_both_and_an_error_under_either_is_found():
-    scene = resolve({"layout": {"rows": 25, "columns": 25}, "control": {"method": "virtual_master"}})
+    scene = resolve(
+        {"layout": {"rows": 25, "columns": 25}, "control": {"method": "virtual_master"}}
+    )
     rest, place = scene.actuator.rest_height, assemble(scene).grid.positions
     tips = np.zeros((61, 2, 7))
     tips[:, :, 0] = np.linspace(-30e-3, 30e-3, 61)[:, None]
@@ -251,6 +274,8 @@ def test_a_relief_of_two_fingers_is_that_of_both_and_an_error_under_either_is_fo
 def test_the_losses_of_two_fingers_are_counted_of_each():
     placed, _ = placed_lift("elastic")
     (finger,) = placed.fingers
-    moved = tuple(replace(one, position=(10e-3, *one.position[1:])) for one in finger.trajectory.waypoints)
+    moved = tuple(
+        replace(one, position=(10e-3, *one.position[1:])) for one in finger.trajectory.waypoints
+    )
     other = replace(finger, trajectory=replace(finger.trajectory, waypoints=moved))
     assert measure_trial(replace(placed, fingers=(finger, other)))["figures"]["losses"] == 2.0

@@ -72,7 +72,10 @@ def measure(*given):
         # 0.43 - 0.4 loses two digits.
         "a constant offset": (np.full(2001, 0.43), pytest.approx(0.03, rel=1e-10)),
         # The trapezium rule is exact for sin² over whole periods.
-        "a sine": (0.4 + 0.1 * np.sin(2.0 * np.pi * TIME), pytest.approx(0.1 / np.sqrt(2.0), rel=ROUNDING)),
+        "a sine": (
+            0.4 + 0.1 * np.sin(2.0 * np.pi * TIME),
+            pytest.approx(0.1 / np.sqrt(2.0), rel=ROUNDING),
+        ),
         "the time without contact is left out": (
             np.where((TIME > 2.0) & (TIME < 6.0), 0.43, 0.0),
             pytest.approx(0.03, rel=1e-10),
@@ -84,16 +87,21 @@ def test_the_rfd_is_the_rms_deviation_in_contact(total, wanted):
 
 
 def test_the_rfd_weighs_rows_by_their_time_and_by_session_and_shaping():
-    # A force of 0.5 for 1 s in 101 rows and of 0.4 for 9 s in 10: rows counted alike would give 0.095.
+    # A force of 0.5 for 1 s in 101 rows and of 0.4 for 9 s in 10: rows counted alike would give
+    # 0.095.
     time = np.concatenate([np.linspace(0.0, 1.0, 101), np.arange(2.0, 11.0)])
     total = np.where(time <= 1.0, 0.5, 0.4)
     # The row at 1 s stands for half a second after it as well: 1.5 s in all.
     assert compute_rfd(time, total, 0.4) == pytest.approx(0.1 * np.sqrt(1.5 / 10.0), rel=1e-9)
     uneven = np.array([0.0, 0.1, 0.5, 2.0, 2.5])
     assert compute_weights(uneven).sum() == pytest.approx(2.5, rel=ROUNDING)
-    # 4 s of 0 and 6 s of 0.4; the trapezium rule smears each of the two jumps over half a row of 2001.
+    # 4 s of 0 and 6 s of 0.4; the trapezium rule smears each of the two jumps over half a row of
+    # 2001.
     found = measure(np.where((TIME > 2.0) & (TIME < 6.0), 0.0, 0.4))
-    assert (found["rfd"], found["rfd_session"]) == (0.0, pytest.approx(0.4 * np.sqrt(0.4), rel=1e-3))
+    assert (found["rfd"], found["rfd_session"]) == (
+        0.0,
+        pytest.approx(0.4 * np.sqrt(0.4), rel=1e-3),
+    )
     case = history(np.where(TIME < 5.0, 0.2, 0.4))
     case["mode"][TIME < 5.0] = Mode.SPRING  # touching down is no shaping
     found = compute_metrics(case, WHOLE)
@@ -143,8 +151,15 @@ def test_shaping_wants_contact_and_a_follower_and_a_loss_is_a_gap_between_two_co
     # 1 s of 5; the gap is 199 rows of 5 ms, and the ends of the window 2 half rows more.
     assert compute_contact_loss_share(TIME, 0.4 * touching) == pytest.approx(0.2, abs=2e-3)
     # A row a second: one between two others stands for 1 s, the first and the last for half of it.
-    for force, share in (([1, 0, 0, 1], 2 / 3), ([0, 1, 0, 1, 1], 2 / 7), ([0, 1, 1, 0], 0.0), ([1], 0.0)):
-        assert compute_contact_loss_share(range(len(force)), force) == pytest.approx(share, rel=ROUNDING)
+    for force, share in (
+        ([1, 0, 0, 1], 2 / 3),
+        ([0, 1, 0, 1, 1], 2 / 7),
+        ([0, 1, 1, 0], 0.0),
+        ([1], 0.0),
+    ):
+        assert compute_contact_loss_share(range(len(force)), force) == pytest.approx(
+            share, rel=ROUNDING
+        )
 
 
 #: 9 pins of 9 mm² raised by 3 and 1 mm and sunk by 1 mm; differences of heights lose three digits.
@@ -199,9 +214,11 @@ def test_the_first_touch_overshoots_by_its_peak_and_settles_within_a_tenth_of_th
     total = np.where(TIME < 1.0, 0.0, 0.4 + 0.1 * np.exp(-(TIME - 1.0)))
     found = measure(total)
     assert found["force_overshoot"] == pytest.approx(0.25, rel=1e-6)
-    # 0.1 exp(-t) falls below 0.04 at ln 2.5 = 0.916 s; a row is 5 ms, and the row before counts as well.
+    # 0.1 exp(-t) falls below 0.04 at ln 2.5 = 0.916 s; a row is 5 ms, and the row before counts as
+    # well.
     assert found["settling_time"] == pytest.approx(np.log(2.5), abs=0.011)
-    # Asked of each cell, of which none follows before 2 s; a quarter too much then, falling as above.
+    # Asked of each cell, of which none follows before 2 s; a quarter too much then, falling as
+    # above.
     case = history(np.where(TIME < 1.0, 0.0, 0.36 * (1.0 + 0.25 * np.exp(-(TIME - 2.0)))))
     case["mode"][TIME < 2.0] = Mode.SPRING
     found = compute_metrics(case, EACH)
@@ -217,22 +234,32 @@ def test_the_summary_is_json_and_has_every_key_at_extremes_as_well():
     one = measure(np.array([0.5]), np.array([0.0]))
     assert (one["rfd"], one["duration"]) == (pytest.approx(0.1, rel=1e-10), 0.0)
     # A single pin has no area to form a volume over.
-    single = {name: value[:, :1] if value.shape[1:] == (9,) else value for name, value in case.items()}
+    single = {
+        name: value[:, :1] if value.shape[1:] == (9,) else value for name, value in case.items()
+    }
     assert compute_metrics({**single, "position": np.zeros((1, 2))}, WHOLE)["raised_volume"] is None
     # Forces that give a lag beyond all numbers give none and no warning.
-    far = {**history(np.full(2001, 1e-300)), "force": case["force"], "position": case["position"] + 1.0}
+    far = {
+        **history(np.full(2001, 1e-300)),
+        "force": case["force"],
+        "position": case["position"] + 1.0,
+    }
     assert compute_metrics(far, WHOLE)["lag_max"] is None
     case["height"][-1, 0] = np.nan
     assert compute_metrics(case, WHOLE)["height_range"] is None
     nothing = {name: value if name == "position" else value[:0] for name, value in case.items()}
-    with pytest.raises(ParameterError, match=r"^History\.time must have at least one row \(got none\)\.$"):
+    with pytest.raises(
+        ParameterError, match=r"^History\.time must have at least one row \(got none\)\.$"
+    ):
         compute_metrics(nothing, WHOLE)
 
 
 FINE = np.linspace(0.0, 10.0, 10001)
 #: A second-order step response with damping 0.5 and 1 rad/s.
 DAMPED = np.sqrt(0.75)
-RESPONSE = 1.0 - np.exp(-0.5 * FINE) * (np.cos(DAMPED * FINE) + 0.5 / DAMPED * np.sin(DAMPED * FINE))
+RESPONSE = 1.0 - np.exp(-0.5 * FINE) * (
+    np.cos(DAMPED * FINE) + 0.5 / DAMPED * np.sin(DAMPED * FINE)
+)
 #: exp(-π ζ / √(1-ζ²)); the peak is flat, a row of 1 ms misses it by 1e-7.
 OVERSHOOT = pytest.approx(np.exp(-np.pi * 0.5 / DAMPED), abs=1e-6)
 
@@ -254,7 +281,13 @@ def test_the_overshoot_is_known(values, target, wanted):
 @table(
     "time, values, target, band, wanted",
     {
-        "an exponential": (FINE, 1.0 - np.exp(-FINE), 1.0, 0.05, pytest.approx(np.log(20.0), abs=1e-3)),
+        "an exponential": (
+            FINE,
+            1.0 - np.exp(-FINE),
+            1.0,
+            0.05,
+            pytest.approx(np.log(20.0), abs=1e-3),
+        ),
         "a signal that leaves its band again": (
             FINE,
             np.where((FINE > 4.0) & (FINE < 5.0), 1.2, 1.0),
@@ -274,7 +307,9 @@ def test_the_settling_time_is_known(time, values, target, band, wanted):
 def test_a_sine_has_its_amplitude_and_frequency_and_mean_and_deviation_are_weighted():
     assert measure_amplitude(3.0 + 0.2 * np.sin(8.0 * FINE)) == pytest.approx(0.2, rel=1e-4)
     # Ten rises; each is found to a row of 1 ms.
-    assert measure_frequency(FINE, np.sin(2.0 * np.pi * 1.3 * FINE + 0.3)) == pytest.approx(1.3, rel=1e-3)
+    assert measure_frequency(FINE, np.sin(2.0 * np.pi * 1.3 * FINE + 0.3)) == pytest.approx(
+        1.3, rel=1e-3
+    )
     assert measure_frequency(FINE, FINE) is None
     # A value for 3 s and another, 4 higher, for 1 s: mean 1, variance (3·1 + 1·9)/4.
     values, weight, nothing = np.array([0.0, 4.0]), np.array([3.0, 1.0]), np.empty(0)
@@ -368,7 +403,8 @@ def test_a_ridge_has_its_height_over_the_path_at_each_pin():
     assert_allclose(errors(np.full(21, 51.5e-3)), 1.5, rtol=1e-12)
     climbing = TIP.copy()
     climbing[:, 2] += 0.1 * np.linspace(-30e-3, 30e-3, 201)
-    # The finger is nearest for 3 mm of its way and 1.5 mm past the pin when it was so last: 0.15 mm higher.
+    # The finger is nearest for 3 mm of its way and 1.5 mm past the pin when it was so last: 0.15 mm
+    # higher.
     assert_allclose(errors(50e-3 + 0.1 * LINE, tip=climbing), -0.15, atol=0.031)
     # 2001 rows are looked at in eight parts alike.
     fine = np.repeat(TIP, 10, axis=0)
@@ -389,7 +425,8 @@ def test_pins_the_finger_did_not_go_on_from_no_travel_no_rows_and_what_follows_a
     rows = ALL.copy()
     rows[100:140] = False
     counted = measure_ridge_errors(PLACE, np.arange(21.0), TIP, rows, 11e-3) + 50e-3
-    # Of pins 0 to 10, passed before, 11 mm of way must follow before the middle: up to pin 6, at -12 mm.
+    # Of pins 0 to 10, passed before, 11 mm of way must follow before the middle: up to pin 6, at
+    # -12 mm.
     assert [int(pin) for pin in np.rint(counted) if pin < 10] == list(range(7))
 
 
@@ -405,13 +442,16 @@ HISTORY = {
 
 def test_the_surface_counts_cells_by_force_and_the_lag_is_that_of_their_centroid():
     # 0.3 N at 51 mm and 0.1 N at 53 mm: 51.5 mm, over a finger at 50 mm.
-    assert measure_surface_under(sum_cells(HISTORY), TIP[:2]) * 1e3 == pytest.approx([1.5], rel=1e-9)
+    assert measure_surface_under(sum_cells(HISTORY), TIP[:2]) * 1e3 == pytest.approx(
+        [1.5], rel=1e-9
+    )
     nothing = {**HISTORY, "force": np.zeros((2, 2)), "total_force": np.zeros(2)}
     assert measure_surface_under(sum_cells(nothing), TIP[:2]).size == 0
     place = np.array([[0.0, 0.0], [0.004, 0.0]])
     fingertip = np.tile([0.001, 0.004, 0.05, 1.0, 0.0, 0.0, 0.0], (3, 1))
     force = np.array([[0.1, 0.3], [0.0, 0.0], [0.4, 0.0]])
-    # Centroids (3, 0) and (0, 0) mm from (1, 4) mm: √(4+16) and √(1+16); the row without force is left out.
+    # Centroids (3, 0) and (0, 0) mm from (1, 4) mm: √(4+16) and √(1+16); the row without force is
+    # left out.
     case = {"position": place, "force": force, "total_force": force.sum(axis=1)}
     sums = sum_cells({**case, "height": np.zeros_like(force), "mode": np.zeros_like(force)})
     assert_allclose(measure_lag(sums, fingertip), np.sqrt([20.0, 17.0]) * 1e-3, rtol=ROUNDING)
@@ -435,14 +475,26 @@ def of_two(places, force, own):
     "places, force, own, lags",
     [
         ((-6e-3, 6e-3), {0: 0.3, 4: 0.1}, (0.3, 0.1), (0.0, 0.0)),  # apart
-        ((-3e-3, 3e-3), {1: 0.2, 2: 0.2, 3: 0.2}, (0.3, 0.3), (1.5e-3, 1.5e-3)),  # the middle pin is of both
+        (
+            (-3e-3, 3e-3),
+            {1: 0.2, 2: 0.2, 3: 0.2},
+            (0.3, 0.3),
+            (1.5e-3, 1.5e-3),
+        ),  # the middle pin is of both
         ((0.0, 0.0), {2: 0.6}, (0.4, 0.2), (0.0, 0.0)),  # in one place
-        ((3e-3, 4e-3), {3: 0.3}, (0.2, 0.1), (0.0, 1e-3)),  # all that one presses is nearer to the other
+        (
+            (3e-3, 4e-3),
+            {3: 0.3},
+            (0.2, 0.1),
+            (0.0, 1e-3),
+        ),  # all that one presses is nearer to the other
         ((3e-3, 4e-3), {3: 0.3}, (0.3, 0.0), (0.0, None)),  # and it presses nothing
         ((-6e-3, 6e-3), {}, (0.0, 0.0), (None, None)),  # none does
     ],
 )
-def test_a_pin_counts_for_the_nearest_of_two_fingers_whose_forces_stay_as_they_are(places, force, own, lags):
+def test_a_pin_counts_for_the_nearest_of_two_fingers_whose_forces_stay_as_they_are(
+    places, force, own, lags
+):
     for mirror in (1, -1):
         given = of_two(places, force, own)
         given["fingertip"][:, :, 0] *= mirror
@@ -450,7 +502,9 @@ def test_a_pin_counts_for_the_nearest_of_two_fingers_whose_forces_stay_as_they_a
         each = [compute_metrics(one, None) for one in split_fingers(given)]
         # Rounding.
         assert [one["max_total_force"] for one in each] == pytest.approx(own, abs=1e-15)
-        assert [one["lag_mean"] for one in each] == [lag and pytest.approx(lag, abs=1e-12) for lag in lags]
+        assert [one["lag_mean"] for one in each] == [
+            lag and pytest.approx(lag, abs=1e-12) for lag in lags
+        ]
 
 
 def test_of_two_fingers_the_lower_one_presses_a_pin_between_them_that_stands_low():

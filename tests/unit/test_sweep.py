@@ -64,11 +64,17 @@ def test_what_varies_is_read_from_a_line(said, words):
 @pytest.mark.parametrize(
     "said, message",
     [
-        ("a.b", " must be KEY=START:STOP:COUNT, KEY=START:STOP:COUNT:log or KEY=A,B,C (got 'a.b')."),
+        (
+            "a.b",
+            " must be KEY=START:STOP:COUNT, KEY=START:STOP:COUNT:log or KEY=A,B,C (got 'a.b').",
+        ),
         ("a.b=1:2", " a.b must be START:STOP:COUNT or START:STOP:COUNT:log (got '1:2')."),
         ("a.b=1:x:3", " a.b must have a number at START and STOP (got '1:x:3')."),
         ("a.b=1:2:1", " a.b must have a whole number from 2 to 10000 at COUNT (got '1:2:1')."),
-        ("a.b=0:2:3:log", " a.b must have numbers above 0 at START and STOP for a logarithmic scale"),
+        (
+            "a.b=0:2:3:log",
+            " a.b must have numbers above 0 at START and STOP for a logarithmic scale",
+        ),
         ("a.b=1:inf:3", " a.b must have two different finite numbers at START and STOP"),
         ("a.b=1 mm:2 m:3", " a.b must have the same unit at START and STOP (got '1 mm:2 m:3')."),
         ("a.b=1,,2", " a.b must have a value between commas (got '1,,2')."),
@@ -83,20 +89,41 @@ def test_what_cannot_vary_is_told_with_key_rule_and_value(said, message):
 @pytest.mark.parametrize(
     "words, message",
     [
-        ("--vary control.force_gian=1,2", "--vary: control.force_gian must be a known key (got 1)."),
-        ("--vary control.force_gain=-1,2", "--vary: control.force_gain must be at least 0 1/N (got -1"),
+        (
+            "--vary control.force_gian=1,2",
+            "--vary: control.force_gian must be a known key (got 1).",
+        ),
+        (
+            "--vary control.force_gain=-1,2",
+            "--vary: control.force_gain must be at least 0 1/N (got -1",
+        ),
         ("--vary layout.rows=11,11.5", "--vary: layout.rows must be a whole number (got 11.5)."),
         ("--vary seed=1:2:6000 --vary b=1,2", "--vary must come to 10000 points at most"),
         ("--vary layout.rows=11,13 --vary layout.rows=15", "--vary layout.rows must be given once"),
-        ("--vary layout.rows=11,13 --set layout.rows=15", "--vary layout.rows must not be given to"),
-        ("--vary layout.rows=11,13 --metric rdf", "--metric must be a known metric (got 'rdf'). Did"),
-        ("--vary control.method=a --method a", "--vary control.method must not be given to --method"),
+        (
+            "--vary layout.rows=11,13 --set layout.rows=15",
+            "--vary layout.rows must not be given to",
+        ),
+        (
+            "--vary layout.rows=11,13 --metric rdf",
+            "--metric must be a known metric (got 'rdf'). Did",
+        ),
+        (
+            "--vary control.method=a --method a",
+            "--vary control.method must not be given to --method",
+        ),
         (
             "--vary simulation.stepper=a --tolerance 1um",
             "--vary simulation.stepper must not be given to --tole",
         ),
-        ("--vary layout.rows=11,13 --workers 0", "digiclay sweep: argument --workers: must be a whole"),
-        ("--vary layout.rows=11,13 --set recorder=absent", "A sweep needs a recorder, and the scene"),
+        (
+            "--vary layout.rows=11,13 --workers 0",
+            "digiclay sweep: argument --workers: must be a whole",
+        ),
+        (
+            "--vary layout.rows=11,13 --set recorder=absent",
+            "A sweep needs a recorder, and the scene",
+        ),
     ],
 )
 def test_a_mistake_is_told_in_one_line_and_leaves_no_folder(words, message, here, refused):
@@ -107,8 +134,15 @@ def test_a_mistake_is_told_in_one_line_and_leaves_no_folder(words, message, here
 @pytest.mark.parametrize("tolerance", ["", "50 um"])
 def test_a_point_is_the_run_with_that_setting_also_within_a_tolerance(tolerance):
     assert main([*GAINS, *(["--tolerance", tolerance] if tolerance else [])]) == 0
-    settings = [Setting("simulation.stepper", "adaptive"), Setting("simulation.tolerance", tolerance)]
-    alone = run(load(find("my.toml"), [Setting("control.force_gain", "5"), *settings[: 2 * bool(tolerance)]]))
+    settings = [
+        Setting("simulation.stepper", "adaptive"),
+        Setting("simulation.tolerance", tolerance),
+    ]
+    alone = run(
+        load(
+            find("my.toml"), [Setting("control.force_gain", "5"), *settings[: 2 * bool(tolerance)]]
+        )
+    )
     assert rows("out")[1]["rfd (N)"] == repr(alone.metrics["rfd"])
 
 
@@ -136,9 +170,18 @@ def test_a_point_that_fails_or_is_no_scene_is_recorded_and_the_others_go_on(caps
     assert rows("out")[1]["error"].startswith("recorder.every must be at least")
     assert "1 of them failed" in capsys.readouterr().out
     assert main([*vary, "simulation.duration=1e6,9e5", "--out", "none"]) == 2
-    assert capsys.readouterr().err.startswith("Every point failed; the first one: recorder.every must be")
-    triggers = command("--vary control.blister_trigger=0.01,0.03 --vary control.spring_trigger=0.02,0.06")
-    assert main(["sweep", "my.toml", "--quiet", "--method", "cell_states", *triggers, "--out", "mixed"]) == 0
+    assert capsys.readouterr().err.startswith(
+        "Every point failed; the first one: recorder.every must be"
+    )
+    triggers = command(
+        "--vary control.blister_trigger=0.01,0.03 --vary control.spring_trigger=0.02,0.06"
+    )
+    assert (
+        main(
+            ["sweep", "my.toml", "--quiet", "--method", "cell_states", *triggers, "--out", "mixed"]
+        )
+        == 0
+    )
     assert [line["error"] for line in rows("mixed")][:2] == ["", ""]
     assert "must be below spring_trigger, 0.02 N (got 0.03 N)" in rows("mixed")[2]["error"]
 
@@ -162,7 +205,8 @@ def test_a_folder_with_another_sweep_is_refused_in_one_line(refused):
     before = kept("out")
     for change in ("--vary layout.rows=11,13", "--set layout.rows=13", "--stepper runge_kutta_4"):
         refused(
-            [*GAINS, *change.split()], "out holds another sweep (2 points over control.force_gain, digiclay "
+            [*GAINS, *change.split()],
+            "out holds another sweep (2 points over control.force_gain, digiclay ",
         )
         assert kept("out") == before
 
@@ -193,7 +237,12 @@ def test_a_sweep_estimates_errors_at_the_ends_of_what_varies_and_says_where(caps
     assert main(sweep) == 0
     said = capsys.readouterr().out
     found = rows("grid")
-    assert [index for index, line in enumerate(found) if line["height_error (m)"]] == [0, 2, 6, 8]  # corners
+    assert [index for index, line in enumerate(found) if line["height_error (m)"]] == [
+        0,
+        2,
+        6,
+        8,
+    ]  # corners
     assert all(float(line["run_time (s)"]) > 0.0 for line in found)
     worst = max(float(line["height_error (m)"]) for line in found if line["height_error (m)"])
     assert f"height error about {worst * 1e6:.2g} µm" in said
@@ -231,7 +280,9 @@ ENDS = {
 def test_points_at_the_ends_are_found_whatever_their_order(name):
     words, expected = ENDS[name]
     keys = (
-        ["blister.profile"] if "cone" in words[0] else ["control.force_gain", "layout.rows"][: len(words[0])]
+        ["blister.profile"]
+        if "cone" in words[0]
+        else ["control.force_gain", "layout.rows"][: len(words[0])]
     )
     points = place_points(find("my.toml"), [], keys, words)
     assert [point.index for point in find_ends(points, keys)] == expected
@@ -239,7 +290,8 @@ def test_points_at_the_ends_are_found_whatever_their_order(name):
     assert [point.index for point in find_ends([lost, *points], keys)] == expected
 
 
-#: What other sections depend on: the method has its blister, the contact of a hexagonal bed its share.
+#: What other sections depend on: the method has its blister, the contact of a hexagonal bed its
+#: share.
 AXES = [
     "control.method=virtual_master,cell_states",
     "layout.arrangement=aligned,hexagonal",
@@ -265,7 +317,9 @@ QUICK = [*MANY, "--set", "simulation.duration=0.3"]
 
 
 def some(count=3):
-    return make_points(find("slow_press"), SHORT, [read_axis(f"valve_lag.time_constant=1 ms:2 ms:{count}")])
+    return make_points(
+        find("slow_press"), SHORT, [read_axis(f"valve_lag.time_constant=1 ms:2 ms:{count}")]
+    )
 
 
 def finished(executor, task, todo, **known):
@@ -290,7 +344,11 @@ def test_a_point_that_fails_is_recorded_and_a_stopped_one_is_not(monkeypatch):
 
 
 def test_a_piece_whose_task_fails_is_told_of_and_the_others_go_on_unless_the_workers_die():
-    faults = {1: DigiclayError("killed too often"), 2: KeyError("own fault"), 4: BrokenExecutor("gone")}
+    faults = {
+        1: DigiclayError("killed too often"),
+        2: KeyError("own fault"),
+        4: BrokenExecutor("gone"),
+    }
 
     def task(bundle):
         if fault := faults.get(bundle[0].index):
@@ -328,7 +386,10 @@ def test_a_sweep_stopped_half_way_keeps_what_is_done_and_goes_on_from_there(
     assert not (here / "out" / "sweep.csv").exists()
     assert main([*QUICK, "--workers", "1", "--out", "out"]) == 0
     after = kept("out")
-    assert all(record["figures"].items() <= after[name]["figures"].items() for name, record in files.items())
+    assert all(
+        record["figures"].items() <= after[name]["figures"].items()
+        for name, record in files.items()
+    )
     assert timeless(here / "out" / "sweep.csv") == whole
 
 
@@ -352,7 +413,9 @@ def test_a_sweep_whose_worker_is_killed_comes_to_the_same_table(here, whole):
     out = here / "out"
     sweep = start(PROGRAM, *QUICK, "--out", str(out))
     wait_until(lambda: list(out.glob("points/*.json")))
-    told = subprocess.run(["ps", "-A", "-o", "pid=,ppid="], capture_output=True, text=True, check=True).stdout
+    told = subprocess.run(
+        ["ps", "-A", "-o", "pid=,ppid="], capture_output=True, text=True, check=True
+    ).stdout
     pairs = [tuple(map(int, line.split())) for line in told.splitlines()]
     worker, *_ = (pid for pid, parent in pairs if parent == sweep.pid)
     os.kill(worker, signal.SIGKILL)

@@ -25,7 +25,16 @@ from digiclay.sessions.sculpting import (
 )
 from digiclay.settings.devices import make_scene
 from digiclay.strokes.nominal import find_nominal
-from digiclay.strokes.stroke import ALONE, FINISHING, PRESSING, YIELDING, Brush, lay_path, make_images, start
+from digiclay.strokes.stroke import (
+    ALONE,
+    FINISHING,
+    PRESSING,
+    YIELDING,
+    Brush,
+    lay_path,
+    make_images,
+    start,
+)
 from numpy.testing import assert_allclose, assert_array_equal
 
 from tests.assemble import assert_near
@@ -77,10 +86,15 @@ def is_replayed(take):
 
 #: A path that stays apart from its images, and from the pins' rows, mm.
 APART = line(20.0, 8.5, 23.0, 9.5)
-#: Images on whole pins, how they turn a table of pins, and the pins by which their center is off the middle.
+#: Images on whole pins, how they turn a table of pins, and the pins by which their center is off
+#: the middle.
 TURNED = {
     "four turns": (make_images("RADIAL", 4), np.rot90, (0, 0)),
-    "four turns about another place": (make_images("RADIAL", 4, (3e-3, -1.5e-3)), np.rot90, (-1, 2)),
+    "four turns about another place": (
+        make_images("RADIAL", 4, (3e-3, -1.5e-3)),
+        np.rot90,
+        (-1, 2),
+    ),
     "two turns": (make_images("RADIAL", 2), lambda table: np.rot90(table, 2), (0, 0)),
     "x": (make_images("X"), np.fliplr, (0, 0)),
     "y of another axis": (make_images("Y", center=(0.0, -3e-3)), np.flipud, (-2, 0)),
@@ -110,11 +124,13 @@ def alone(method, brush):
 def test_images_form_alike_in_the_time_of_one_and_are_replayed_bit_for_bit(method, brush, images):
     made, turn, (row, column) = TURNED[images]
     session = finish(queue(begin(method), APART, made, brush))
-    # One period more, without the fingertips of the images; noise of the valves may take another look.
+    # One period more, without the fingertips of the images; noise of the valves may take another
+    # look.
     assert session.state.period - alone(method, brush) in (1, 5)
     table = 1e3 * heights(session).reshape(COUNT, COUNT) - 40.0
     part = np.roll(table, (-row, -column), (0, 1))[5:-5, 5:-5]
-    # Valves place pins to 1 µm; pins that only give way differ by the order in which fingertips press them.
+    # Valves place pins to 1 µm; pins that only give way differ by the order in which fingertips
+    # press them.
     assert_near(part, turn(part), 0.03 if method == "plastic" else 2e-3)
     assert np.abs(part).max() > 2.5
     assert (session.poses.shape, session.system.fingers, len(session.gestures)) == ((1, 7), 1, 1)
@@ -145,8 +161,8 @@ def follow_to_the_end(session, periods=8):
     return session, force, left
 
 
-#: Images that are near each other, or meet: method, brush, path, mm, images, and greatest time, as a multiple
-#: of that of one.
+#: Images that are near each other, or meet: method, brush, path, mm, images, and greatest time, as
+#: a multiple of that of one.
 MEETING = {
     "on the axis one presses": ("hybrid", RAISE, line(0, -9, 0, 9), X, 1.1),
     "a click in the middle is one": (ONE, LOWER, line(0, 0, 0, 0), make_images("RADIAL", 6), 1.05),
@@ -225,17 +241,28 @@ def test_images_begin_no_error_estimate_of_their_own():
 
 def test_no_fingertip_lifts_again_for_another_one_that_is_down():
     images = make_images("RADIAL", 12, (1.1e-3, -0.7e-3), 0.4)
-    session, pressing, lifted = queue(begin(), line(3.7, 0.9, 11.6, 5.4), images, RAISE), set[int](), 0
+    session, pressing, lifted = (
+        queue(begin(), line(3.7, 0.9, 11.6, 5.4), images, RAISE),
+        set[int](),
+        0,
+    )
     while session.strokes:
         session = follow_finger(session, session.poses, 1)
-        parts, forces = session.strokes[0].parts if session.strokes else (), session.state.finger_forces()
+        parts, forces = (
+            session.strokes[0].parts if session.strokes else (),
+            session.state.finger_forces(),
+        )
         lifted += sum(part.image in pressing for part in parts if part.phase == YIELDING)
-        pressing = {part.image for part in parts if part.phase == PRESSING and forces[part.image] > 0.0}
+        pressing = {
+            part.image for part in parts if part.phase == PRESSING and forces[part.image] > 0.0
+        }
     # It would run into what the others raise, at forces of up to 70 N.
     assert lifted == 0
 
 
-@pytest.mark.parametrize("name", ["lines that pass each other", "so with Method I, about another place"])
+@pytest.mark.parametrize(
+    "name", ["lines that pass each other", "so with Method I, about another place"]
+)
 def test_what_near_images_leave_does_not_depend_on_the_periods_of_a_tick(name):
     method, brush, path, images, _ = MEETING[name]
     *_, left = follow_to_the_end(queue(begin(method), path, images, brush), 1)
@@ -267,7 +294,8 @@ def test_there_are_no_more_fingertips_than_a_bed_can_have_and_the_others_stay():
     assert_array_equal(session.poses[1:], stood[1:])
     angle = np.arange(24) * math.pi / 12
     assert (
-        heights(session)[session.system.grid.at(24e-3 * np.cos(angle), 24e-3 * np.sin(angle))].max() < 37e-3
+        heights(session)[session.system.grid.at(24e-3 * np.cos(angle), 24e-3 * np.sin(angle))].max()
+        < 37e-3
     )
 
 
@@ -320,7 +348,9 @@ def test_settings_and_fingertips_change_in_the_middle_of_a_stroke(change):
     session = middle()
     scene, numbers = session.scene, session.numbers
     if change != "a second fingertip":
-        scene = replace(scene, control=replace(scene.control, force_gain=0.9 * scene.control.force_gain))
+        scene = replace(
+            scene, control=replace(scene.control, force_gain=0.9 * scene.control.force_gain)
+        )
     if change != "settings":
         scene, numbers = scene.with_fingers(2), (1, 2)
     force = go_on(middle(), 1).state.finger_forces()
@@ -328,7 +358,8 @@ def test_settings_and_fingertips_change_in_the_middle_of_a_stroke(change):
     session, lost = change_scene(session, scene, numbers, poses)
     assert (lost, session.numbers, session.names[len(numbers) :]) == ("", numbers, (33, 34, 35))
     session = go_on(session, 1)
-    # The pulps of the images' fingertips relax on: ones that begin anew would press 2.6 times as hard.
+    # The pulps of the images' fingertips relax on: ones that begin anew would press 2.6 times as
+    # hard.
     pressing = session.state.finger_forces()[list_pressing(session)]
     assert_allclose(pressing, force, rtol=0.1)
     done = finish(session)
@@ -345,7 +376,14 @@ def test_settings_and_fingertips_change_in_the_middle_of_a_stroke(change):
 def test_a_session_begins_from_the_state_that_was_kept_in_the_middle_of_a_stroke():
     session = middle()
     again, lost = begin_session(
-        7, "Bed", session.scene, session.poses[:1], session.snapshot, 0, session.numbers, session.names
+        7,
+        "Bed",
+        session.scene,
+        session.poses[:1],
+        session.snapshot,
+        0,
+        session.numbers,
+        session.names,
     )
     assert (lost, again.system.fingers) == ("", 1)
     assert_array_equal(heights(again), heights(session))

@@ -91,7 +91,8 @@ def test_bytes_bring_a_take_and_its_orders_back_and_damaged_ones_are_refused_in_
 
 
 def test_a_finer_step_moves_heights_by_less_than_the_integrations_error():
-    # 1 ms steps leave about 1 µm; a difference of nothing at all would mean that nothing was refined.
+    # 1 ms steps leave about 1 µm; a difference of nothing at all would mean that nothing was
+    # refined.
     _, take, _ = taken()
     assert 0.0 < difference(take, 4) < 5e-6
     assert difference(take, 1) == 0.0
@@ -103,19 +104,25 @@ def test_a_finer_step_moves_heights_by_less_than_the_integrations_error():
 def test_a_take_as_a_scene_file_runs_to_the_same_heights(tmp_path):
     system, take, last = taken()
     made = to_scene(take, "my take")
-    # The finger was read every 6th period, and goes straight in between: only turning points are waypoints.
+    # The finger was read every 6th period, and goes straight in between: only turning points are
+    # waypoints.
     assert len(made.section("trajectory").waypoints) <= COUNT // 6 + 2
     (tmp_path / "my take.toml").write_text(format_scene(made), encoding="utf-8")
     read = load(tmp_path / "my take.toml")
     assert (read.periods, read.cells) == (COUNT, system.grid.count)
     # A take begun on a bed that has waited at rest is a scene too.
-    *_, waited = simulate_path(system, begin(system), np.tile([0.0, 0.0, 46e-3, *LEVEL], (30, 1, 1)))
+    *_, waited = simulate_path(
+        system, begin(system), np.tile([0.0, 0.0, 46e-3, *LEVEL], (30, 1, 1))
+    )
     late = to_scene(replace(take, start=snapshot.dump(system, waited)), "late")
     for scene in (read, late):
         done = record(assemble(scene), scene.section("trajectory").trajectory(), scene.periods)
-        # The path is the same but for rounding, 1e-17 m, which stiff contact enlarges a thousandfold.
+        # The path is the same but for rounding, 1e-17 m, which stiff contact enlarges a
+        # thousandfold.
         assert np.abs(done.height[-1] - last.row(0)).max() < 1e-12
-    with pytest.raises(OutputError, match=r"begins on a bed that is formed already.*reset the session"):
+    with pytest.raises(
+        OutputError, match=r"begins on a bed that is formed already.*reset the session"
+    ):
         to_scene(taken(True)[1], "late")
 
 
@@ -138,10 +145,16 @@ SURFACE = np.where(np.arange(121) % 3 == 0, np.nan, 42e-3)
 
 
 def every_order():
-    smooth, average = (make_orders(12, -6e-3, 6e-3, 0.0, 10e-3, 0, verb).rows for verb in Verb if verb < 2)
-    others = [repeat_order(4, verb, 3e-3, 0.0, 5e-3, 2.0) for verb in (Verb.LOCK, Verb.ERASE, Verb.INVERT)]
+    smooth, average = (
+        make_orders(12, -6e-3, 6e-3, 0.0, 10e-3, 0, verb).rows for verb in Verb if verb < 2
+    )
+    others = [
+        repeat_order(4, verb, 3e-3, 0.0, 5e-3, 2.0) for verb in (Verb.LOCK, Verb.ERASE, Verb.INVERT)
+    ]
     free = repeat_order(1, Verb.UNLOCK, radius=1.0)
-    return Orders(np.concatenate([smooth, average, *others, free, repeat_order(30, Verb.PLACE)]), (SURFACE,))
+    return Orders(
+        np.concatenate([smooth, average, *others, free, repeat_order(30, Verb.PLACE)]), (SURFACE,)
+    )
 
 
 ORDERS = every_order()

@@ -36,10 +36,13 @@ def packed(path, resources, build, head="", **parts):
         archive.writestr("[Content_Types].xml", TYPES)
         archive.writestr("_rels/.rels", RELATIONS)
         archive.writestr(
-            "3D/3dmodel.model", f"{model}<resources>{resources}</resources><build>{build}</build></model>"
+            "3D/3dmodel.model",
+            f"{model}<resources>{resources}</resources><build>{build}</build></model>",
         )
         for name, text in parts.items():
-            archive.writestr(f"3D/{name}.model", f"{model}<resources>{text}</resources><build/></model>")
+            archive.writestr(
+                f"3D/{name}.model", f"{model}<resources>{text}</resources><build/></model>"
+            )
     return path
 
 
@@ -84,12 +87,15 @@ def test_components_and_items_stand_where_lib3mf_puts_them(tmp_path):
     assert back.length == 25.4e-3
     # lib3mf has 32-bit numbers.
     assert_near(np.sort(back.vertices, 0), np.sort(np.array(points), 0), 1e-5)
-    # Three times as it is, once stretched to double, the mirrored ones turned the right way out again.
+    # Three times as it is, once stretched to double, the mirrored ones turned the right way out
+    # again.
     volume = trimesh.Trimesh(back.vertices, back.faces, process=False).volume
     assert volume == pytest.approx(4 * 5 * 7 * 11 / 6, rel=1e-5)
 
 
-def test_a_part_that_another_one_names_is_read_and_supports_and_what_is_not_built_are_left_away(tmp_path):
+def test_a_part_that_another_one_names_is_read_and_supports_and_what_is_not_built_are_left_away(
+    tmp_path,
+):
     # As programs that prepare prints write it: each object in a part of its own.
     path = packed(
         tmp_path / "parts.3mf",
@@ -100,7 +106,9 @@ def test_a_part_that_another_one_names_is_read_and_supports_and_what_is_not_buil
     )
     np.testing.assert_allclose(read(path).vertices, PLACES + np.array([100.0, 0.0, 0.0]))
     kinds = enumerate(("model", "support", "solidsupport", "model"), 1)
-    resources = "".join(f'<object id="{number}" type="{kind}">{MESH}</object>' for number, kind in kinds)
+    resources = "".join(
+        f'<object id="{number}" type="{kind}">{MESH}</object>' for number, kind in kinds
+    )
     build = "".join(f'<item objectid="{number}"/>' for number in (1, 2, 3))
     assert len(read(packed(tmp_path / "some.3mf", resources, build)).faces) == 4
 
@@ -114,7 +122,9 @@ def nested(levels, copies=1):
     return text
 
 
-LAUGHS = "".join(f'<!ENTITY {name} "{10 * f"&{other};"}">' for other, name in pairwise("abcdefghij"))
+LAUGHS = "".join(
+    f'<!ENTITY {name} "{10 * f"&{other};"}">' for other, name in pairwise("abcdefghij")
+)
 ENTITIES = f'<!DOCTYPE x [<!ENTITY a "aaaaaaaaaa">{LAUGHS}]>'
 OBJECT = f'<object id="1">{MESH}</object>'
 OWN = '<components><component objectid="1"/></components>'
@@ -161,7 +171,8 @@ def test_a_3mf_that_needs_an_extension_is_refused_with_its_name(tmp_path, prefix
         assert len(read(path).faces) == len(FACES)
         return
     with pytest.raises(
-        ParameterError, match=re.escape(f"model: needs {beams if 'b' in prefixes else prefixes}"[:90])
+        ParameterError,
+        match=re.escape(f"model: needs {beams if 'b' in prefixes else prefixes}"[:90]),
     ):
         read(path)
 
@@ -171,12 +182,16 @@ def test_a_zip_that_unpacks_to_more_than_is_allowed_is_not_unpacked(tmp_path, mo
     assert path.stat().st_size < 20_000
     read(path)
     monkeypatch.setattr(mesh_limits, "MOST_BYTES", 2_000_000)
-    with pytest.raises(ParameterError, match=r"at most 0.002 GB unpacked .got bomb.3mf: 3D/3dmodel"):
+    with pytest.raises(
+        ParameterError, match=r"at most 0.002 GB unpacked .got bomb.3mf: 3D/3dmodel"
+    ):
         read(path)
     # The limit is checked against the directory; a directory that lies must not get past it.
     with zipfile.ZipFile(path) as archive:
         size = archive.getinfo("3D/3dmodel.model").file_size
-    path.write_bytes(path.read_bytes().replace(size.to_bytes(4, "little"), (2000).to_bytes(4, "little")))
+    path.write_bytes(
+        path.read_bytes().replace(size.to_bytes(4, "little"), (2000).to_bytes(4, "little"))
+    )
     with pytest.raises(ParameterError, match="3MF file that can be read"):
         read(path)
 

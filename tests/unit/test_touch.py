@@ -10,7 +10,9 @@ from digiclay.core.model.trajectory import interpolate_poses
 from tests.assemble import make_system, path, record
 
 
-@pytest.mark.parametrize("turn", [LEVEL, (0.8, 0.0, 0.6, 0.0), (0.5, -0.5, 0.5, 0.5), (-0.6, 0.1, 0.0, 0.8)])
+@pytest.mark.parametrize(
+    "turn", [LEVEL, (0.8, 0.0, 0.6, 0.0), (0.5, -0.5, 0.5, 0.5), (-0.6, 0.1, 0.0, 0.8)]
+)
 def test_a_finger_that_does_not_turn_is_that_of_the_same_poses_among_turned_ones(turn):
     tip, rng = Fingertip(length=12e-3), np.random.default_rng(3)
     poses = np.concatenate([rng.normal(0.0, 0.02, (6, 3)), np.tile(turn, (6, 1))], axis=1)
@@ -18,7 +20,10 @@ def test_a_finger_that_does_not_turn_is_that_of_the_same_poses_among_turned_ones
     for other in (tip, Fingertip(), tip):  # each keeps its own
         assert (other.outline(poses) == other.outline(among)[:-1]).all()
     parts = np.linspace(0.0, 1.0, 4)
-    together, alone = interpolate_poses(among[:, None], parts), interpolate_poses(poses[:, None], parts)
+    together, alone = (
+        interpolate_poses(among[:, None], parts),
+        interpolate_poses(poses[:, None], parts),
+    )
     assert (together[:5] == alone).all()
 
 
@@ -33,7 +38,8 @@ def test_a_finger_presses_the_pins_below_it_and_over_the_rim_what_there_is():
     assert np.unravel_index(pressed(3.0, -6.0, 2.0).argmax(), (9, 9)) == (2, 5)
     middle, rim, outside = pressed(0, 0, 2.0), pressed(12.0, 0, 2.0), pressed(15.0, 0.0, 3.0)
     assert (pressed(0, 0, 0.5) > 0).sum() < (middle > 0).sum() < (pressed(0, 0, 2.5) > 0).sum()
-    # The half on this side of the finger: the same cells, the same path. Rounding of positions of 12 mm.
+    # The half on this side of the finger: the same cells, the same path. Rounding of positions of
+    # 12 mm.
     assert rim[4, 4:] == pytest.approx(middle[4, :5], abs=1e-12)
     assert outside[4, 8] > 0.0  # a pitch beside the bed
     assert not outside[:, :6].any()

@@ -26,7 +26,9 @@ def felt(poses, force=0.0, stiffness=0.0, top=0.04):
     """Return what fingertips feel, all the same."""
     each = np.ones(len(poses))
     around = Around(stiffness * each, top * each, lambda there: np.full(len(there), top))
-    return Felt(np.array(poses, float), force * each, force * each, 5e-4, top, lambda: around, 1.25e-3)
+    return Felt(
+        np.array(poses, float), force * each, force * each, 5e-4, top, lambda: around, 1.25e-3
+    )
 
 
 def at(*places):
@@ -70,15 +72,23 @@ def test_exchanged_identities_do_not_move_a_fingertip_through_the_clay(before, a
     tracks = replace(tracks, there=np.ones(len(start), bool))
     tracks, targets = advance(name_fingers(tracks, at(*now)), Tracking(), felt(poses), 5e-3)
     assert tuple(tracks.identities.tolist()) == held
-    assert np.linalg.norm(targets[:, :3] - poses[:, :3], axis=1).max() < 0.011  # of what each has moved
+    assert (
+        np.linalg.norm(targets[:, :3] - poses[:, :3], axis=1).max() < 0.011
+    )  # of what each has moved
 
 
-#: Fingers before and after a time, s, by identity: x and, where it is not that of all, z, mm; who is held.
+#: Fingers before and after a time, s, by identity: x and, where it is not that of all, z, mm; who
+#: is held.
 RENAMED = {
     "one has another identity": ({1: (0,), 2: (40,)}, 0.016, {1: (0,), 7: (42,)}, (1, 7, -1)),
     "both": ({1: (0,), 2: (18,)}, 0.016, {8: (19,), 7: (1,)}, (7, 8, -1)),
     "after 80 ms farther off": ({1: (0,)}, 0.08, {7: (14,)}, (7, -1, -1)),
-    "a new one beside one that is lifted": ({1: (0,), 2: (18,)}, 0.016, {2: (18,), 7: (-14,)}, (1, 2, 7)),
+    "a new one beside one that is lifted": (
+        {1: (0,), 2: (18,)},
+        0.016,
+        {2: (18,), 7: (-14,)},
+        (1, 2, 7),
+    ),
     "at another time": ({1: (0,)}, 0.08, {7: (16,)}, (1, 7, -1)),
     "a new one below one that was raised": ({1: (0, 60)}, 0.016, {7: (3, 40)}, (1, 7, -1)),
     "nearer to one that stays": ({1: (0,), 2: (15,)}, 0.03, {1: (0,), 7: (7,)}, (1, 2, 7)),
@@ -88,29 +98,40 @@ RENAMED = {
 
 @table("before, time, after, held", RENAMED)
 @pytest.mark.parametrize("turn", [0.0, 2.0])
-def test_a_finger_that_goes_on_under_another_identity_keeps_its_fingertip(before, time, after, held, turn):
+def test_a_finger_that_goes_on_under_another_identity_keeps_its_fingertip(
+    before, time, after, held, turn
+):
     def tell(fingers):
         way = 1e-3 * np.array([math.cos(turn), math.sin(turn)])
-        place = ((one, x * way, 1e-3 * z) for one, (x, z) in ((one, (*at, 40)[:2]) for one, at in fingers))
+        place = (
+            (one, x * way, 1e-3 * z)
+            for one, (x, z) in ((one, (*at, 40)[:2]) for one, at in fingers)
+        )
         return [(one, (*xy.tolist(), z, *LEVEL)) for one, xy, z in place]
 
     tracks = name_fingers(begin_tracks(np.zeros((3, 7))), tell(before.items()))
     tracks = replace(tracks, there=tracks.identities >= 0, unnamed=np.full(3, time))
     tracks = name_fingers(tracks, tell(after.items()))
     assert tuple(tracks.identities.tolist()) == held
-    assert tracks.there.tolist() == [row < len(before) for row in range(3)]  # another one has to land
+    assert tracks.there.tolist() == [
+        row < len(before) for row in range(3)
+    ]  # another one has to land
 
 
 @pytest.mark.parametrize("far", [0.02, 1e300])
 def test_a_finger_that_is_elsewhere_all_at_once_is_not_believed_and_rises_if_it_stays(far):
     here, there, found = np.array([[0.0, 0.0, 0.038, *LEVEL]]), (far, 0.0, 0.038), []
-    tracks = replace(name_fingers(begin_tracks(here), at((0.0, 0.0, 0.038))), there=np.ones(1, bool))
+    tracks = replace(
+        name_fingers(begin_tracks(here), at((0.0, 0.0, 0.038))), there=np.ones(1, bool)
+    )
     for _ in range(20):
         tracks, targets = advance(name_fingers(tracks, at(there)), Tracking(), felt(here), 5e-3)
         found.append(targets[0, :3].tolist())
     assert found == [[0.0, 0.0, 0.038]] * 19 + [[0.0, 0.0, PARKED]]
     for _ in range(2):
-        tracks, targets = advance(name_fingers(tracks, at(there)), Tracking(), felt(here + 0.01), 5e-3)
+        tracks, targets = advance(
+            name_fingers(tracks, at(there)), Tracking(), felt(here + 0.01), 5e-3
+        )
     assert targets[0, :3].tolist() == [min(far, 1e3), 0.0, 0.038]
 
 
@@ -131,7 +152,9 @@ def filtered(signal, cutoff, seconds, step):
     tracks, found = begin_tracks(np.zeros((1, 7))), []
     for time in np.arange(0.0, seconds, step):
         tracks = name_fingers(tracks, at((0.0, 0.0, signal(time))))
-        tracks, targets = advance(tracks, Tracking(cutoff=cutoff), felt([[0, 0, 1.0, *LEVEL]]), step)
+        tracks, targets = advance(
+            tracks, Tracking(cutoff=cutoff), felt([[0, 0, 1.0, *LEVEL]]), step
+        )
         found.append(targets[0, 2])
     return np.array(found[1:])
 
@@ -140,7 +163,8 @@ def filtered(signal, cutoff, seconds, step):
 def test_the_filter_calms_a_trembling_hand_and_follows_a_quick_one(step):
     still = filtered(lambda _: 0.05, 1.0, 0.5, step)
     assert np.ptp(still) == 0.0
-    # A tremor of 0.1 mm at 10 Hz, of 4 mm/s, raises the cutoff of 1 Hz by 0.1 Hz at most: a tenth passes.
+    # A tremor of 0.1 mm at 10 Hz, of 4 mm/s, raises the cutoff of 1 Hz by 0.1 Hz at most: a tenth
+    # passes.
     tremor = filtered(lambda time: 0.05 + 1e-4 * math.sin(20.0 * math.pi * time), 1.0, 4.0, step)[
         -int(1.0 / step) :
     ]
@@ -191,4 +215,6 @@ def test_a_coupled_fingertip_lands_deep_rises_over_what_is_in_its_way_and_sticks
     over = give_way(goal, contact._replace(poses=np.array([[0, 0, 0.0595, *LEVEL]])), 100.0, 5e-3)
     assert over[0, :3].tolist() == [0.02, 0.0, 0.0595]
     contact = felt([[0, 0, 0.04, *LEVEL]], 0.4, 4000.0)
-    assert give_way(np.array([[0, 0, 0.045, *LEVEL]]), contact, 50.0, 5e-3)[:, 2].tolist() == [0.045]
+    assert give_way(np.array([[0, 0, 0.045, *LEVEL]]), contact, 50.0, 5e-3)[:, 2].tolist() == [
+        0.045
+    ]

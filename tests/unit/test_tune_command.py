@@ -11,7 +11,15 @@ from digiclay.core.scene.toml_table import format_scene
 from digiclay.core.session.run_scene import run
 
 from digiclay_study.tune_command import find_front, find_knee
-from tests.scene_files import SMALL_BLISTER, command, interrupt_after, read_text, rows, timeless, write_text
+from tests.scene_files import (
+    SMALL_BLISTER,
+    command,
+    interrupt_after,
+    read_text,
+    rows,
+    timeless,
+    write_text,
+)
 
 pytest.importorskip("optuna", reason="digiclay[study] is not installed")
 
@@ -69,7 +77,9 @@ def test_a_tuning_leaves_tables_a_plot_and_a_scene_that_gives_the_same_metrics(w
     # A preset of Blender is a file of this text.
     assert read_text(whole / "chosen.toml") == format_scene(scene)
     assert scene.name == "my_tuned"
-    assert scene.description.startswith("Chosen by digiclay tune from 32 runs, knee of the front: rfd ")
+    assert scene.description.startswith(
+        "Chosen by digiclay tune from 32 runs, knee of the front: rfd "
+    )
 
 
 def test_the_least_of_a_metric_can_be_chosen_of_a_finished_tuning(whole, here, capsys):
@@ -77,7 +87,9 @@ def test_the_least_of_a_metric_can_be_chosen_of_a_finished_tuning(whole, here, c
     assert main([*TUNE[:-1], "--generations", "4", "--choose", "lag"]) == 0
     front = values(here / "out" / "front.csv")
     metrics = run(load(here / "out" / "chosen.toml")).metrics
-    assert [metrics["rfd"], metrics["lag_mean"]] == pytest.approx(front[np.argmin(front[:, 1])], rel=1e-9)
+    assert [metrics["rfd"], metrics["lag_mean"]] == pytest.approx(
+        front[np.argmin(front[:, 1])], rel=1e-9
+    )
     assert "chosen (lag_mean): rfd " in capsys.readouterr().out
 
 
@@ -93,7 +105,9 @@ def test_a_tuning_that_is_stopped_goes_on_from_there_bit_for_bit(here, whole, mo
     assert files(here / "out") == files(whole)
 
 
-def test_points_of_another_search_are_refused_and_without_any_contact_there_is_no_front(whole, here, refused):
+def test_points_of_another_search_are_refused_and_without_any_contact_there_is_no_front(
+    whole, here, refused
+):
     shutil.copytree(whole, here / "out")
     one, other = (here / "out" / "points" / f"{index:06d}.json" for index in (12, 13))
     one.write_bytes(other.read_bytes())
@@ -114,10 +128,22 @@ def test_points_of_another_search_are_refused_and_without_any_contact_there_is_n
         ),
         ("--choose relief", "--choose must be knee, rfd or lag_mean (got 'ridge_error')."),
         ("--choose kneee", "--choose must be knee, rfd or lag_mean (got 'kneee')."),
-        ("--population 3", "digiclay tune: argument --population: must be a whole number from 4 to"),
-        ("--generations 0", "digiclay tune: argument --generations: must be a whole number from 1 to"),
-        ("--generations 4096", "--population times --generations must come to 10000 points at most"),
-        ("--vary control.travel=1:nan", "--vary control.travel must have two different finite numbers at LO"),
+        (
+            "--population 3",
+            "digiclay tune: argument --population: must be a whole number from 4 to",
+        ),
+        (
+            "--generations 0",
+            "digiclay tune: argument --generations: must be a whole number from 1 to",
+        ),
+        (
+            "--generations 4096",
+            "--population times --generations must come to 10000 points at most",
+        ),
+        (
+            "--vary control.travel=1:nan",
+            "--vary control.travel must have two different finite numbers at LO",
+        ),
     ],
 )
 def test_a_mistake_is_told_in_one_line_and_leaves_no_folder(words, message, here, refused):
@@ -125,7 +151,9 @@ def test_a_mistake_is_told_in_one_line_and_leaves_no_folder(words, message, here
     assert not (here / "out").exists()
 
 
-POINTS = np.array([[1.0, 5.0], [2.0, 2.0], [3.0, 3.0], [2.0, 4.0], [5.0, 1.0], [np.nan, 0.0], [2.0, 2.0]])
+POINTS = np.array(
+    [[1.0, 5.0], [2.0, 2.0], [3.0, 3.0], [2.0, 4.0], [5.0, 1.0], [np.nan, 0.0], [2.0, 2.0]]
+)
 
 
 def test_a_front_has_the_points_that_none_dominates_in_order():

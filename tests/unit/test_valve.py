@@ -17,8 +17,11 @@ WIDE = Valve(orifice_diameter=0.8e-3)
 THIN = Fluid(density=760.0, viscosity=0.65e-6)
 BOTH = pytest.mark.parametrize("valve, fluid", [(Valve(), Fluid()), (WIDE, THIN)])
 #: For the wide valve, the thin fluid and a narrow conduit: both branches, and drops of like size.
-MESH, DROPS = (grid.ravel() for grid in np.meshgrid([0.03, 0.2, 0.6, 1.0], np.geomspace(10.0, 1e6, 9)))
-#: Relative errors of some ten products; steps of 2e-13 of a drop to either side move the flow by 4e-13.
+MESH, DROPS = (
+    grid.ravel() for grid in np.meshgrid([0.03, 0.2, 0.6, 1.0], np.geomspace(10.0, 1e6, 9))
+)
+#: Relative errors of some ten products; steps of 2e-13 of a drop to either side move the flow by
+#: 4e-13.
 ROUNDING = 1e-12
 
 
@@ -38,7 +41,9 @@ def test_the_branches_meet_at_the_critical_drop(valve, fluid):
     assert law.laminar * OPENINGS**2 * drop == meeting
     assert law.turbulent * OPENINGS * np.sqrt(drop) == meeting
     assert law.knee == pytest.approx(critical(valve, fluid, 1.0), rel=ROUNDING)
-    assert (law.knee > 1e5) == (valve == Valve())  # the default one stays laminar between the reservoirs
+    assert (law.knee > 1e5) == (
+        valve == Valve()
+    )  # the default one stays laminar between the reservoirs
     # Below, the flow is proportional to the drop; above it grows with its root.
     for one, other in ((0.9, 0.3), (18.0, 2.0)):
         share = law.flow(OPENINGS, one * drop) / law.flow(OPENINGS, other * drop)
@@ -50,13 +55,17 @@ def test_with_the_opening_as_gap_all_openings_turn_turbulent_at_one_drop():
     law = make_orifice(valve, THIN)
     sides = (1.0 - 2e-13, 1.0, 1.0 + 2e-13)
     below, at, above = (law.flow(OPENINGS, np.full(5, law.knee * side)) for side in sides)
-    assert np.sqrt(at / (THIN.viscosity * valve.stroke * OPENINGS)) == pytest.approx(200.0, rel=ROUNDING)
+    assert np.sqrt(at / (THIN.viscosity * valve.stroke * OPENINGS)) == pytest.approx(
+        200.0, rel=ROUNDING
+    )
     assert np.abs(above / below - 1.0).max() < ROUNDING
     laminar = law.flow(OPENINGS, np.full(5, 0.1 * law.knee)) / OPENINGS
     assert laminar == pytest.approx(laminar[-1], rel=ROUNDING)
     # Fully open the gap makes no difference.
     drop = np.array([1e3, 1e5, 1e7])
-    assert np.array_equal(law.flow(np.ones(3), drop), make_orifice(WIDE, THIN).flow(np.ones(3), drop))
+    assert np.array_equal(
+        law.flow(np.ones(3), drop), make_orifice(WIDE, THIN).flow(np.ones(3), drop)
+    )
 
 
 def series(gap="stroke"):
@@ -88,7 +97,9 @@ def test_the_drops_of_valve_and_conduit_add_up(gap, power):
     turbulent = flow >= 4e4 * THIN.viscosity * 30e-6 * (MESH if power == 1 else 1.0)
     laminar = flow / (law.valve.laminar * MESH**power)
     ours = np.where(turbulent, (flow / (law.valve.turbulent * MESH)) ** 2, laminar)
-    assert ours + law.resistance * flow == pytest.approx(DROPS, rel=1e-12)  # solved without cancellation
+    assert ours + law.resistance * flow == pytest.approx(
+        DROPS, rel=1e-12
+    )  # solved without cancellation
     assert 5 < turbulent.sum() < turbulent.size - 5
     assert (law.resistance * flow / DROPS).max() > 0.3, "the conduit hardly counts"
     assert np.all(flow < law.valve.flow(MESH, DROPS))
@@ -105,7 +116,9 @@ def test_the_resistance_is_that_of_a_parabolic_profile_and_behind_a_wide_valve_i
     assert conduit.resistance(fluid) == pytest.approx(1e5 / quad(ring, 0.0, edge)[0], rel=1e-12)
     valve = make_orifice(WIDE, THIN)
     without = OrificeAndConduit(valve, 0.0)
-    assert without.flow(MESH, DROPS) == pytest.approx(valve.flow(MESH, DROPS), rel=1e-14)  # rounding
+    assert without.flow(MESH, DROPS) == pytest.approx(
+        valve.flow(MESH, DROPS), rel=1e-14
+    )  # rounding
     wide = OrificeAndConduit(
         make_orifice(Valve(orifice_diameter=0.2), Fluid()), Conduit().resistance(Fluid())
     )
@@ -119,12 +132,16 @@ def test_the_drop_between_reservoir_and_load_moves_the_pin():
     contact, lift = cell.touch.contact, 0.5e5 * np.pi * 1e-6  # P_s A_a = 0.157 N
 
     def speed_under(force, opening):
-        depth = np.log1p(force / contact.share * contact.exponent / contact.stiffness) / contact.exponent
+        depth = (
+            np.log1p(force / contact.share * contact.exponent / contact.stiffness)
+            / contact.exponent
+        )
         y, under = np.array([[50e-3]]), np.array([50e-3 - depth])
         return float(compute_rates(cell, y, under, np.array([opening]))[0, 0])
 
     assert speed_under(1.5 * lift, 1.0) < 0.0
-    # Twice the balance force turns ΔP = P_s - F/A_a into its opposite; the laminar flow with it. Rounding.
+    # Twice the balance force turns ΔP = P_s - F/A_a into its opposite; the laminar flow with it.
+    # Rounding.
     assert speed_under(2.0 * lift, 1.0) == pytest.approx(-speed_under(0.0, 1.0), rel=1e-9)
     # Rounding of ΔP: 1e-16 of 0.5 bar, against the free speed of 24 mm/s.
     assert abs(speed_under(lift, 1.0)) < 1e-12

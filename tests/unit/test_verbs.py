@@ -27,7 +27,9 @@ CLICK, LINE, DRAG = ((0.0, 0.0),), ((-18e-3, 0.0), (18e-3, 0.0)), ((0.0, 0.0), (
 
 
 def begin(**tables):
-    scene = resolve({"layout": {"rows": 21, "columns": 21}, "control": {"method": "hybrid"}, **tables})
+    scene = resolve(
+        {"layout": {"rows": 21, "columns": 21}, "control": {"method": "hybrid"}, **tables}
+    )
     return sculpting.begin_session(1, "Bed", scene, np.array([0.0, 0.0, 46e-3, *LEVEL]))[0]
 
 
@@ -71,7 +73,9 @@ CASES = [
     pytest.param(stroke("stamp", DRAG), id="stamp"),
     pytest.param(stroke("stamp", DRAG, ctrl=True), id="imprint"),
     pytest.param(stroke("invert_locks", CLICK), id="invert"),
-    pytest.param(stroke("erase", symmetry="radial", radial=3, center_x=3e-3, center_y=-2e-3), id="radial"),
+    pytest.param(
+        stroke("erase", symmetry="radial", radial=3, center_x=3e-3, center_y=-2e-3), id="radial"
+    ),
 ]
 
 
@@ -97,7 +101,9 @@ def test_one_stroke_erases_what_is_in_its_ring_and_a_weak_one_part_of_it(strengt
     row = relief(done)[10, 5:16]
     assert np.abs(row).max() < left
     assert strength == 1.0 or np.abs(row).min() > 1.5
-    far = np.abs(np.arange(21) - 10) * 3e-3 > find_radius(done.scene.fingers[0].fingertip, done.scene.layout)
+    far = np.abs(np.arange(21) - 10) * 3e-3 > find_radius(
+        done.scene.fingers[0].fingertip, done.scene.layout
+    )
     assert_near(relief(done)[far], before[far], 1e-9)
 
 
@@ -113,12 +119,21 @@ OTHERS = [
 
 @pytest.mark.parametrize(
     "brush, keys, method",
-    [*((*one, "hybrid") for one in OTHERS), (*OTHERS[0], "virtual_master"), (*OTHERS[1], "cell_states")],
+    [
+        *((*one, "hybrid") for one in OTHERS),
+        (*OTHERS[0], "virtual_master"),
+        (*OTHERS[1], "cell_states"),
+    ],
 )
-def test_a_locked_pin_keeps_its_height_under_every_brush_and_no_finger_presses_into_it(brush, keys, method):
+def test_a_locked_pin_keeps_its_height_under_every_brush_and_no_finger_presses_into_it(
+    brush, keys, method
+):
     held = begin_hollow(method, stroke("lock", ((6e-3, 0.0), (9e-3, 0.0))))
     before, kept = heights(held), locked(held)
-    done = play(sculpting.set_recording(held, True), stroke(brush, ((-3e-3, -1.8e-3), (15e-3, 9e-3)), **keys))
+    done = play(
+        sculpting.set_recording(held, True),
+        stroke(brush, ((-3e-3, -1.8e-3), (15e-3, 9e-3)), **keys),
+    )
     assert_array_equal(heights(done)[kept.ravel()], before[kept.ravel()])
     assert_array_equal(locked(done), kept)
     assert np.abs(heights(done) - before).max() > 1e-3
@@ -176,13 +191,22 @@ def test_a_stamp_has_the_drawn_size_turn_and_strength_up_or_down(tmp_path, keys,
 @pytest.mark.parametrize(
     "symmetry, axis", [("x", 0.0), ("y", 0.0), ("xy", 0.0), ("x", 90.0), ("radial", 0.0)]
 )
-def test_images_of_a_stamp_are_mirrored_and_turned_about_the_placed_center(tmp_path, symmetry, axis):
+def test_images_of_a_stamp_are_mirrored_and_turned_about_the_placed_center(
+    tmp_path, symmetry, axis
+):
     np.save(tmp_path / "ramp.npy", np.tile(np.linspace(0.0, 1.0, 40), (40, 1)))
     keys = {"symmetry": symmetry, "axis": axis, "radial": 4}
     places = ((15e-3, 12e-3), (21e-3, 12e-3))
-    formed = relief(play(begin(), stroke("stamp", places, stamp=str(tmp_path / "ramp.npy"), **keys)))
+    formed = relief(
+        play(begin(), stroke("stamp", places, stamp=str(tmp_path / "ramp.npy"), **keys))
+    )
     assert formed.max() > 10.0
-    images = {"x": [np.fliplr], "y": [np.flipud], "xy": [np.fliplr, np.flipud], "radial": [np.rot90]}
+    images = {
+        "x": [np.fliplr],
+        "y": [np.flipud],
+        "xy": [np.fliplr, np.flipud],
+        "radial": [np.rot90],
+    }
     images["x"] = [np.flipud] if axis else images["x"]
     for image in images[symmetry]:
         assert_near(formed, image(formed), 2e-3)

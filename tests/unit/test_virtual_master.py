@@ -10,7 +10,13 @@ from digiclay.core.control.blister import Blister
 from digiclay.core.control.masters import VirtualMasterBatch, VirtualMasterColumns, gather
 from digiclay.core.control.side_by_side import join_controllers
 from digiclay.core.control.travel import Heading
-from digiclay.core.control.virtual_master import MANY, Master, Phase, VirtualMaster, make_master_cell
+from digiclay.core.control.virtual_master import (
+    MANY,
+    Master,
+    Phase,
+    VirtualMaster,
+    make_master_cell,
+)
 from digiclay.core.model.conduit import Conduit
 from digiclay.core.model.control_interface import Measurement
 from digiclay.core.model.layout import Layout, make_grid
@@ -74,16 +80,29 @@ PHASES = {
     "first touch: a spring": (IDLE, 0.0, [(0, 0, 0.1)], Phase.SPRING, 0),
     "a spring below the set point": (SPRINGY, 0.0, [(0, 0, 0.399)], Phase.SPRING, 0),
     "shaping from it on": (SPRINGY, 0.0, [(0, 0, 0.401)], Phase.SHAPING, 0),
-    # The centroid takes those within r_VM of the master alone; a flank pressed farther off counts as well.
+    # The centroid takes those within r_VM of the master alone; a flank pressed farther off counts
+    # as well.
     "the force of all cells": (SPRINGY, 0.0, [(0, 0, 0.3), (9, 0, 0.11)], Phase.SHAPING, 0),
     "shaping continues below it": (SHAPING, 0.0, [(0, 0, 0.1)], Phase.SHAPING, 0),
     "elsewhere: anew, and counted": (SHAPING, 0.0, [(-18, 0, 0.1)], Phase.SPRING, 1),
     "may be noise": (IDLE, 10e-3, [(0, 0, 9.9e-3)], Phase.IDLE, 0),
     "no noise": (IDLE, 10e-3, [(0, 0, 10.1e-3)], Phase.SPRING, 0),
-    "noise adds up to nothing": (IDLE, 10e-3, [(3.0 * x, 0, 9e-3) for x in range(5)], Phase.IDLE, 0),
+    "noise adds up to nothing": (
+        IDLE,
+        10e-3,
+        [(3.0 * x, 0, 9e-3) for x in range(5)],
+        Phase.IDLE,
+        0,
+    ),
     # What noise hides next to the master counts to the controlled force, farther off it does not.
     "enough near": (SPRINGY, 10e-3, [(0, 0, 0.39), (6, 0, 2e-3), (-6, 0, 9e-3)], Phase.SHAPING, 0),
-    "too little near": (SPRINGY, 10e-3, [(0, 0, 0.39), (6, 0, -2e-3), (-6, 0, 9e-3)], Phase.SPRING, 0),
+    "too little near": (
+        SPRINGY,
+        10e-3,
+        [(0, 0, 0.39), (6, 0, -2e-3), (-6, 0, 9e-3)],
+        Phase.SPRING,
+        0,
+    ),
     "hidden far off": (SPRINGY, 10e-3, [(0, 0, 0.395), (9, 0, 9.9e-3)], Phase.SPRING, 0),
     "felt far off": (SPRINGY, 10e-3, [(0, 0, 0.395), (9, 0, 10.1e-3)], Phase.SHAPING, 0),
     # 6 mm behind where it was and 11 mm from where it is now; the other way round 12 mm and 7 mm.
@@ -105,7 +124,8 @@ def test_forces_set_the_phase(before, floor, presses, phase, losses):
 @pytest.mark.parametrize(
     "before, force, count, height",
     [
-        # 0.2 N / 200 N/m is 1 mm. The flow goes with the error squared: after 3 s some 60 µm are left.
+        # 0.2 N / 200 N/m is 1 mm. The flow goes with the error squared: after 3 s some 60 µm are
+        # left.
         (master(phase=Phase.SPRING, height=40e-3), 0.2, 600, pytest.approx(39e-3, abs=0.1e-3)),
         (master(), 0.4, 600, 45e-3),  # at the set point it stays
         (master(), 0.3, 20, pytest.approx(45.6e-3, abs=0.6e-3)),  # below it rises
@@ -193,7 +213,9 @@ def test_the_speed_is_that_of_the_valve_s_flow_law(name, opening):
     supply = one.supply.high if opening > 0.0 else one.supply.low
     flow = one.flow.flow(np.array([opening]), np.array([supply]))[0]
     # Another order of the same few products: rounding.
-    assert make_master_cell(one, 5e-3).speed(opening) == pytest.approx(flow / one.actuator.area, rel=1e-14)
+    assert make_master_cell(one, 5e-3).speed(opening) == pytest.approx(
+        flow / one.actuator.area, rel=1e-14
+    )
 
 
 def test_in_a_period_it_goes_the_way_its_opening_lets_it():
@@ -247,7 +269,9 @@ def test_a_profile_has_its_formula_over_any_surface(blister, distance, profile):
     places, part = np.array(distance), np.array(profile)
     assert blister.evaluate_profile(places) == pytest.approx(part, rel=1e-14, abs=1e-15)
     for edge, top in ((40e-3, 55e-3), (40e-3, 30e-3)):
-        assert blister.interpolate(places, edge, top) == pytest.approx(edge + part * (top - edge), abs=1e-16)
+        assert blister.interpolate(places, edge, top) == pytest.approx(
+            edge + part * (top - edge), abs=1e-16
+        )
 
 
 # Blister
@@ -274,7 +298,9 @@ def test_targets_stay_within_the_stroke_and_outside_the_blister_whose_next_cells
     assert np.array_equal(created(master(**BESIDE), bed())[1].mode == Mode.EDGE, ring)
 
 
-@pytest.mark.parametrize("phase, mode", [(Phase.SHAPING, Mode.FORCE_FOLLOW), (Phase.SPRING, Mode.SPRING)])
+@pytest.mark.parametrize(
+    "phase, mode", [(Phase.SHAPING, Mode.FORCE_FOLLOW), (Phase.SPRING, Mode.SPRING)]
+)
 def test_cells_under_the_fingertip_show_the_phase(phase, mode):
     seen = bed()
     seen.force[at(0, 0)] = 0.1
@@ -300,7 +326,9 @@ def test_the_edge_height_is_the_mean_of_the_whole_ring_at_rest_and_of_that_ahead
     seen.height[BED.x > 0] += 2e-3
     seen.height[BED.x < 0] -= 1e-3
     ring = np.abs(np.hypot(BED.x - BESIDE["x"], BED.y - BESIDE["y"]) - 16.75e-3) < 1.75e-3
-    assert created(master(**BESIDE), seen)[0].edge == pytest.approx(seen.height[ring].mean(), abs=1e-16)
+    assert created(master(**BESIDE), seen)[0].edge == pytest.approx(
+        seen.height[ring].mean(), abs=1e-16
+    )
     seen = bed()
     seen.height[BED.x < -0.1e-3] = 60e-3  # the finished ridge
     assert created(master(1.0, 0.0), seen)[0].edge == pytest.approx(40e-3, abs=1e-16)
@@ -357,7 +385,9 @@ def test_what_outgrows_a_frozen_cell_takes_it_along(height, target, after):
 
 
 @pytest.mark.parametrize("risen, kept", [(1.4e-3, False), (1.6e-3, True)])
-def test_a_blister_in_search_of_the_finger_takes_frozen_cells_along_by_a_tenth_of_its_radius(risen, kept):
+def test_a_blister_in_search_of_the_finger_takes_frozen_cells_along_by_a_tenth_of_its_radius(
+    risen, kept
+):
     # It has not felt the finger for a period.
     searching = master(*EAST, height=55e-3)._replace(felt=55e-3 - risen, alone=1)
     target = created(searching, ridge(Mode.FROZEN))[1].target[at(-12, 0)]
@@ -397,7 +427,8 @@ def formed(x, y, profile="cone"):
 
 @pytest.mark.parametrize("profile", ["cone", "gaussian"])
 def test_a_lifting_finger_takes_the_surface_along(profile):
-    # From 4.5 mm below the surface to 3 mm above; with its pulp pressed 1.5 mm the pin stands at 44.5 mm.
+    # From 4.5 mm below the surface to 3 mm above; with its pulp pressed 1.5 mm the pin stands at
+    # 44.5 mm.
     assert formed(0.0, 0.0, profile)[7, 7] == pytest.approx(44.5e-3, abs=0.7e-3)
 
 
@@ -416,7 +447,9 @@ def test_many_masters_decide_side_by_side_as_each_alone_bit_for_bit(laminar):
     valve = replace(one.model.flow.valve, turbulent=one.model.flow.valve.turbulent / 50.0)
     model = one.model if laminar else replace(one.model, laminar=False, flow=valve)
     for _ in range(4 * MANY):
-        gains = replace(one.parameters, force_gain=draw.uniform(1, 9), felt_force=draw.uniform(0.5e-3, 2e-3))
+        gains = replace(
+            one.parameters, force_gain=draw.uniform(1, 9), felt_force=draw.uniform(0.5e-3, 2e-3)
+        )
         runs.append(replace(one, parameters=gains, model=model))
     together = join_controllers(runs)
     parts = {field.name: getattr(together, field.name) for field in fields(together)}
@@ -436,7 +469,9 @@ def test_many_masters_decide_side_by_side_as_each_alone_bit_for_bit(laminar):
         # Some are not felt, some not near; most go on where they are, or a little farther.
         total = draw.choice([0.0, 0.2, 0.5], count)
         near = total * draw.choice([0.0, 1e-3, 1.0, 1.0], count)
-        x, y = np.array([(own.x, own.y) for own in both[0]]).T + draw.choice([0.0, 1e-4, 3e-3], (2, count))
+        x, y = np.array([(own.x, own.y) for own in both[0]]).T + draw.choice(
+            [0.0, 1e-4, 3e-3], (2, count)
+        )
         sums = [total, total * x, total * y, near, near * x, near * y]
         level, cells = draw.uniform(0.0, 0.5, count), draw.integers(0, 9, count)
         results = []

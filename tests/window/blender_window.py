@@ -14,8 +14,8 @@ BLENDER = os.environ.get("DIGICLAY_BLENDER_WINDOW", "")
 ON_DISPLAY = shlex.split(os.environ.get("DIGICLAY_BLENDER_DISPLAY", ""))
 HERE = Path(__file__).parent
 ADDON = HERE.parents[1] / "addon" / "digiclay"
-#: A run takes two minutes under a virtual screen with software GL, and has taken more than eight on a busy
-#: machine; beyond this it hangs, s.
+#: A run takes two minutes under a virtual screen with software GL, and has taken more than eight on
+#: a busy machine; beyond this it hangs, s.
 LIMIT = 1200
 #: Pins at rest, and how far a pin is down at least that a finger of 4 mm depth has passed, mm.
 REST, FORMED = 40.0, 1.0
@@ -39,8 +39,9 @@ def down(seen, name):
 def played(script, out, size=(1280, 800), by_hand=False, display=""):
     """Play a script of this folder in a Blender with the extension; return what it saw and its "output".
 
-    Events come from the script, or `by_hand` from outside: Blender takes one of the two. The folder is empty
-    at first. Software GL draws a window of a small size, pixels, much quicker; `display` is that of a screen.
+    Events come from the script, or `by_hand` from outside: Blender takes one of the two. The folder
+    is empty at first. Software GL draws a window of a small size, pixels, much quicker; `display`
+    is that of a screen.
     """
     installed = out / "extensions" / "user_default" / "digiclay"
     shutil.copytree(ADDON, installed, ignore=shutil.ignore_patterns("__pycache__", ".*"))
@@ -61,7 +62,9 @@ def played(script, out, size=(1280, 800), by_hand=False, display=""):
         for picture in out.glob("*.png"):
             shutil.copy(picture, kept)
     said = f"{done.stdout[-6000:]}\n{done.stderr[-6000:]}"
-    assert (out / "seen.json").is_file(), f"Blender ended with {done.returncode} and no result:\n{said}"
+    assert (out / "seen.json").is_file(), (
+        f"Blender ended with {done.returncode} and no result:\n{said}"
+    )
     result = json.loads((out / "seen.json").read_text())
     assert "error" not in result, f"{result['error']}\n{said}"
     assert "Traceback" not in said, said

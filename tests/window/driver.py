@@ -43,7 +43,9 @@ def event(kind, value="PRESS", at=(0, 0), **modifiers):
 
 def key(kind, at, **modifiers):
     event(kind, "PRESS", at, **modifiers)
-    event(kind, "RELEASE", at, **{name: held for name, held in modifiers.items() if name != "unicode"})
+    event(
+        kind, "RELEASE", at, **{name: held for name, held in modifiers.items() if name != "unicode"}
+    )
 
 
 def click(at):
@@ -166,7 +168,9 @@ def unfolded(name, root, *sections):
     panels = part("panels")
     every = [kind for kind in panels.CLASSES if issubclass(kind, bpy.types.Panel)]
     names = ("bl_idname", "bl_parent_id", "bl_category", "bl_options")
-    former = {kind: {key: getattr(kind, key) for key in names if hasattr(kind, key)} for kind in every}
+    former = {
+        kind: {key: getattr(kind, key) for key in names if hasattr(kind, key)} for kind in every
+    }
     tab = f"Look at {name}"
     panels.unregister()
     for kind in every:
@@ -198,8 +202,8 @@ def select(thing):
 def grab(offset, axis, steps=6, look_as="", end="LEFTMOUSE", periods=0):
     """Move what is selected with G along an axis, by an offset in mm, step by step, and confirm it.
 
-    Sessions follow each step before the next, for so many control `periods` at least. With `look_as` what
-    stands in the scene is written down during the move, after each step.
+    Sessions follow each step before the next, for so many control `periods` at least. With
+    `look_as` what stands in the scene is written down during the move, after each step.
     """
     evaluate()
     start = bpy.context.view_layer.objects.active.matrix_world.translation.copy()
@@ -318,13 +322,17 @@ def take_frame(name):
 def shot(name):
     take_frame(name)
     pixels = read_shot(name)[::4, ::4]
-    SEEN.setdefault("colors", {})[name] = len(np.unique(pixels.reshape(-1, pixels.shape[2]), axis=0))
+    SEEN.setdefault("colors", {})[name] = len(
+        np.unique(pixels.reshape(-1, pixels.shape[2]), axis=0)
+    )
 
 
 def read_shot(name):
     """Return the pixels of a picture, (height, width, channels), the lower row first."""
     image = bpy.data.images.load(str(OUT / f"{name}.png"))
-    pixels = np.array(image.pixels[:], np.float32).reshape(image.size[1], image.size[0], image.channels)
+    pixels = np.array(image.pixels[:], np.float32).reshape(
+        image.size[1], image.size[0], image.channels
+    )
     bpy.data.images.remove(image)
     return pixels
 
@@ -355,8 +363,12 @@ def main():
     played = importlib.util.module_from_spec(found)
     found.loader.exec_module(played)
     if "error" not in SEEN and not getattr(played, "FINE_PINS", False):
-        part("device.parts").MANY = 0  # the vertices of rounder pins cost software GL most of a frame
-        for area in (area for screen in bpy.data.screens for area in screen.areas if area.type == "VIEW_3D"):
+        part(
+            "device.parts"
+        ).MANY = 0  # the vertices of rounder pins cost software GL most of a frame
+        for area in (
+            area for screen in bpy.data.screens for area in screen.areas if area.type == "VIEW_3D"
+        ):
             area.spaces.active.overlay.show_floor = False  # a sixth of what is left
     steps = played.script(sys.modules[__name__])
 
@@ -367,7 +379,8 @@ def main():
         except StopIteration:
             pass
         except Exception:
-            # Whatever went wrong is the test's to report; without this Blender would sit there for ever.
+            # Whatever went wrong is the test's to report; without this Blender would sit there for
+            # ever.
             SEEN["error"] = traceback.format_exc()
         finish()
         return None

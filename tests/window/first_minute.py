@@ -20,19 +20,21 @@ from tests.window.hand_strokes import (
 
 #: Pictures show the pins as a user sees them; a film has a frame for each step of the hand.
 FINE_PINS = PICTURED = "DIGICLAY_SCREENSHOTS" in os.environ
-#: Pixels from the upper right corner of the sidebar to the tab, and in it to the first button; from the
-#: corners of other windows to the menu File, the arrow of *Get Extensions*, the button *Export*.
+#: Pixels from the upper right corner of the sidebar to the tab, and in it to the first button; from
+#: the corners of other windows to the menu File, the arrow of *Get Extensions*, the button
+#: *Export*.
 TAB, START, FILE, ARROW, EXPORT = (-10, 178), (-130, 45), (46, 13), (-20, 19), (-60, -22)
 #: How far the middle mouse button drags the view, pixels: down, to look more from above.
 TILT = 95
 #: Steps in which it goes from one place to the next.
 TURNS = 11
-#: What the curves of the two hearts are multiplied by, mm; steps along each; and their turn, rad: upright in
-#: the view of the start-up file.
+#: What the curves of the two hearts are multiplied by, mm; steps along each; and their turn, rad:
+#: upright in the view of the start-up file.
 OUTER, INNER, TURN = (3.7, 108), (1.6, 48), 0.815
 #: Depth of the inner one that is typed, mm.
 DEPTH = 8
-#: The fingertip comes below this place along x of the bed, mm, on the left side of the outer one alone.
+#: The fingertip comes below this place along x of the bed, mm, on the left side of the outer one
+#: alone.
 LEFT = -30.0
 
 
@@ -41,7 +43,9 @@ def lay_heart(size, steps):
     places = []
     for angle in (2.0 * pi * step / steps for step in range(steps + 1)):
         x = size * 16.0 * sin(angle) ** 3
-        y = size * (13.0 * cos(angle) - 5.0 * cos(2 * angle) - 2.0 * cos(3 * angle) - cos(4 * angle) + 2.0)
+        y = size * (
+            13.0 * cos(angle) - 5.0 * cos(2 * angle) - 2.0 * cos(3 * angle) - cos(4 * angle) + 2.0
+        )
         places.append((cos(TURN) * x - sin(TURN) * y, sin(TURN) * x + cos(TURN) * y))
     return places
 
@@ -158,7 +162,9 @@ def ridge(blender):
 
 
 def valley(blender):
-    yield from done(blender, to(on_the_screen(blender, 0.0, 0.0)), "key shift+f sleep 0.5", f"key {DEPTH}")
+    yield from done(
+        blender, to(on_the_screen(blender, 0.0, 0.0)), "key shift+f sleep 0.5", f"key {DEPTH}"
+    )
     blender.shot("relief_depth")
     yield from done(blender, "key Return")
     yield from trace(blender, "valley", lay_heart(*INNER), 1.5, "mousedown 1", "mouseup 1")
@@ -184,7 +190,9 @@ def export(blender):
     browser = next(area for area in shown.screen.areas if area.type == "FILE_BROWSER")
     browser.spaces.active.params.directory = bytes(blender.OUT)
     yield 1.0
-    yield from done(blender, to((x + shown.width + EXPORT[0], y + shown.height + EXPORT[1])), "click 1")
+    yield from done(
+        blender, to((x + shown.width + EXPORT[0], y + shown.height + EXPORT[1])), "click 1"
+    )
     yield from blender.until(lambda: any(blender.OUT.glob("*.stl")))
 
 
@@ -216,7 +224,9 @@ def script(blender):
         began, waited = time.perf_counter(), waiting()
         yield from step(blender)
         blender.SEEN.setdefault("steps", []).append(words)
-        blender.SEEN.setdefault("took", []).append([time.perf_counter() - began, waiting() - waited])
+        blender.SEEN.setdefault("took", []).append(
+            [time.perf_counter() - began, waiting() - waited]
+        )
     yield from ball(blender)
 
 

@@ -32,7 +32,9 @@ def put_spikes(blender):
     for row in (0, system.rows.target):
         state.rows[row, cells] += SPIKE
     state.modes[cells] = 1
-    kept = blender.part("core.session.snapshot").dump(system, state._replace(peak=float(state.rows[0].max())))
+    kept = blender.part("core.session.snapshot").dump(
+        system, state._replace(peak=float(state.rows[0].max()))
+    )
     pose = session.pose.copy()
     pose[2] = 0.08
     back = blender.part("sessions.sculpting").restore(session, kept, pose)

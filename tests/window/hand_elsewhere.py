@@ -44,7 +44,9 @@ def held_stroke(blender):
 
 
 def followed(blender):
-    yield from blender.until(lambda: held_stroke(blender) is not None and held_stroke(blender).reached > 0)
+    yield from blender.until(
+        lambda: held_stroke(blender) is not None and held_stroke(blender).reached > 0
+    )
 
 
 def let_go(blender, name):
@@ -74,12 +76,15 @@ def turned(blender):
     process.terminate()
     yield from done(blender, process)
     seen = {"held": held_stroke(blender) is not None}
-    # What a trackpad sends to Blender on X11: two fingers up, to the left and to the right are wheels.
+    # What a trackpad sends to Blender on X11: two fingers up, to the left and to the right are
+    # wheels.
     yield from done(blender, hand("click 4 sleep 0.1 click 6 sleep 0.1 click 7 sleep 0.1"))
     seen["nearer"] = distance / looking.view_distance
     yield from done(blender, hand(drag(middle, on_the_screen(blender, HALF, 0.0), 0.5, 60)))
     yield from let_go(blender, "turned")
-    blender.SEEN["turned"] |= seen | {"turned": np.abs(np.array(looking.view_rotation) - before).max().item()}
+    blender.SEEN["turned"] |= seen | {
+        "turned": np.abs(np.array(looking.view_rotation) - before).max().item()
+    }
     blender.shot("elsewhere_turned")
 
 
@@ -103,13 +108,18 @@ def draw_in(blender, name, window, region, corner):
 def windows_on_screen():
 
     def told(*words):
-        return subprocess.run(["xdotool", *words], check=True, capture_output=True, text=True).stdout.split()
+        return subprocess.run(
+            ["xdotool", *words], check=True, capture_output=True, text=True
+        ).stdout.split()
 
     lines = {
         number: told("getwindowgeometry", "--shell", number)
         for number in told("search", "--onlyvisible", "--class", "blender")
     }
-    return {one: {k: int(v) for k, v in (text.split("=") for text in found)} for one, found in lines.items()}
+    return {
+        one: {k: int(v) for k, v in (text.split("=") for text in found)}
+        for one, found in lines.items()
+    }
 
 
 def second_window(blender):

@@ -18,8 +18,13 @@ from tests.window.hand_strokes import (
     to,
 )
 
-#: Ends of three quick strokes, mm, drawn one after the other in so many moves, within so long each, s.
-LINES = (((-27.0, 20.0), (27.0, 20.0)), ((-27.0, 0.0), (27.0, 0.0)), ((-27.0, -20.0), (27.0, -20.0)))
+#: Ends of three quick strokes, mm, drawn one after the other in so many moves, within so long each,
+#: s.
+LINES = (
+    ((-27.0, 20.0), (27.0, 20.0)),
+    ((-27.0, 0.0), (27.0, 0.0)),
+    ((-27.0, -20.0), (27.0, -20.0)),
+)
 DURATION, RATE = 0.25, 120
 #: Wave of a single stroke, drawn under different loads, mm.
 WAVE = ((-27.0, -9.0), (-9.0, 12.0), (9.0, -12.0), (27.0, 9.0))
@@ -32,7 +37,9 @@ def draw(blender, *paths, then=""):
     for path in paths:
         places = [on_the_screen(blender, *place) for place in path]
         words += [to(places[0], 0.02), "mousedown 1"]
-        words += [drag(start, end, DURATION / (len(places) - 1), RATE) for start, end in pairwise(places)]
+        words += [
+            drag(start, end, DURATION / (len(places) - 1), RATE) for start, end in pairwise(places)
+        ]
         words += ["mouseup 1"]
     return hand(*words, then)
 
@@ -86,7 +93,10 @@ def queue(blender):
 
 def haste(blender):
     loop = blender.part("live.loop").LOOP
-    for name, keys in (("finished", "key Return"), ("let go on", "key Return sleep 0.05 key Escape")):
+    for name, keys in (
+        ("finished", "key Return"),
+        ("let go on", "key Return sleep 0.05 key Escape"),
+    ):
         yield from done(blender, draw(blender, *LINES, then=keys))
         yield from blender.until(lambda: not loop.in_haste)
         note(blender, name)
@@ -118,7 +128,9 @@ def taken_back(blender):
     yield from blender.until(lambda: not blender.sessions())
     note(blender, "stopped")
     bpy.ops.wm.open_mainfile(filepath=file)
-    yield from blender.until(lambda: not blender.part("live.beds").read_queue(blender.beds()[0])[-1])
+    yield from blender.until(
+        lambda: not blender.part("live.beds").read_queue(blender.beds()[0])[-1]
+    )
     yield from blender.rounds()
     note(blender, "opened")
     brush(blender).brush = "LOWER"

@@ -139,7 +139,9 @@ def script(blender):
     yield from prepare(blender)
     for duration, rate in STROKES:
         how, picture = (duration, rate), f"hand_{duration:g}"
-        yield from stroke(blender, f"stroke {duration:g}", (-HALF, 0.0), (HALF, 0.0), *how, picture=picture)
+        yield from stroke(
+            blender, f"stroke {duration:g}", (-HALF, 0.0), (HALF, 0.0), *how, picture=picture
+        )
         yield from reset(blender)
     yield from message(blender)
     yield from taps(blender)
@@ -156,7 +158,9 @@ def message(blender):
     size = tip.scale.copy()
     for scale, waits in ((0.0 * size, True), (size, False)):
         tip.scale = scale
-        yield from blender.until(lambda waits=waits: bool(blender.session().blocking_reason) == waits)
+        yield from blender.until(
+            lambda waits=waits: bool(blender.session().blocking_reason) == waits
+        )
     blender.SEEN["message"] = blender.part("sessions.running").last_message()
     yield from stroke(blender, "stroke under a message", (-HALF, 0.0), (HALF, 0.0))
     yield from reset(blender)
@@ -164,7 +168,9 @@ def message(blender):
 
 def taps(blender):
     note(blender, "before the taps")
-    yield from act(blender, *(to(on_the_screen(blender, *at), 0.08) + " click 1 sleep 0.15" for at in TAPS))
+    yield from act(
+        blender, *(to(on_the_screen(blender, *at), 0.08) + " click 1 sleep 0.15" for at in TAPS)
+    )
     note(blender, "taps")
     yield from act(blender, to(on_the_screen(blender, 0.0, -30.0)), "key ctrl+z")
     note(blender, "one tap undone")
@@ -205,7 +211,9 @@ def pie_menu(blender):
         "sleep 0.3 mouseup 1 sleep 0.5", drag((x + 60, y + 40), (x + 90, y + 40), 0.3, 30),
     )  # fmt: skip
     yield from blender.until(lambda: process.poll() is not None)
-    yield from blender.until(lambda: not any(one.held for s in blender.sessions() for one in s.strokes))
+    yield from blender.until(
+        lambda: not any(one.held for s in blender.sessions() for one in s.strokes)
+    )
     after = list(area.spaces.active.region_3d.view_location)
     yield from finish(blender, process)
     note(blender, "pie menu")
@@ -216,7 +224,9 @@ def pie_menu(blender):
 def taken_back(blender):
     for name, key in (("undone", "ctrl+z"), ("escaped", "Escape")):
         process = line(blender, (-HALF, 0.0), (HALF, 0.0), last="sleep 2")
-        yield from blender.until(lambda: any(s.strokes and s.strokes[0].reached for s in blender.sessions()))
+        yield from blender.until(
+            lambda: any(s.strokes and s.strokes[0].reached for s in blender.sessions())
+        )
         yield from act(blender, f"key {key} sleep 0.2")
         hand("mouseup 1")
         yield from finish(blender, process)
@@ -244,8 +254,11 @@ def things(blender):
             axes = one.length, one.width, one.thickness
             size = [1e3 * given or other for given, other in zip(axes, usual, strict=True)]
             if not np.allclose(bpy.context.window_manager.digiclay_finger, size):
-                # The fingertip has a size at a time; the strokes of one size are drawn while others wait.
-                yield from blender.until(lambda: not any(session.strokes for session in blender.sessions()))
+                # The fingertip has a size at a time; the strokes of one size are drawn while others
+                # wait.
+                yield from blender.until(
+                    lambda: not any(session.strokes for session in blender.sessions())
+                )
                 bpy.context.window_manager.digiclay_finger = size
             choose(blender, one)
             yield from done(blender, hand(follow(blender, one)))

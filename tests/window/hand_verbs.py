@@ -28,7 +28,9 @@ def keep(blender, name):
     note(blender, name)
     session = blender.session()
     locked = blender.part("core.base.modes").Mode.LOCKED
-    blender.SEEN[name]["locked"] = [] if session is None else (session.state.mode() == locked).tolist()
+    blender.SEEN[name]["locked"] = (
+        [] if session is None else (session.state.mode() == locked).tolist()
+    )
     blender.shot(f"verbs_{name.replace(' ', '_')}")
 
 
@@ -71,7 +73,9 @@ def stamp(blender, settings):
     settings.brush, settings.stamp, settings.height = "STAMP", "pyramid", 12.0
     start, end = (on_the_screen(blender, x, 18.0) for x in (0.0, 15.0))
     process = hand(to(start), "mousedown 1", drag(start, end, *HOW), "sleep 1 mouseup 1")
-    yield from blender.until(lambda: bool(bpy.context.window.modal_operators.get("DIGICLAY_OT_press_shape")))
+    yield from blender.until(
+        lambda: bool(bpy.context.window.modal_operators.get("DIGICLAY_OT_press_shape"))
+    )
     yield 0.8
     blender.shot("verbs_stamp_under_way")
     yield from finish(blender, process)
@@ -89,7 +93,10 @@ def center(blender, settings):
     yield from reset(blender)
     note(blender, "flat")
     yield from blender.settle()
-    start, end = on_the_screen(blender, *CENTER), on_the_screen(blender, CENTER[0] + 15.0, CENTER[1] + 15.0)
+    start, end = (
+        on_the_screen(blender, *CENTER),
+        on_the_screen(blender, CENTER[0] + 15.0, CENTER[1] + 15.0),
+    )
     area, region = blender.view()
     with bpy.context.temp_override(window=blender.window(), area=area, region=region):
         bpy.ops.digiclay.press_center("INVOKE_DEFAULT")

@@ -1,7 +1,7 @@
 """Intended reliefs of the things that strokes form: drawings that depend on no stroke.
 
-Lines, arcs and areas have the section that a designer expects of a brush: even up to the flat part of its
-blister, then straight down to the ground.
+Lines, arcs and areas have the section that a designer expects of a brush: even up to the flat part
+of its blister, then straight down to the ground.
 """
 
 from collections.abc import Sequence
@@ -12,7 +12,8 @@ import numpy as np
 
 Corners = Sequence[tuple[float, float]]
 
-#: Section of strokes by the bed's fingertip, a stylus of 6 mm and a palm: half of the flat part, and of all.
+#: Section of strokes by the bed's fingertip, a stylus of 6 mm and a palm: half of the flat part,
+#: and of all.
 TIP, STYLUS, PALM = (3.0, 7.5), (2.25, 5.625), (18.75, 46.875)
 
 
@@ -44,21 +45,28 @@ def _round(corners):
     """Return a closed polygon with its corners cut off, and those that this leaves once more."""
     for _ in range(2):
         start, end = np.array(corners[:-1]), np.array(corners[1:])
-        cut = np.stack([0.75 * start + 0.25 * end, 0.25 * start + 0.75 * end], axis=1).reshape(-1, 2)
+        cut = np.stack([0.75 * start + 0.25 * end, 0.25 * start + 0.75 * end], axis=1).reshape(
+            -1, 2
+        )
         corners = [*map(tuple, cut.tolist()), tuple(cut[0].tolist())]
     return corners
 
 
 def _mirror(*lines):
     """Return lines and their mirror images."""
-    return [replace(line, corners=[(s * x, y) for x, y in line.corners]) for line in lines for s in (1, -1)]
+    return [
+        replace(line, corners=[(s * x, y) for x, y in line.corners])
+        for line in lines
+        for s in (1, -1)
+    ]
 
 
 def _draw_r(height):
     """Stem, bowl and leg of a letter R."""
     bowl = [(-28.0, 50.0), *_arc(4.0, 25.0, 25.0, 90.0, -90.0), (-28.0, 0.0)]
     return [
-        Line(part, height) for part in ([(-28.0, -50.0), (-28.0, 50.0)], bowl, [(4.0, 0.0), (30.0, -50.0)])
+        Line(part, height)
+        for part in ([(-28.0, -50.0), (-28.0, 50.0)], bowl, [(4.0, 0.0), (30.0, -50.0)])
     ]
 
 
@@ -68,7 +76,9 @@ LETTER_A = [
 ]  # fmt: skip
 #: Spiral whose turns are 18 mm apart: 400 mm between its first and its last radius.
 SPIRAL = [
-    (r * np.cos(a), r * np.sin(a)) for r in np.linspace(4.0, 48.04, 1000) for a in (2 * np.pi * (r - 4) / 18,)
+    (r * np.cos(a), r * np.sin(a))
+    for r in np.linspace(4.0, 48.04, 1000)
+    for a in (2 * np.pi * (r - 4) / 18,)
 ]
 #: Leaf between two arcs from tip to tip, midrib with a stalk, and veins.
 LEAF = [
@@ -122,7 +132,9 @@ THINGS = tuple(RELIEFS)
 
 def find_relief(name, x, y):
     """Return the intended heights of one of `THINGS` above rest at some places (n,), m."""
-    layers = [np.array([line.evaluate(1e3 * x, 1e3 * y) for line in layer]) for layer in RELIEFS[name]]
+    layers = [
+        np.array([line.evaluate(1e3 * x, 1e3 * y) for line in layer]) for layer in RELIEFS[name]
+    ]
     heights = [one.max(axis=0).clip(0.0) + one.min(axis=0).clip(None, 0.0) for one in layers]
     return np.asarray(1e-3 * np.sum(heights, axis=0))
 

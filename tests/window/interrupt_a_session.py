@@ -75,7 +75,9 @@ def script(blender):
     yield from after("scaled")
     blender.key("F", blender.on_the_bed(0.0, -25.0))  # at every redraw it would fail
     yield 1.0
-    blender.SEEN["adjusting"] = [operator.bl_idname for operator in blender.window().modal_operators]
+    blender.SEEN["adjusting"] = [
+        operator.bl_idname for operator in blender.window().modal_operators
+    ]
     blender.beds()[0].scale = (1.0, 1.0, 1.0)
     yield from after("scaled no more")
 
@@ -112,7 +114,9 @@ def script(blender):
     yield 1.0
     blender.look("another file")
     drawing = getattr(bpy.types.STATUSBAR_HT_header.draw, "_draw_funcs", [])
-    blender.SEEN["keys drawn"] = [f.__module__ for f in drawing if f.__module__.startswith(blender.EXTENSION)]
+    blender.SEEN["keys drawn"] = [
+        f.__module__ for f in drawing if f.__module__.startswith(blender.EXTENSION)
+    ]
     blender.call(bpy.ops.mesh.digital_clay_add)
     yield from blender.start()
     blender.look("before quitting")

@@ -66,7 +66,8 @@ def ridge(blender):
     # Lifted while its pins still sink, a fingertip is lost.
     yield from blender.simulate(100)
     note(blender, "pressed")
-    # At 5 mm/s of the device's time, however slow the machine is; a quick tick takes a step at once.
+    # At 5 mm/s of the device's time, however slow the machine is; a quick tick takes a step at
+    # once.
     yield from to_height(blender, 47.0, steps=60, periods=8)
     note(blender, "raised")
     yield from blender.grab((30, 0, 0), "X", steps=15, periods=20)
@@ -107,7 +108,9 @@ def replayed(blender):
     note(blender, "replay stopped")
     blender.call(bpy.ops.digiclay.take_replay, "INVOKE_DEFAULT")
     end = blender.part("recorded.takes").read(blender.beds()[0], "1").end
-    yield from blender.until(lambda: blender.part("live.beds").read_snapshot(blender.beds()[0]) == end)
+    yield from blender.until(
+        lambda: blender.part("live.beds").read_snapshot(blender.beds()[0]) == end
+    )
     yield 1.0
     note(blender, "replayed")
 

@@ -96,7 +96,9 @@ def export(blender):
     blender.SEEN["groups"] = [group.name for group in made.vertex_groups]
     made.location.y -= 0.9
     blender.select(bed)
-    blender.call(bpy.ops.mesh.digital_clay_make, "EXEC_DEFAULT", True, kind="features", skin="smooth")
+    blender.call(
+        bpy.ops.mesh.digital_clay_make, "EXEC_DEFAULT", True, kind="features", skin="smooth"
+    )
     yield None
     blender.key("HOME", blender.middle())
     yield None
@@ -113,7 +115,9 @@ def export(blender):
 
 def browser(blender):
     """Export by File > Export: look at the browser's options, change the format, and confirm."""
-    blender.call(bpy.ops.export_mesh.digital_clay, "INVOKE_DEFAULT", kind="solid", file_format="3mf")
+    blender.call(
+        bpy.ops.export_mesh.digital_clay, "INVOKE_DEFAULT", kind="solid", file_format="3mf"
+    )
     yield 1.0
     yield None
     windows = bpy.context.window_manager.windows

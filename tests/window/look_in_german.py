@@ -17,8 +17,8 @@ PANELS = {
     "DIGICLAY_PT_control": "control blister sensors simulation recorder",
 }
 LIVE = ("DIGICLAY_PT_session", "DIGICLAY_PT_takes", "DIGICLAY_PT_laboratory")
-#: At a scale of 1, pixels: an icon with the margins of its button, the margins of a label of a property, and
-#: what tabs and margins take of a sidebar.
+#: At a scale of 1, pixels: an icon with the margins of its button, the margins of a label of a
+#: property, and what tabs and margins take of a sidebar.
 ICON, MARGIN, TABS = 26.0, 6.0, 55.0
 #: Share of a row that the label of a property has.
 LABEL = 0.4
@@ -53,7 +53,10 @@ def script(blender):
         blf.size(0, points * scale)
         (root,) = panel.layout.introspect()
         need, text = find_need(root, scale)
-        drawn[f"{type(panel).__name__}, {scale}: {text}"] = need, context.region.width - TABS * scale
+        drawn[f"{type(panel).__name__}, {scale}: {text}"] = (
+            need,
+            context.region.width - TABS * scale,
+        )
 
     for kind in blender.part("panels").CLASSES:
         if issubclass(kind, bpy.types.Panel):

@@ -28,7 +28,9 @@ def move(strokes, angle, shift):
     """Return strokes turned by an angle, rad, and shifted, m; depths and heights stay."""
     c, s, (x0, y0) = cos(angle), sin(angle), shift
     return tuple(
-        replace(one, moves=tuple((t, c * x - s * y + x0, s * x + c * y + y0) for t, x, y in one.moves))
+        replace(
+            one, moves=tuple((t, c * x - s * y + x0, s * x + c * y + y0) for t, x, y in one.moves)
+        )
         for one in strokes
     )
 
@@ -64,8 +66,12 @@ def play(scene, strokes):
     """Play strokes on a bed at rest."""
     session, force, rest = begin(scene), 0.0, scene.actuator.rest_height
     for after in play_strokes(session, strokes):
-        # A trace has the total of the fingertips; what each of several feels is seen at the end of a tick.
-        one, since = len(session.poses) == len(after.poses) == 1, after.state.period - session.state.period
+        # A trace has the total of the fingertips; what each of several feels is seen at the end of
+        # a tick.
+        one, since = (
+            len(session.poses) == len(after.poses) == 1,
+            after.state.period - session.state.period,
+        )
         felt = after.trace.force[-since:] if one and since else after.state.finger_forces()
         session, force = after, max(force, float(felt.max(initial=0.0)))
     time = session.state.period * session.system.period

@@ -150,18 +150,24 @@ def views(blender):
     yield from tapped(blender, blender.pixel(blender.world(-15.0, 9.0)), "orthographic")
     blender.shot("play_orthographic")
     areas = len(blender.window().screen.areas)
-    blender.call(bpy.ops.screen.screen_full_area)  # a quarter of a small view has no room for the overlay
+    blender.call(
+        bpy.ops.screen.screen_full_area
+    )  # a quarter of a small view has no room for the overlay
     yield from blender.until(lambda: len(blender.window().screen.areas) < areas)
     blender.part("operators.pin_view").pick_pins(blender.beds()[0], [312])
     blender.call(bpy.ops.screen.region_quadview)
     yield from blender.until(lambda: top_quarter(blender) is not None)
-    yield from tapped(blender, blender.pixel(blender.world(15.0, -9.0), top_quarter(blender)), "quad view")
+    yield from tapped(
+        blender, blender.pixel(blender.world(15.0, -9.0), top_quarter(blender)), "quad view"
+    )
     with drawn(blender) as marks:
         yield from blender.until(lambda: len(marks) == 4)
     blender.SEEN["drawn in the quarters"] = sorted(marks.values())
     area, _ = blender.view()
     turned = area.spaces.active.region_3d
-    own = next(one.as_pointer() for one in area.regions if one.type == "WINDOW" and one.data == turned)
+    own = next(
+        one.as_pointer() for one in area.regions if one.type == "WINDOW" and one.data == turned
+    )
     blender.SEEN["drawn where the view can be turned"] = marks[own]
     blender.shot("play_quad")
     blender.call(bpy.ops.screen.region_quadview)
@@ -215,7 +221,9 @@ def tapped(blender, at, name):
 
 
 def held(blender):
-    return "DIGICLAY_OT_press" in [operator.bl_idname for operator in blender.window().modal_operators]
+    return "DIGICLAY_OT_press" in [
+        operator.bl_idname for operator in blender.window().modal_operators
+    ]
 
 
 def at_rest(blender):
@@ -240,7 +248,9 @@ def pick(blender):
     blender.window().workspace = bpy.data.workspaces["Animation"]
     yield None
     yield None
-    timeline = next(area for area in blender.window().screen.areas if area.type == "DOPESHEET_EDITOR")
+    timeline = next(
+        area for area in blender.window().screen.areas if area.type == "DOPESHEET_EDITOR"
+    )
     yield from blender.click((timeline.x + timeline.width // 2, timeline.y + timeline.height // 2))
     blender.SEEN["clicked in the timeline"] = list(picked(blender.beds()[0]))
     blender.key("HOME", blender.middle())

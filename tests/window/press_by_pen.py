@@ -11,14 +11,23 @@ from tests.window.hand_strokes import finish, note, on_the_screen, prepare
 
 HAND = Path(__file__).parent / "tablet" / "pen_hand.py"
 #: Row, mm, pressure, and tilt to the right and to the user, of each stroke; half its length, mm.
-STROKES = {"firm": (24.0, 1.0, 0.0, 0.0), "light": (0.0, 0.5, 0.0, 0.0), "leaning": (-24.0, 1.0, 0.8, 0.0)}
+STROKES = {
+    "firm": (24.0, 1.0, 0.0, 0.0),
+    "light": (0.0, 0.5, 0.0, 0.0),
+    "leaning": (-24.0, 1.0, 0.8, 0.0),
+}
 HALF = 12.0
 
 
 def draw(blender, row, pressure, right, near):
     places = (on_the_screen(blender, float(x), row) for x in np.linspace(-HALF, HALF, 31))
     (x, y), *later = places
-    words = [f"to {x} {y} 0 {right} {near}", "sleep 0.1", f"to {x} {y} {pressure} {right} {near}", "down"]
+    words = [
+        f"to {x} {y} 0 {right} {near}",
+        "sleep 0.1",
+        f"to {x} {y} {pressure} {right} {near}",
+        "down",
+    ]
     for x, y in later:
         words += ["sleep 0.033", f"to {x} {y} {pressure} {right} {near}"]
     return subprocess.Popen([sys.executable, str(HAND), *words, "up"])

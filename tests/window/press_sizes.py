@@ -25,7 +25,8 @@ from tests.window.hand_strokes import (
 MIRRORED = ((-27.0, 12.0), (-9.0, 12.0))
 #: Radius of the ring, mm.
 RADIUS = 21.0
-#: How far the mouse goes sideways to make the fingertip larger, mm on the bed: half of what its size grows.
+#: How far the mouse goes sideways to make the fingertip larger, mm on the bed: half of what its
+#: size grows.
 WIDER = 4.0
 #: Places of the pins, mm: behind the cube, and beside it.
 COVERED, BARE = (15.0, -15.0), (-27.0, -27.0)
@@ -41,7 +42,9 @@ def script(blender):
     yield from act(blender, to(on_the_screen(blender, -24.0, -24.0)), "click 1")
     yield from sizes(blender)
     yield from reset(blender)
-    bpy.ops.ed.undo_push(message="Reset")  # what Ctrl-Z goes back to: a reset has no step of its own
+    bpy.ops.ed.undo_push(
+        message="Reset"
+    )  # what Ctrl-Z goes back to: a reset has no step of its own
     yield from symmetric(blender)
     yield from shapes(blender)
 
@@ -86,7 +89,9 @@ def sizes(blender):
     yield from done(blender, to(start), keys("f 1 c m Return"), name="typed cm")
     yield from done(blender, keys("bracketright bracketright bracketleft"), name="brackets")
     yield from done(blender, keys("f 1 6 Return"))
-    yield from done(blender, to(start), keys("shift+f"), drag(start, (start[0] + 40, start[1]), 0.4, 60))
+    yield from done(
+        blender, to(start), keys("shift+f"), drag(start, (start[0] + 40, start[1]), 0.4, 60)
+    )
     blender.shot("size_depth")
     yield from done(blender, "click 1", name="deeper")
     yield from done(blender, keys("shift+f 4 Return ctrl+f 5 0 Return"), name="strength")
@@ -127,7 +132,9 @@ def shapes(blender):
 
 
 def put(blender):
-    bpy.ops.wm.redraw_timer(type="DRAW_WIN_SWAP", iterations=1)  # a view that has changed knows so when drawn
+    bpy.ops.wm.redraw_timer(
+        type="DRAW_WIN_SWAP", iterations=1
+    )  # a view that has changed knows so when drawn
     area, _ = blender.view()
     looking = area.spaces.active.region_3d
     place = blender.world(*COVERED)
@@ -147,7 +154,9 @@ def try_both(blender, name):
     for what, place in (("covered", COVERED), ("bare", BARE)):
         yield from act(blender, to(on_the_screen(blender, *place), 0.3), "click 1 sleep 0.3")
         seen[what] = sum(session.finished_strokes for session in blender.sessions())
-        seen[f"{what} selected"] = [thing.name for thing in blender.window().view_layer.objects.selected]
+        seen[f"{what} selected"] = [
+            thing.name for thing in blender.window().view_layer.objects.selected
+        ]
     blender.SEEN[name] = seen
     yield from reset(blender)
 

@@ -28,7 +28,8 @@ def drag(blender, way, pause=0.3):
 def come(blender):
     """Wait until the finger has come to rest: it stays where it is while the session ticks on.
 
-    By time alone a slow machine, on which nothing happens for a second, would be taken for a finger at rest.
+    By time alone a slow machine, on which nothing happens for a second, would be taken for a finger
+    at rest.
     """
     last, still, since = None, 0, 0
     for _ in range(480):
@@ -56,7 +57,9 @@ def note(blender, name):
         "bed": blender.heights().round(4).tolist(),
         "finger": (1e3 * blender.part("bridge").pose(tip)[:3]).tolist(),
         "overlay": blender.part("overlay.views").shown(),
-        "forces written": bool(blender.part("bridge").read_cells(blender.beds()[0].data)["force"].any()),
+        "forces written": bool(
+            blender.part("bridge").read_cells(blender.beds()[0].data)["force"].any()
+        ),
         "picked": list(blender.part("device.view").picked_pins(blender.beds()[0])),
     }
 
@@ -123,7 +126,10 @@ def edges(blender):
     places = {"middle": (0.4, 0.6), "right": (0.98, 0.6), "corner": (0.97, 0.03)}
     blender.SEEN["room"], blender.SEEN["text"] = (left, bottom, right, top), {}
     for name, (x, y) in places.items():
-        at = round(region.x + left + x * (right - left)), round(region.y + bottom + y * (top - bottom))
+        at = (
+            round(region.x + left + x * (right - left)),
+            round(region.y + bottom + y * (top - bottom)),
+        )
         pictures = []
         for preferences.show_cursor_text in (False, True):
             blender.event("MOUSEMOVE", "NOTHING", at)
@@ -131,7 +137,9 @@ def edges(blender):
             blender.shot(f"press_text_{name}")
             pictures.append(blender.read_shot(f"press_text_{name}"))
         rows, columns = np.nonzero((pictures[0] != pictures[1]).any(axis=2))
-        ends = [columns.min(), rows.min(), columns.max(), rows.max()] - np.tile([region.x, region.y], 2)
+        ends = [columns.min(), rows.min(), columns.max(), rows.max()] - np.tile(
+            [region.x, region.y], 2
+        )
         blender.SEEN["text"][name] = ends.tolist()
     looking.view_distance, area.spaces.active.show_region_ui = distance, False
     yield 0.5

@@ -81,7 +81,8 @@ class Events:
             willing = operator.poll()
         if willing:
             try:
-                # With an undo step: data that come and go without one crash Blender at the next undo.
+                # With an undo step: data that come and go without one crash Blender at the next
+                # undo.
                 self.blender.call(operator, *(how or ("EXEC_DEFAULT",)), True, **properties)
             except RuntimeError as error:
                 if not str(error).startswith("Error: "):  # what an operator reports is no fault

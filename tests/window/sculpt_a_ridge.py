@@ -101,7 +101,9 @@ def shape(blender):
     blender.call(bpy.ops.mesh.digital_clay_make, "EXEC_DEFAULT", True, kind="solid", beside=False)
     yield None
     mesh = blender.window().view_layer.objects.active
-    blender.SEEN["mesh"] = max(vertex.co.z for vertex in mesh.data.vertices) / blender.part("bridge").SCALE
+    blender.SEEN["mesh"] = (
+        max(vertex.co.z for vertex in mesh.data.vertices) / blender.part("bridge").SCALE
+    )
     blender.key("Z", blender.middle(), ctrl=True)
     yield None
 

@@ -4,7 +4,17 @@ import bpy
 import numpy as np
 from mathutils import Vector
 
-from tests.window.hand_strokes import act, add_bed, done, finish, focus_window, hand, line, on_the_screen, to
+from tests.window.hand_strokes import (
+    act,
+    add_bed,
+    done,
+    finish,
+    focus_window,
+    hand,
+    line,
+    on_the_screen,
+    to,
+)
 
 
 def count_orange(name, blender):
@@ -73,7 +83,9 @@ def draw_lines(blender, count, depth):
     away = np.hypot(np.maximum(np.abs(x) - 50.0, 0.0), aside)
     under = np.minimum(4.0 - depth - np.sqrt(np.maximum(16.0 - away**2, 0.0)), 0.0)
     height = np.where(away < 4.0, 40.0 + under, 40.0)
-    bridge.write_cells(bed.data, place, 1e-3 * height, mode=np.where(height < 40.0, 1, 0).astype(np.int8))
+    bridge.write_cells(
+        bed.data, place, 1e-3 * height, mode=np.where(height < 40.0, 1, 0).astype(np.int8)
+    )
 
 
 def lines_at(count):
@@ -87,13 +99,17 @@ def measure_lines(blender, count, name):
     rows = [blender.on_the_bed(0.0, y)[1] - region.y for y in (-1.0, 0.5)]
     profile = np.convolve(shown[:, left:right].mean(axis=1), np.ones(rows[1] - rows[0]), "same")
     profile /= rows[1] - rows[0]
-    ends = [[blender.on_the_bed(0.0, y + d)[1] - region.y for d in (-6.0, 6.0)] for y in lines_at(count)]
+    ends = [
+        [blender.on_the_bed(0.0, y + d)[1] - region.y for d in (-6.0, 6.0)] for y in lines_at(count)
+    ]
     return [float(np.ptp(profile[low:high])) for low, high in ends]
 
 
 def rectangle_of_the_bed(blender):
     bed = blender.beds()[0]
-    corners = np.array([blender.pixel(bed.matrix_world @ Vector(corner)) for corner in bed.bound_box])
+    corners = np.array(
+        [blender.pixel(bed.matrix_world @ Vector(corner)) for corner in bed.bound_box]
+    )
     _, region = blender.view()
     corners -= (region.x, region.y)
     return [float(value) for value in (*corners.min(axis=0), *corners.max(axis=0))]
@@ -192,7 +208,9 @@ def levels_of_detail(blender):
         # Between the limits: 9 pixels a pitch.
         looking.view_distance = distance * (times or pitch_in_pixels(blender, distance) / 9.0)
         area.tag_redraw()
-        yield from blender.rounds(20)  # the pitch is measured in a drawing, and acted upon by a timer
+        yield from blender.rounds(
+            20
+        )  # the pitch is measured in a drawing, and acted upon by a timer
         note(blender, name)
     looking.view_distance = distance
 

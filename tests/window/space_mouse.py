@@ -1,8 +1,9 @@
 """Stand-in for the driver of a 3D mouse: programs connect to it, and what a hand sends comes to them.
 
-The library libspnav, by which Blender reads a 3D mouse on Linux, connects to the socket in ``SPNAV_SOCKET``
-and asks first for a version of the protocol. Each motion is then 8 integers: 0, translation to the right, up
-and to the user, turns about these axes, and the time since the one before, ms.
+The library libspnav, by which Blender reads a 3D mouse on Linux, connects to the socket in
+``SPNAV_SOCKET`` and asks first for a version of the protocol. Each motion is then 8 integers: 0,
+translation to the right, up and to the user, turns about these axes, and the time since the one
+before, ms.
 """
 
 import os
@@ -25,7 +26,9 @@ def driver(folder, blender):
     path, mark = str(folder / "space_mouse"), folder / "made"
     # Where a true driver runs, the file is there already, and stays.
     files = (USUAL, str(mark))
-    _run(blender, f"import os; os.path.exists({USUAL!r}) or [open(name, 'x') for name in {files!r}]")
+    _run(
+        blender, f"import os; os.path.exists({USUAL!r}) or [open(name, 'x') for name in {files!r}]"
+    )
     try:
         yield from _listen(path)
     finally:

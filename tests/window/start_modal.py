@@ -15,7 +15,9 @@ def script(blender):
     yield None
     # Blender loses an operator of which it has had a subclass: last.
     action = blender.part("operators.action")
-    every = [kind for kind in blender.part("operators").CLASSES if issubclass(kind, bpy.types.Operator)]
+    every = [
+        kind for kind in blender.part("operators").CLASSES if issubclass(kind, bpy.types.Operator)
+    ]
     for kind in [kind for kind in every if hasattr(kind, "modal")]:
         begun = {}
         if issubclass(kind, action.Modal):
@@ -47,7 +49,11 @@ def stamp(blender):
     """Press on the bed with a stamp from a file that is not there, then with one that is."""
     blender.call(bpy.ops.wm.tool_set_by_id, name="digiclay.press_tool")
     settings = blender.part("press.brush").tool_settings(bpy.context)
-    settings.brush, settings.stamp, settings.stamp_file = "STAMP", "FILE", str(blender.OUT / "no.stl")
+    settings.brush, settings.stamp, settings.stamp_file = (
+        "STAMP",
+        "FILE",
+        str(blender.OUT / "no.stl"),
+    )
     for name, x in (("FILE", -15.0), ("heart", 15.0)):
         settings.stamp, at = name, blender.on_the_bed(x, 0.0)
         blender.event("MOUSEMOVE", "NOTHING", at)

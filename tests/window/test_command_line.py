@@ -23,7 +23,9 @@ def execute(tmp_path_factory):
         done = subprocess.run(
             words, env=environment, cwd=folder, capture_output=True, text=True, timeout=TIMEOUT
         )
-        assert (done.returncode, "Traceback" in done.stderr) == (status, False), done.stdout + done.stderr
+        assert (done.returncode, "Traceback" in done.stderr) == (status, False), (
+            done.stdout + done.stderr
+        )
         return done
 
     return execute
@@ -85,7 +87,9 @@ def test_a_series_for_a_farm_is_run_by_blender(command, execute, tmp_path):
         "[film]\nwidth = 64\nheight = 40\nrate = 20\n",
         encoding="utf-8",
     )
-    done = command("batch", str(jobs), "--out", str(out), "--submit", "openjd", "--program", str(BLENDER))
+    done = command(
+        "batch", str(jobs), "--out", str(out), "--submit", "openjd", "--program", str(BLENDER)
+    )
     assert f"-p {blender}" in done.stdout
     # As the line that was printed says.
     execute(sys.executable, "-m", "openjd", "run", str(out / "openjd.json"), "-p", blender)

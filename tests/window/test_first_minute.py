@@ -22,13 +22,19 @@ def test_the_script_takes_the_steps_of_the_page_and_each_does_what_it_says(seen)
     assert 1.0 < seen["distance"] < 6.0
     # No pin has an outline, and all the factory file has but its cube is kept.
     assert (seen["selected"], {"Camera", "Light"} <= set(seen["things"])) == ([], True)
-    assert np.array(seen["ridge"]["bed"]).shape == (BEDS[FIRST].rows, BEDS[FIRST].columns) == (100, 100)
+    assert (
+        np.array(seen["ridge"]["bed"]).shape
+        == (BEDS[FIRST].rows, BEDS[FIRST].columns)
+        == (100, 100)
+    )
     assert (seen["started"], seen["tool"], seen["left"]) == (1, "digiclay.press_tool", 0)
 
 
 def test_a_ridge_and_a_valley_stand_within_a_minute_along_the_hearts_that_were_drawn(seen):
     plan = BEDS[FIRST]
-    x, y = np.meshgrid(*(1e3 * plan.pitch * (np.arange(n) - (n - 1) / 2) for n in (plan.columns, plan.rows)))
+    x, y = np.meshgrid(
+        *(1e3 * plan.pitch * (np.arange(n) - (n - 1) / 2) for n in (plan.columns, plan.rows))
+    )
     outer, inner = (find_distance(seen[f"{name} drawn"], x, y) for name in ("ridge", "valley"))
     # A pixel of the picture is 0.3 mm; the top of a blister is flat in its middle.
     assert np.abs(up(seen, "ridge")[outer < 1.0] - 15.0).max() < 1.0

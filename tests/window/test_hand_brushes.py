@@ -20,7 +20,9 @@ def test_a_quick_drag_of_60_mm_raises_all_its_columns_by_15_mm(seen, name, row):
     assert (np.abs(risen - 15.0) < 2.0).mean() >= 0.95
 
 
-def test_ctrl_lowers_level_fills_a_valley_the_header_smooths_and_a_click_with_shift_forms_a_line(seen):
+def test_ctrl_lowers_level_fills_a_valley_the_header_smooths_and_a_click_with_shift_forms_a_line(
+    seen,
+):
     assert (up(seen, "lowered")[12, COLUMNS] < -1.0).mean() >= 0.95
     assert up(seen, "lowered")[12, 12] < -1.0
     # The pin in the middle of the crossing, and its neighbors along the stroke.
@@ -38,15 +40,16 @@ def test_shift_and_a_drag_smooth_a_spike_in_one_stroke(seen):
     assert smoothed.sum() == pytest.approx(before.sum(), abs=625 * 0.01)
     outside = np.abs(np.arange(25) - 12) > 3
     np.testing.assert_array_equal(smoothed[outside], before[outside])
-    # It begins where the mouse went down, by 0.3 mm a pixel: a drag is told from a click after 3 of them.
+    # It begins where the mouse went down, by 0.3 mm a pixel: a drag is told from a click after 3 of
+    # them.
     np.testing.assert_allclose(seen["smoothed"]["first"], [-HALF, 0.0], atol=0.5)
 
 
 @pytest.mark.parametrize(
     "name, before, tolerance",
     [
-        # The script's reset before it was no undo step: what it removed is there again, as it was when the
-        # stroke ended; pins still settled then by some µm.
+        # The script's reset before it was no undo step: what it removed is there again, as it was
+        # when the stroke ended; pins still settled then by some µm.
         pytest.param("raising undone", "raised", 0.05, id="a raised ridge is one undo step"),
         pytest.param("undone", "before", 1e-3, id="Ctrl-Z takes the smoothing back"),
         pytest.param("escaped", "by brush", 1e-3, id="Esc in mid-stroke leaves the bed as before"),

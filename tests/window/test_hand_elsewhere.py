@@ -13,7 +13,10 @@ PITCH = 3.0
 @pytest.fixture(scope="module")
 def seen(tmp_path_factory):
     """Play the script once, with a 3D mouse; return what stood in the scene after each of its steps."""
-    with driver(tmp_path_factory.mktemp("mouse"), BLENDER) as path, pytest.MonkeyPatch.context() as patch:
+    with (
+        driver(tmp_path_factory.mktemp("mouse"), BLENDER) as path,
+        pytest.MonkeyPatch.context() as patch,
+    ):
         patch.setenv(VARIABLE, path)
         out = tmp_path_factory.mktemp("elsewhere")
         return played("hand_elsewhere.py", out, size=(800, 560), by_hand=True)

@@ -23,8 +23,8 @@ def test_strokes_drawn_at_once_do_not_wait_for_the_clock_are_all_formed_and_undo
         assert formed(seen, f"undone {count}") == [True] * (3 - count) + [False] * count
         assert formed(seen, f"redone {count}") == [True] * (1 + count) + [False] * (2 - count)
     assert formed(seen, "backspace") == [True, True, False]
-    # By the clock it were 5 ms in a tick, of which there are at most 30 a second. Software draws for most of
-    # the time, and the machine is shared.
+    # By the clock it were 5 ms in a tick, of which there are at most 30 a second. Software draws
+    # for most of the time, and the machine is shared.
     assert seen["time"]["simulated"] > 2.0 * 0.15 * seen["time"]["after the hand"]
 
 
@@ -54,7 +54,8 @@ def test_three_times_esc_takes_back_no_stroke_and_a_file_saved_meanwhile_has_all
 
 @pytest.mark.parametrize("name", list(LOADS)[1:])
 def test_the_same_path_leaves_the_same_heights_whatever_the_load(seen, name):
-    # The script may miss the last moves before a quick stroke ends: its path is no more than a beginning.
+    # The script may miss the last moves before a quick stroke ends: its path is no more than a
+    # beginning.
     one, other = seen["alone"], seen[name]
     shorter = min(len(one["path"]), len(other["path"]))
     assert one["path"][:shorter] == other["path"][:shorter]

@@ -38,7 +38,9 @@ def test_each_tap_is_a_press_of_its_own(seen, name, formed):
 
 
 def test_the_view_turns_and_zooms_in_mid_stroke_and_the_stroke_goes_on(seen):
-    before, middle, after = (seen[name] for name in ("before orbit", "in mid-stroke", "after orbit"))
+    before, middle, after = (
+        seen[name] for name in ("before orbit", "in mid-stroke", "after orbit")
+    )
     assert np.abs(np.subtract(before["view"], middle["view"])).max() > 0.02
     assert middle["distance"] < before["distance"]
     assert (middle["drawn"], after["drawn"]) == (before["drawn"], before["drawn"] + 1)

@@ -30,7 +30,11 @@ def test_erasing_brings_a_groove_back_to_rest_but_for_locked_pins(seen):
 
 @pytest.mark.parametrize(
     "name, before",
-    [("erasing undone", "locked"), ("inverting undone", "erasing undone"), ("stamping undone", "cleared")],
+    [
+        ("erasing undone", "locked"),
+        ("inverting undone", "erasing undone"),
+        ("stamping undone", "cleared"),
+    ],
 )
 def test_each_is_one_undo_step(seen, name, before):
     assert_near(up(seen, name), up(seen, before), 1e-3)
@@ -53,7 +57,10 @@ def test_a_stamp_stands_where_and_as_large_as_it_was_drawn_and_ctrl_presses_it_i
     # In the row 18 mm behind the middle; the hand's place is good to a pixel or two.
     assert risen[18, 12] == pytest.approx(12.0, abs=0.8)
     across = np.flatnonzero(risen[18] > 0.5) * 3.0 - 36.0
-    assert (across.min(), across.max()) == (pytest.approx(-13.5, abs=2.0), pytest.approx(13.5, abs=2.0))
+    assert (across.min(), across.max()) == (
+        pytest.approx(-13.5, abs=2.0),
+        pytest.approx(13.5, abs=2.0),
+    )
     sunk = up(seen, "imprinted") - up(seen, "cleared")
     assert sunk.min() == pytest.approx(-8.0, abs=0.8)
     assert sunk.max() < 0.01
@@ -64,7 +71,10 @@ def test_a_placed_center_has_five_rays_about_it(seen):
     assert (x, y) == (pytest.approx(CENTER[0], abs=0.7), pytest.approx(CENTER[1], abs=0.7))
     assert axis == pytest.approx(math.pi / 4.0, abs=0.1)
     risen = up(seen, "radial") - up(seen, "flat")
-    places = [(x + 15.0 * math.cos(turn), y + 15.0 * math.sin(turn)) for turn in np.arange(5) * 0.4 * math.pi]
+    places = [
+        (x + 15.0 * math.cos(turn), y + 15.0 * math.sin(turn))
+        for turn in np.arange(5) * 0.4 * math.pi
+    ]
     for place in places:
         column, row = (round(part / 3.0) + 12 for part in place)
         assert risen[max(row - 1, 0) : row + 2, max(column - 1, 0) : column + 2].max() > 5.0, place

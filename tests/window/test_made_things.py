@@ -40,7 +40,8 @@ def test_a_thing_made_by_recorded_strokes_is_what_was_intended(name):
 SIDE = 60
 #: Angles, degrees, and shifts, m, of the cases: beside the grid of the pins.
 TURNS = ((0.0, (0.0, 0.0)), (17.0, (0.4e-3, 0.7e-3)))
-#: Depths and heights asked for, m; ticks a second, and moves a tick, of hands on slow and quick machines.
+#: Depths and heights asked for, m; ticks a second, and moves a tick, of hands on slow and quick
+#: machines.
 AMOUNTS, HANDS = (2e-3, 4e-3, 8e-3, 15e-3), ((60.0, 1), (24.0, 5), (7.0, 1))
 #: How far from the path pins are whose heights count as those of the stroke, m.
 CORE = 1.5e-3
@@ -54,7 +55,11 @@ KINDS = {
 def _bend(*places):
     """Return the moves of a hand through places, mm, within half a second."""
     times = np.linspace(0.0, 0.5, len(places))
-    return {"moves": tuple((t, 1e-3 * x, 1e-3 * y) for t, (x, y) in zip(times.tolist(), places, strict=True))}
+    return {
+        "moves": tuple(
+            (t, 1e-3 * x, 1e-3 * y) for t, (x, y) in zip(times.tolist(), places, strict=True)
+        )
+    }
 
 
 PATHS = {
@@ -109,7 +114,9 @@ def find_spikes(made):
 def draw_by_hand(scene, stroke, rate, moves):
     """Draw a stroke on a bed at rest, some moves a tick, ticks at a rate, 1/s; return heights, (n,), m."""
     session = begin(scene)
-    session, number = queue_stroke(session, start(0, *stroke.moves[0][1:], stroke.amount, brush=stroke.kind))
+    session, number = queue_stroke(
+        session, start(0, *stroke.moves[0][1:], stroke.amount, brush=stroke.kind)
+    )
     left, count = list(stroke.moves[1:]), round(1.0 / (rate * session.system.period))
     while find_stroke(session, number) is not None:
         for _, x, y in left[:moves]:
@@ -125,7 +132,8 @@ def list_reliefs():
     for (kind, amount), (name, path) in product(KINDS.items(), PATHS.items()):
         for angle, shift in TURNS:
             made = play(
-                make_bed(side=SIDE), move((PointerStroke(**amount, **path),), math.radians(angle), shift)
+                make_bed(side=SIDE),
+                move((PointerStroke(**amount, **path),), math.radians(angle), shift),
             )
             formed = measure_unevenness(made)
             yield {
@@ -151,7 +159,9 @@ def list_differences():
         usual = play(make_bed(side=SIDE), (free,)).formed
         for rate, moves in HANDS:
             drawn = draw_by_hand(make_bed(side=SIDE), free, rate, moves)
-            yield _differ(f"{kind}: drawn by {moves} moves a tick, {rate:g} ticks a second", drawn - usual)
+            yield _differ(
+                f"{kind}: drawn by {moves} moves a tick, {rate:g} ticks a second", drawn - usual
+            )
     for brush, asked in product(("lower", "raise"), AMOUNTS):
         line = PointerStroke(brush=brush, depth=asked, height=asked, **PATHS["line"])
         made = play(make_bed(side=SIDE), (line,))

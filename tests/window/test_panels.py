@@ -15,9 +15,13 @@ COMPLAINTS = (
 
 
 def test_every_panel_is_drawn_unfolded_without_a_complaint_and_a_bed_beside_it(seen):
-    pictures = "start all device device_rest laboratory details takes control control_rest stale own"
+    pictures = (
+        "start all device device_rest laboratory details takes control control_rest stale own"
+    )
     others = "panels_own_missing panels_preferences export_features export_meshes export_browser"
-    assert set(seen["colors"]) == {f"panels_{name}" for name in pictures.split()} | set(others.split())
+    assert set(seen["colors"]) == {f"panels_{name}" for name in pictures.split()} | set(
+        others.split()
+    )
     assert [word for word in COMPLAINTS if word in seen["output"]] == []
     # Shaded pins have thousands of colors.
     assert 500 < seen["colors"]["panels_start"] < seen["colors"]["panels_all"]

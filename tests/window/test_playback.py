@@ -10,14 +10,19 @@ REST = 40e-3
 def test_the_bed_forms_while_the_gizmo_is_dragged(seen):
     down = [seen[f"gizmo {step}"]["pose"][2] for step in range(1, 7)]
     assert (np.diff(down) <= 0.0).all()
-    # The blue arrow is dragged by what 12 mm are seen as; what it takes to be a drag is a few pixels.
+    # The blue arrow is dragged by what 12 mm are seen as; what it takes to be a drag is a few
+    # pixels.
     assert down[0] - down[-1] == pytest.approx(12e-3, abs=3e-3)
     assert seen["gizmo 6"]["heights"][0] < REST - 0.1e-3
 
 
 def test_the_bed_follows_an_animation_and_esc_stops_first_the_session_then_the_playback(seen):
     assert seen["played"]["heights"][0] < REST - 0.5e-3
-    assert [seen[name]["sessions"] for name in ("played", "after one Esc", "after two")] == [1, 0, 0]
+    assert [seen[name]["sessions"] for name in ("played", "after one Esc", "after two")] == [
+        1,
+        0,
+        0,
+    ]
     assert [seen[name]["plays"] for name in ("after one Esc", "after two")] == [True, False]
 
 
@@ -38,7 +43,9 @@ def test_a_session_waits_for_a_render_and_outlives_the_view_it_was_started_in(se
     assert "internal error" not in seen["output"]
 
 
-@pytest.mark.parametrize("name, place", [("orthographic", (-15e-3, 9e-3)), ("quad view", (15e-3, -9e-3))])
+@pytest.mark.parametrize(
+    "name, place", [("orthographic", (-15e-3, 9e-3)), ("quad view", (15e-3, -9e-3))]
+)
 def test_the_press_tool_presses_under_the_mouse_in_every_view(seen, name, place):
     # A pixel of the small views is up to 1 mm of the bed.
     np.testing.assert_allclose(seen[name]["pose"][:2], place, rtol=0, atol=1.5e-3)

@@ -9,7 +9,9 @@ from tests.assemble import assert_near
 from tests.window.blender_window import ON_DISPLAY, played
 from tests.window.tablet.screen import pen_screen
 
-pytestmark = pytest.mark.skipif(not ON_DISPLAY, reason="a screen with a pen needs DIGICLAY_BLENDER_DISPLAY")
+pytestmark = pytest.mark.skipif(
+    not ON_DISPLAY, reason="a screen with a pen needs DIGICLAY_BLENDER_DISPLAY"
+)
 
 
 @pytest.fixture(scope="module")
@@ -20,7 +22,8 @@ def seen(tmp_path_factory):
 
 
 @pytest.mark.parametrize(
-    "name, depth, angle", [("firm", 4.0, 0.0), ("light", 2.0, 0.0), ("leaning", 4.0, 0.8 * FULL_TILT)]
+    "name, depth, angle",
+    [("firm", 4.0, 0.0), ("light", 2.0, 0.0), ("leaning", 4.0, 0.8 * FULL_TILT)],
 )
 def test_a_pen_presses_as_deep_as_its_pressure_and_the_fingertip_leans_with_it_meanwhile(
     seen, name, depth, angle

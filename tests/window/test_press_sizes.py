@@ -33,7 +33,9 @@ def test_the_session_goes_on_with_the_size_that_is_set(seen, name, size, toleran
 def test_depth_and_strength_have_keys_of_their_own(seen):
     assert seen["begun"]["depth"] == pytest.approx(4.0)
     assert seen["deeper"]["depth"] == pytest.approx(6.0, abs=0.2)
-    assert (seen["strength"]["depth"], seen["strength"]["strength"]) == pytest.approx((4.0, 0.5), abs=1e-6)
+    assert (seen["strength"]["depth"], seen["strength"]["strength"]) == pytest.approx(
+        (4.0, 0.5), abs=1e-6
+    )
 
 
 def test_a_symmetric_stroke_forms_its_images_and_is_one_undo_step(seen):

@@ -42,11 +42,17 @@ def test_images_are_alike_on_a_turned_bed(seen, name, turns):
 
 
 def test_twelve_images_on_a_large_bed_take_the_periods_of_one(seen):
-    print({name: f"{periods} periods, {seconds:.2f} s" for name, (periods, seconds) in seen["timed"].items()})
+    print(
+        {
+            name: f"{periods} periods, {seconds:.2f} s"
+            for name, (periods, seconds) in seen["timed"].items()
+        }
+    )
     # While the hand is slower than the fingertip, the session waits for it.
     for name, alone in (("2", "1"), ("6", "1"), ("12", "1"), ("2 beside", "1 beside")):
         assert seen["timed"][name][0] <= 1.15 * seen["timed"][alone][0] + 16
-    # Those that begin at their ends do so when the hand lets go, at 1.6 times that of one if it is slow.
+    # Those that begin at their ends do so when the hand lets go, at 1.6 times that of one if it is
+    # slow.
     assert seen["timed"]["12 rays"][0] <= 1.6 * seen["timed"]["1 ray"][0]
 
 

@@ -17,8 +17,8 @@ def finger(seen, name):
 
 def test_a_press_starts_a_session_and_puts_the_finger_under_the_mouse(seen):
     assert (seen["added"]["sessions"], seen["pressed"]["sessions"]) == (0, 1)
-    # 18 mm, 6 mm to a pixel of the picture: the bed of 75 mm is 500 pixels wide. The fingertip waits within
-    # 0.5 mm of the hand, the way of a control period.
+    # 18 mm, 6 mm to a pixel of the picture: the bed of 75 mm is 500 pixels wide. The fingertip
+    # waits within 0.5 mm of the hand, the way of a control period.
     assert_near(finger(seen, "pressed")[:2], [18.0, 6.0], 0.8)
     # Its lowest point is below the tops of the pins that hold its force.
     assert -6.0 < finger(seen, "pressed")[2] - REST < -4.0
@@ -66,12 +66,23 @@ def test_clicks_pick_the_pins_under_the_mouse_and_forces_are_written_once_they_a
 
 
 def test_the_overlay_is_drawn_while_a_session_runs_and_it_is_wanted(seen):
-    wanted = {"added": False, "pressed": True, "overlay off": False, "overlay on": True, "ended": False}
+    wanted = {
+        "added": False,
+        "pressed": True,
+        "overlay off": False,
+        "overlay on": True,
+        "ended": False,
+    }
     assert {name: seen[name]["overlay"] for name in wanted} == wanted
 
 
 def test_the_next_press_starts_the_session_anew_and_ends_with_its_bed(seen):
-    assert [seen[name]["sessions"] for name in ("ended", "started anew", "bed deleted")] == [0, 1, 0]
+    assert [seen[name]["sessions"] for name in ("ended", "started anew", "bed deleted")] == [
+        0,
+        1,
+        0,
+    ]
     assert seen["bed deleted"]["beds"] == 0
-    # Disabled: what the extension left behind to draw would fail with a traceback, which ends `played`.
+    # Disabled: what the extension left behind to draw would fail with a traceback, which ends
+    # `played`.
     assert seen["tools held"] == ["digiclay.press_tool", "builtin.select_box"]

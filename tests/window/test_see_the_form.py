@@ -8,7 +8,8 @@ FEW = 150
 
 
 def test_ten_valleys_of_3_mm_are_read_from_above_and_the_light_that_a_user_chooses_remains(seen):
-    # A tenth is seen at a glance. As pins in the light of the factory file they differ by color alone.
+    # A tenth is seen at a glance. As pins in the light of the factory file they differ by color
+    # alone.
     assert len(seen["lit"]) == 10
     assert min(seen["lit"]) > 0.35
     assert min(seen["lit"]) > 2.0 * max(seen["as pins"])

@@ -38,14 +38,16 @@ def test_dragging_moves_the_fingertip_of_a_bed_at_rest_and_nothing_else_without_
 def test_the_ridge_grows_and_the_fingertip_is_felt_during_the_move(seen):
     pressing = [lowest(seen[f"pressing {step}"]) for step in range(1, 7)]
     assert pressing[-1] < pressing[0]
-    # Cells that keep the height they were left at, and those the fingertip leaves behind: its trail.
+    # Cells that keep the height they were left at, and those the fingertip leaves behind: its
+    # trail.
     modes = np.array([seen[f"drawing {step}"]["modes"] for step in range(1, 9)])
     trail = modes[:, 1] + modes[:, 7]
     assert (np.diff(trail) >= 0).all()
     assert trail[-1] > trail[1] + 20
     # The set point is 0.4 N.
     assert all(0.1 < seen[f"drawing {step}"]["force"] < 2.0 for step in range(2, 9))
-    # Software GL draws a frame in a third of a second; 20 periods of 5 ms are simulated in between at most.
+    # Software GL draws a frame in a third of a second; 20 periods of 5 ms are simulated in between
+    # at most.
     assert 0.0 < seen["drawn"]["factor"] <= 1.1
 
 
@@ -54,7 +56,9 @@ def test_what_was_formed_stays_when_lifted_and_backspace_and_undo_take_it_back_a
     assert seen["lifted"]["force"] == 0.0
     assert lowest(seen["lifted"]) < 39e-3
     # Backspace takes back the last gesture alone, also after undo and redo.
-    counts = [seen[name]["gestures"] for name in ("lift redone", "resumed", "rewound", "rewinding undone")]
+    counts = [
+        seen[name]["gestures"] for name in ("lift redone", "resumed", "rewound", "rewinding undone")
+    ]
     assert counts == [seen["lifted"]["gestures"]] * 2 + [counts[0] - 1, counts[0]]
     assert counts[0] > 1
     assert lowest(seen["rewinding undone"]) == pytest.approx(lowest(seen["resumed"]), abs=SETTLING)
@@ -75,13 +79,18 @@ def test_undo_and_redo_take_one_gesture_after_the_other_and_the_session_goes_on(
 def test_p_pauses_and_resumes_and_shift_p_does_one_period(seen):
     paused = seen["paused"]
     assert (paused["paused"], seen["paused later"]["period"]) == (True, paused["period"])
-    assert (seen["single step"]["paused"], seen["single step"]["period"]) == (True, paused["period"] + 1)
+    assert (seen["single step"]["paused"], seen["single step"]["period"]) == (
+        True,
+        paused["period"] + 1,
+    )
     assert not seen["resumed"]["paused"]
     assert seen["resumed"]["period"] > paused["period"] + 1
 
 
 def test_a_file_saved_in_mid_session_is_loaded_as_it_was_and_esc_keeps_what_is_formed(seen):
-    saved, loaded, later, stopped = (seen[name] for name in ("saved", "loaded", "going on", "stopped"))
+    saved, loaded, later, stopped = (
+        seen[name] for name in ("saved", "loaded", "going on", "stopped")
+    )
     assert [look["sessions"] for look in (loaded, later, stopped)] == [0, 1, 0]
     assert "another file was loaded" in loaded["said"]
     assert (loaded["heights"], loaded["kept"]) == (saved["heights"], saved["kept"])
@@ -119,7 +128,9 @@ def test_a_session_waits_with_the_reason_and_goes_on(interrupted, stopped, words
         pytest.param("enabled again", 0, id="disabling the extension ends the session"),
         pytest.param("going on", 1, id="a session starts after enabling"),
         pytest.param("another file", 0, id="loading another file ends the session"),
-        pytest.param("before quitting", 1, id="Blender quits with a session on, well as `played` requires"),
+        pytest.param(
+            "before quitting", 1, id="Blender quits with a session on, well as `played` requires"
+        ),
     ],
 )
 def test_sessions_end_with_what_they_need(interrupted, name, sessions):
@@ -135,7 +146,11 @@ def test_whatever_ends_a_session_says_so_and_leaves_the_state_and_nothing_else(i
     assert lowest(again) == pytest.approx(lowest(interrupted["formed"]), abs=2 * SETTLING)
     assert later["period"] > again["period"]
     assert "another file was loaded" in interrupted["another file"]["said"]
-    left = (interrupted["another file"]["beds"], interrupted["panels left"], interrupted["keys drawn"])
+    left = (
+        interrupted["another file"]["beds"],
+        interrupted["panels left"],
+        interrupted["keys drawn"],
+    )
     assert left == (0, [], [])
 
 
@@ -162,7 +177,9 @@ def test_the_shape_comes_up_and_a_session_goes_on_from_it_with_the_fingertip_abo
     assert seen["displayed"]["heights"] == pytest.approx([0.04, 0.052], abs=1.1e-5)
     assert seen["displayed"]["pose"][2] > 0.052
     assert seen["session on a shape"]["sessions"] == 1
-    assert seen["session on a shape"]["heights"] == pytest.approx(seen["displayed"]["heights"], abs=1e-7)
+    assert seen["session on a shape"]["heights"] == pytest.approx(
+        seen["displayed"]["heights"], abs=1e-7
+    )
 
 
 def test_the_fingertip_forms_the_shape_which_is_made_a_mesh_and_kept_in_one_undo_step(seen):
@@ -178,7 +195,9 @@ HAND = list(range(1, 8))
 
 
 def test_fingertips_come_and_go_while_the_session_goes_on(seen):
-    found = {name: seen[name]["numbers"] for name in ("two", "hand", "deleted", "hand again", "copied")}
+    found = {
+        name: seen[name]["numbers"] for name in ("two", "hand", "deleted", "hand again", "copied")
+    }
     assert found == {
         "two": [1, 2],
         "hand": HAND,

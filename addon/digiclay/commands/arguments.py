@@ -15,8 +15,8 @@ from ..core.scene.schema import Scene
 
 #: The key of the control method in scene files.
 METHOD = "control.method"
-#: Options by ``"--name METAVAR"``: the help; type or choices, help, and perhaps the default; or a dict of
-#: arguments of `argparse`.
+#: Options by ``"--name METAVAR"``: the help; type or choices, help, and perhaps the default; or a
+#: dict of arguments of `argparse`.
 Options = Table
 #: Keys in scene files of options that change a scene.
 SET_BY = {"method": METHOD, "stepper": "simulation.stepper", "tolerance": "simulation.tolerance"}
@@ -71,7 +71,9 @@ SCENE_OPTIONS: Options = {
 }
 
 
-def add_scene(parser: argparse.ArgumentParser, default: str = "", *, optional: bool = False) -> None:
+def add_scene(
+    parser: argparse.ArgumentParser, default: str = "", *, optional: bool = False
+) -> None:
     """Add SCENE, or --scene where there is a default, and the options that change it."""
     scene = "a .toml file, a sample's name, or the folder of a run"
     if default:
@@ -108,7 +110,9 @@ def name_methods(varied: str) -> str:
     key, _, words = varied.partition("=")
     if key.strip() != METHOD:
         return varied
-    return f"{METHOD}={','.join(load_by_option(word.strip(), '--vary') for word in words.split(','))}"
+    return (
+        f"{METHOD}={','.join(load_by_option(word.strip(), '--vary') for word in words.split(','))}"
+    )
 
 
 def load_by_option(word: str, option: str) -> str:
@@ -158,7 +162,9 @@ class Command(NamedTuple):
 
     def add(self, commands: Any, name: str) -> None:
         """Add the command to others."""
-        parser = add_command(commands, name, *self.texts, carry_out=self.carry_out, listed=self.listed)
+        parser = add_command(
+            commands, name, *self.texts, carry_out=self.carry_out, listed=self.listed
+        )
         for each in self.taken:
             each(parser) if callable(each) else add_options(parser, each)
 
@@ -199,7 +205,9 @@ def whole_number(least: int, most: int) -> Callable[[str], int]:
     def read(text: str) -> int:
         digits = text.isascii() and text.isdecimal() and len(text) < 12
         if not digits or not least <= int(text) <= most:
-            raise argparse.ArgumentTypeError(f"must be a whole number from {least} to {most} (got {text!r})")
+            raise argparse.ArgumentTypeError(
+                f"must be a whole number from {least} to {most} (got {text!r})"
+            )
         return int(text)
 
     return read
@@ -217,7 +225,8 @@ def _measured(usual: str, unit: str) -> Callable[[str], float]:
     return read
 
 
-#: Readers of a time, ``0.3`` or ``"300 ms"``, of a length in m, and of one that is in mm without a unit.
+#: Readers of a time, ``0.3`` or ``"300 ms"``, of a length in m, and of one that is in mm without a
+#: unit.
 seconds, length, millimeters = _measured("s", "s"), _measured("m", "m"), _measured("mm", "m")
 
 
@@ -235,5 +244,7 @@ def size(text: str) -> tuple[int, int]:
     """Read the size of a picture, ``1600x1000``."""
     read = re.fullmatch(r"([1-9]\d{0,4})x([1-9]\d{0,4})", text)
     if not read:
-        raise argparse.ArgumentTypeError(f"must be WIDTHxHEIGHT in pixels, such as 1600x1000 (got {text!r})")
+        raise argparse.ArgumentTypeError(
+            f"must be WIDTHxHEIGHT in pixels, such as 1600x1000 (got {text!r})"
+        )
     return int(read[1]), int(read[2])

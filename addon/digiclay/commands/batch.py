@@ -43,7 +43,10 @@ FARM_OPTIONS = {
     "--program PATH": (
         "with --submit: digiclay, its Python or Blender on the machines there; default: the one running"
     ),
-    "--chunk N": (read_count, f"with --submit: frames of a film that a task draws; default {CHUNK}"),
+    "--chunk N": (
+        read_count,
+        f"with --submit: frames of a film that a task draws; default {CHUNK}",
+    ),
     "--quiet": QUIET,
 }
 OPTIONS: Options = {
@@ -64,7 +67,8 @@ INSTEAD = {
         f"write the files of the jobs and those of a render farm: {', '.join(FORMATS)}; run none",
     ),
 }
-#: Seconds between two pages that are written while jobs run, at least, and times that a page's writing takes.
+#: Seconds between two pages that are written while jobs run, at least, and times that a page's
+#: writing takes.
 PAUSE, REST = 2.0, 10.0
 
 
@@ -115,13 +119,19 @@ def carry_out(arguments: Namespace) -> int:
         if arguments.prepare:
             say(arguments, f"{len(series.jobs) - len(failed)} jobs written to {out / 'jobs'}")
         elif arguments.submit:
-            say(arguments, *write_farm_files(folder, arguments.submit, arguments.program, arguments.chunk))
+            say(
+                arguments,
+                *write_farm_files(folder, arguments.submit, arguments.program, arguments.chunk),
+            )
         elif not _finish(arguments, folder, failed):
             return STOPPED
     if not failed:
         return 0
     name, error = next(iter(failed.items()))
-    print(f"{len(failed)} of {len(series.jobs)} jobs failed; the first one: {name}: {error}", file=sys.stderr)
+    print(
+        f"{len(failed)} of {len(series.jobs)} jobs failed; the first one: {name}: {error}",
+        file=sys.stderr,
+    )
     return FAILED
 
 
@@ -152,7 +162,9 @@ def _finish(arguments: Namespace, folder: Folder, failed: dict[str, str]) -> boo
                     say(arguments, f"failed: {job.name}: {error}")
                 began = time.monotonic()
                 if began >= due:
-                    folder.write_index(failed, f"{folder.summarize(ended, failed, 'ended so far')}.")
+                    folder.write_index(
+                        failed, f"{folder.summarize(ended, failed, 'ended so far')}."
+                    )
                     due = time.monotonic() + max(PAUSE, REST * (time.monotonic() - began))
         stopped = stop()
     now = sum(folder.is_done(job) for job in todo)
@@ -189,7 +201,9 @@ def _start_job(folder: Folder, job: Job) -> JobProcess:
     return JobProcess(arguments, folder.find_log(job))
 
 
-def write_farm_files(folder: Folder, form: str, program: str | None, chunk: int | None) -> list[str]:
+def write_farm_files(
+    folder: Folder, form: str, program: str | None, chunk: int | None
+) -> list[str]:
     """Write the files of a farm, or none in case of an error; return the lines to print."""
     tasks = plan_series(folder.batch, chunk or CHUNK)
     # Without "..", through the links by which the user named it where that is right.
@@ -202,7 +216,9 @@ def write_farm_files(folder: Folder, form: str, program: str | None, chunk: int 
         try:
             word.encode()
         except UnicodeEncodeError:
-            raise OutputError(f"{word!r} is not valid text: choose another folder with --out.") from None
+            raise OutputError(
+                f"{word!r} is not valid text: choose another folder with --out."
+            ) from None
     if form == "cuecmd":  # an earlier submission may have had more lists
         for path in folder.path.glob("cuecmd/[0-9]-*.txt"):
             if f"cuecmd/{path.name}" not in files:
@@ -212,7 +228,10 @@ def write_farm_files(folder: Folder, form: str, program: str | None, chunk: int 
         path.parent.mkdir(exist_ok=True)
         write_whole(path, text.encode())
     count = len(split_frames(tasks))
-    return [f"{count} tasks written to {', '.join(str(folder.path / name) for name in files)}", *lines]
+    return [
+        f"{count} tasks written to {', '.join(str(folder.path / name) for name in files)}",
+        *lines,
+    ]
 
 
 def find_start(program: str | None) -> list[str]:

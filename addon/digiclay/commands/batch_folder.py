@@ -24,9 +24,11 @@ from .progress import format_duration
 MARK, JOBS, LOGS, INDEX = "batch.json", "jobs", "logs", "index.html"
 #: What a thumbnail leads to: the first of these there is.
 SHOWN = ("film.mp4", "turntable.mp4", "still.png")
-#: What a card says of a job that is not done, and after how many seconds a browser then loads the page again.
+#: What a card says of a job that is not done, and after how many seconds a browser then loads the
+#: page again.
 UNDONE, AGAIN = [("not done yet", "")], 30
-#: Seconds to wait for another process that writes the page; and the age from which on jobs write it anew, s.
+#: Seconds to wait for another process that writes the page; and the age from which on jobs write it
+#: anew, s.
 PATIENCE, AGE = 20.0, 10.0
 #: Metrics on the card of a run.
 FACTS = {
@@ -87,17 +89,25 @@ class Folder:
 
     def measure_start_up(self) -> float | None:
         """Return the seconds it usually took until a job's process began to work."""
-        timings = (run_folder.read_json(self.find_run(job) / TIMING) or {} for job in self.batch.jobs)
-        times = [timing["start_up"] for timing in timings if isinstance(timing.get("start_up"), float)]
+        timings = (
+            run_folder.read_json(self.find_run(job) / TIMING) or {} for job in self.batch.jobs
+        )
+        times = [
+            timing["start_up"] for timing in timings if isinstance(timing.get("start_up"), float)
+        ]
         return median(times) if times else None
 
     def write_index(self, failed: Mapping[str, str], summary: str) -> Path:
         """Write the page about all jobs; `failed` has the reasons by name."""
-        cards = [self._make_card(job, failed.get(job.name, "") or job.error) for job in self.batch.jobs]
+        cards = [
+            self._make_card(job, failed.get(job.name, "") or job.error) for job in self.batch.jobs
+        ]
         path = self.path / INDEX
         refresh = AGAIN if any(card.facts == UNDONE for card in cards) else 0
         with run_folder.lock_name(path, PATIENCE):
-            run_folder.write_whole(path, page(f"Batch {self.batch.name}", summary, cards, refresh).encode())
+            run_folder.write_whole(
+                path, page(f"Batch {self.batch.name}", summary, cards, refresh).encode()
+            )
         return path
 
     def summarize(self, count: int, failed: Mapping[str, str], state: str = "done") -> str:
@@ -122,8 +132,12 @@ class Folder:
         if not self.is_done(job):
             return Card(job.name, facts=UNDONE)
         run = self.find_run(job)
-        thumbnail = next(((run / name).read_bytes() for name in NAMES if (run / name).is_file()), b"")
-        metrics, timing = (run_folder.read_json(run / name) or {} for name in ("metrics.json", TIMING))
+        thumbnail = next(
+            ((run / name).read_bytes() for name in NAMES if (run / name).is_file()), b""
+        )
+        metrics, timing = (
+            run_folder.read_json(run / name) or {} for name in ("metrics.json", TIMING)
+        )
         took = sum(value for value in timing.values() if isinstance(value, float))
         facts = [
             ("method", str(metrics.get("method", ""))),
@@ -167,7 +181,9 @@ def read_batch(path: Path) -> Folder:
     """Return a batch's folder with the jobs it has, without their definitions."""
     description = run_folder.read_json(path / MARK)
     if description is None or not isinstance(description.get("batch"), str):
-        raise OutputError(f"{path} is not the folder of a job series: it has no {MARK} of 'digiclay batch'.")
+        raise OutputError(
+            f"{path} is not the folder of a job series: it has no {MARK} of 'digiclay batch'."
+        )
     named = description.get("jobs")
     if not isinstance(named, dict):  # of an older version
         named = {job.name: "" for job in sorted((path / JOBS).glob("*/")) if (job / JOB).is_file()}

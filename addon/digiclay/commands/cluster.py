@@ -74,8 +74,8 @@ def evaluate_on_worker(bundle: Sequence[Point]) -> list[Record | None]:
 def _watch_task() -> Callable[[], bool]:
     """Return a function that tells whether the task of this thread is cancelled.
 
-    Dask does not interrupt a task. Its worker marks it as soon as the session releases it, has died, or
-    the scheduler is gone: no event is shared, and a look costs no message.
+    Dask does not interrupt a task. Its worker marks it as soon as the session releases it, has
+    died, or the scheduler is gone: no event is shared, and a look costs no message.
     """
     from distributed import Status, get_worker
 
@@ -130,11 +130,12 @@ class Cluster(Executor):
     def _hand_back(self, future: Future[Any], packed: bytes, alone: bool, remote: Any) -> None:
         """Hand the outcome of a task over, unless it is cancelled; Dask calls this from one thread.
 
-        Dask blames the death of a worker on all tasks that it had, also on those that it had not begun. So
-        each is tried once more, one after the other: a task that kills another worker is to blame.
+        Dask blames the death of a worker on all tasks that it had, also on those that it had not
+        begun. So each is tried once more, one after the other: a task that kills another worker is
+        to blame.
 
-        Rarely Dask tells of a result and never hands it over. This thread would wait for good, and with it
-        all results after that one: the task is repeated then.
+        Rarely Dask tells of a result and never hands it over. This thread would wait for good, and
+        with it all results after that one: the task is repeated then.
         """
         from distributed import KilledWorker
 
@@ -197,7 +198,9 @@ class Cluster(Executor):
         """Wait for a first worker, visibly."""
         note = self.describe()
         if not self._workers:
-            _tell(f"{self._address} has no workers yet: start some with 'dask worker {self._address}'.")
+            _tell(
+                f"{self._address} has no workers yet: start some with 'dask worker {self._address}'."
+            )
         while not self._workers and not stop():
             draw(note)
             time.sleep(PAUSE)
@@ -225,7 +228,9 @@ class Cluster(Executor):
 
 def _is_lost(answer: Any) -> bool:
     """Return whether a worker died instead of answering; one that restarts is asked by its tasks."""
-    return isinstance(answer, ConnectionError) or (isinstance(answer, OSError) and answer.errno is None)
+    return isinstance(answer, ConnectionError) or (
+        isinstance(answer, OSError) and answer.errno is None
+    )
 
 
 def _refuse_others(versions_of: Table, here: Versions) -> None:
@@ -249,7 +254,9 @@ def _describe_exposure(address: str) -> str:
     scheme, _, host = address.rpartition("://")
     if scheme in ENCRYPTED:
         return ""
-    exposure = describe_exposure(urlsplit(f"//{host}").hostname or "", "points, code and results are")
+    exposure = describe_exposure(
+        urlsplit(f"//{host}").hostname or "", "points, code and results are"
+    )
     return exposure and f"{exposure} tls:// encrypts."
 
 
@@ -270,7 +277,9 @@ def _tell(line: str) -> None:
 
 
 @contextmanager
-def open_cluster(address: str, stop: Callable[[], bool], draw: Callable[[str], None]) -> Iterator[Cluster]:
+def open_cluster(
+    address: str, stop: Callable[[], bool], draw: Callable[[str], None]
+) -> Iterator[Cluster]:
     """Connect with a Dask scheduler, wait for workers, and compare versions.
 
     At the end of the block, whatever ends it, the cluster has no task of this process any more.
@@ -305,7 +314,9 @@ def _connect(address: str) -> Any:
         rule = f"No Dask scheduler answers at {address} within {PATIENCE:g} s"
     except Exception as error:
         why = one_line(error).rstrip(".")
-        rule = f"--scheduler must be an address such as tcp://127.0.0.1:8786 (got {address!r}: {why})"
+        rule = (
+            f"--scheduler must be an address such as tcp://127.0.0.1:8786 (got {address!r}: {why})"
+        )
     raise DigiclayError(f"{rule}.")
 
 

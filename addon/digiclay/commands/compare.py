@@ -24,7 +24,15 @@ from ..core.scene.scene_source import Setting, find, load
 from ..core.scene.schema import Scene
 from ..core.session.run_scene import RUN_METRICS, run
 from ..core.studies.axes import Point
-from ..core.studies.speed_limits import HIGH, LOW, Criterion, Drag, Lift, describe_end, find_largest_speed
+from ..core.studies.speed_limits import (
+    HIGH,
+    LOW,
+    Criterion,
+    Drag,
+    Lift,
+    describe_end,
+    find_largest_speed,
+)
 from ..core.studies.sweep_plan import Folder, hash_points, open_points
 from ..core.version import __version__
 from ..plugins.method_loader import find_installed, is_file_word
@@ -75,7 +83,9 @@ def _add_suite(parser: ArgumentParser) -> None:
     if suite := find_beside(*SUITE):
         suite.add_suite(parser)
     else:
-        parser.add_argument("--suite", nargs=0, action=_AbsentSuite, help="(not part of the extension)")
+        parser.add_argument(
+            "--suite", nargs=0, action=_AbsentSuite, help="(not part of the extension)"
+        )
         parser.set_defaults(suite=None, **dict.fromkeys(SUITE_ONLY))
 
 
@@ -160,7 +170,9 @@ def carry_out(arguments: Namespace) -> int:
     return 0
 
 
-def _open_folder(out: Path, points: Sequence[Point], arguments: Namespace) -> AbstractContextManager[Folder]:
+def _open_folder(
+    out: Path, points: Sequence[Point], arguments: Namespace
+) -> AbstractContextManager[Folder]:
     """Open the folder of a comparison, see `open_points`; with --overwrite another one in it is removed."""
     methods = [point.words[0] for point in points]
     plan = {"digiclay": __version__, "methods": methods, "speed": arguments.speed}
@@ -190,7 +202,10 @@ def _measure(point: Point, arguments: Namespace) -> Record:
     asked = np.where(np.isnan(wanted), None, wanted)  # type: ignore[call-overload]  # JSON has no NaN
     return {
         "figures": done.figures | {name: done.metrics.get(name) for name in ERRORS} | speeds,
-        "absent": [*absent, *([describe_errors(done.metrics)] if "height_error" not in done.metrics else [])],
+        "absent": [
+            *absent,
+            *([describe_errors(done.metrics)] if "height_error" not in done.metrics else []),
+        ],
         "forces": [worst["time"].tolist(), worst["total_force"].tolist(), asked.tolist()],
         "beyond_a_finger": done.metrics.get("beyond_a_finger", ""),
         "fingers": done.metrics.get("fingers"),
@@ -218,7 +233,9 @@ def _write(out: Path, scene: Scene, every: Mapping[str, Record], *, speed: bool)
         ends = f"searched from {LOW * 1e3:g} to {HIGH * 1e3:g} mm/s"
         notes.append(f"Followed{alone}, {ends}: {Criterion()}.")
     notes += dict.fromkeys(why for each in every.values() for why in each.get("absent", ()))
-    notes += [f"The worst of {len(scene.fingers)} fingers; metrics.json has each."] if several else []
+    notes += (
+        [f"The worst of {len(scene.fingers)} fingers; metrics.json has each."] if several else []
+    )
     return [*notes, f"written to {out}"]
 
 
@@ -260,6 +277,10 @@ def table(measured: dict[str, Metrics]) -> Iterator[str]:
             if name in ERRORS:
                 factor, unit = metric.factor, metric.shown
             rows.append(
-                [name, unit, *(write(name, values.get(name), factor) for values in measured.values())]
+                [
+                    name,
+                    unit,
+                    *(write(name, values.get(name), factor) for values in measured.values()),
+                ]
             )
     yield from aligned(("metric", "unit", *measured), rows, left=2)

@@ -11,7 +11,11 @@ from ..core.control.virtual_master import make_master_cell
 from ..core.engine.system import System
 from ..core.scene.assembly import assemble
 from ..core.scene.schema import SECTIONS, Scene
-from ..core.session.memory_limit import count_busy_cells, count_bytes_needed, measure_available_memory
+from ..core.session.memory_limit import (
+    count_busy_cells,
+    count_bytes_needed,
+    measure_available_memory,
+)
 from ..core.shapes.fitting import fit_shape
 from .arguments import add_scene, command, scene_of
 
@@ -39,7 +43,13 @@ PLACES = (
     ("recorder", "recorder"),
 )
 #: Units people read: factor and name.
-READ = {"m": (1e3, "mm"), "s": (1e3, "ms"), "Pa": (1e-5, "bar"), "m2/s": (1e6, "mm2/s"), "m/s": (1e3, "mm/s")}
+READ = {
+    "m": (1e3, "mm"),
+    "s": (1e3, "ms"),
+    "Pa": (1e-5, "bar"),
+    "m2/s": (1e6, "mm2/s"),
+    "m/s": (1e3, "mm/s"),
+}
 
 
 @command(
@@ -74,7 +84,9 @@ def _list_parts(scene: Scene, section: str) -> list[tuple[str, Any]]:
     owners: dict[Any, list[str]] = {}
     for number, part in enumerate(scene.list_parts(section), 1):
         owners.setdefault(part, []).append(str(number))
-    return [(", ".join(numbers) if len(owners) > 1 else "", part) for part, numbers in owners.items()]
+    return [
+        (", ".join(numbers) if len(owners) > 1 else "", part) for part, numbers in owners.items()
+    ]
 
 
 def describe_meaning(declared: Quantity) -> str:
@@ -91,7 +103,9 @@ def write_value(value: object) -> str:
 
 def write_range(declared: Quantity) -> str:
     """Write the range of a parameter, in its unit."""
-    return ", ".join(f"{word.replace('_', ' ')} {write_value(end)}" for word, end in declared.list_bounds())
+    return ", ".join(
+        f"{word.replace('_', ' ')} {write_value(end)}" for word, end in declared.list_bounds()
+    )
 
 
 def description(scene: Scene, system: System) -> Iterator[str]:
@@ -115,7 +129,9 @@ def description(scene: Scene, system: System) -> Iterator[str]:
     for name, text in _pins(scene, system):
         yield _filled(name, text)
     yield "\nThe state of a cell"
-    rows = ", ".join(f"{name} ({count})" if count > 1 else name for name, count in _rows(system) if count)
+    rows = ", ".join(
+        f"{name} ({count})" if count > 1 else name for name, count in _rows(system) if count
+    )
     yield f"  {system.rows.count} rows: {rows}; {8 * system.rows.count} bytes"
     yield "\nThe session"
     period, step = human(simulation.control_period, "s"), human(simulation.physics_step, "s")
@@ -124,8 +140,13 @@ def description(scene: Scene, system: System) -> Iterator[str]:
         path, points = finger.trajectory, finger.trajectory.waypoints
         yield f"  {len(points)} waypoints, {path.interpolation}, the last at {points[-1].time:g} s"
     sizes = scene.cells, scene.periods, count_busy_cells(scene)
-    needed, free = count_bytes_needed(scene.recorder, system.rows, *sizes), measure_available_memory()
-    extent = f"{scene.recorder.rows(scene.periods)} rows kept" if scene.recorder else "no history kept"
+    needed, free = (
+        count_bytes_needed(scene.recorder, system.rows, *sizes),
+        measure_available_memory(),
+    )
+    extent = (
+        f"{scene.recorder.rows(scene.periods)} rows kept" if scene.recorder else "no history kept"
+    )
     yield f"  {extent}; {size(needed)} of memory needed, {size(free)} free"
 
 
@@ -134,7 +155,10 @@ def _pins(scene: Scene, system: System) -> Iterator[tuple[str, str]]:
     actuator, supply = scene.actuator, scene.supply
     speed = make_master_cell(system.cell, system.period).speed
     up, down = speed(1.0), 0.0 - speed(-1.0)
-    yield "free speed", f"{up * 1e3:.3g} mm/s up, {down * 1e3:.3g} mm/s down, valve wide open and no load"
+    yield (
+        "free speed",
+        f"{up * 1e3:.3g} mm/s up, {down * 1e3:.3g} mm/s down, valve wide open and no load",
+    )
     lift, pull = supply.high * actuator.area, (0.0 - supply.low) * actuator.area
     yield (
         "hold force",
@@ -178,14 +202,18 @@ def _parameters(part: Parameters) -> str:
     for name, declared in list_quantities(part).items():
         value = getattr(part, name)
         values = value if isinstance(value, tuple) else (value,)
-        shown.append(f"{name.replace('_', ' ')} {' '.join(human(value, declared.unit) for value in values)}")
+        shown.append(
+            f"{name.replace('_', ' ')} {' '.join(human(value, declared.unit) for value in values)}"
+        )
     return ", ".join(shown)
 
 
 def human(value: object, unit: str) -> str:
     """Write a value in the unit people read. `value`: in SI; `unit`: SI unit; empty where there is none."""
     factor, name = READ.get(unit, (1.0, unit))
-    return f"{value * factor:.6g} {name}".rstrip() if isinstance(value, (int, float)) else str(value)
+    return (
+        f"{value * factor:.6g} {name}".rstrip() if isinstance(value, (int, float)) else str(value)
+    )
 
 
 def size(count: float) -> str:

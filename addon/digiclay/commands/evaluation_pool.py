@@ -30,7 +30,9 @@ read_count = whole_number(1, MOST)
 def _read_address(text: str) -> str:
     """Return the address of a scheduler; refuse it without Dask, before any work."""
     if in_blender():
-        raise DigiclayError("--scheduler is not for the extension: run 'digiclay' outside of Blender.")
+        raise DigiclayError(
+            "--scheduler is not for the extension: run 'digiclay' outside of Blender."
+        )
     refuse_without("--scheduler", "cluster", "distributed")
     return text
 
@@ -79,7 +81,10 @@ def open_pool(
 
         with open_cluster(arguments.scheduler, stop, draw) as cluster:
             yield partial(
-                submit, cluster, evaluate_on_worker, stopped=lambda: draw_and_ask(cluster.describe())
+                submit,
+                cluster,
+                evaluate_on_worker,
+                stopped=lambda: draw_and_ask(cluster.describe()),
             )
         return
     count = 1 if in_blender() else min(arguments.workers or count_cores(), MOST, pieces)
@@ -91,15 +96,17 @@ def open_pool(
         return
     task = partial(evaluate_bundle, stopped=draw_and_ask)
     yield lambda bundles: (
-        (bundle, partial(task, bundle)) for bundle in takewhile(lambda _: not draw_and_ask(), bundles)
+        (bundle, partial(task, bundle))
+        for bundle in takewhile(lambda _: not draw_and_ask(), bundles)
     )
 
 
 class Evaluation(ExitStack):
     """Points of a series under evaluation, with a progress line; each is kept as soon as it is done.
 
-    `records` has the finished points by index, below `total`; `failed` those that no worker survived, which
-    the same command tries again. `pieces`: bundles at a time, at most, where they are not known at once.
+    `records` has the finished points by index, below `total`; `failed` those that no worker
+    survived, which the same command tries again. `pieces`: bundles at a time, at most, where they
+    are not known at once.
     """
 
     def __init__(
@@ -142,9 +149,14 @@ class Evaluation(ExitStack):
         def keep(bundle: Sequence[Point], evaluated: Sequence[Record | None]) -> None:
             for point, record in zip(bundle, evaluated, strict=True):
                 if record is not None and lacks(point):
-                    # What is there remains: in another bundle the last bit of a figure may be another one.
+                    # What is there remains: in another bundle the last bit of a figure may be
+                    # another one.
                     if there := self.records.get(point.index):
-                        figures = {**dict.fromkeys(ERRORS), **record.get("figures", {}), **there["figures"]}
+                        figures = {
+                            **dict.fromkeys(ERRORS),
+                            **record.get("figures", {}),
+                            **there["figures"],
+                        }
                         absent = record.get("error") or record.get("errors_absent")
                         record = {
                             **there,

@@ -84,13 +84,19 @@ class Evaluator(Process):
             pickle.dump(tuple(bundle), self.input)
             self.input.flush()
             records: list[Record | None] = pickle.load(self.process.stdout)  # type: ignore[arg-type]
-        except (OSError, ValueError, pickle.UnpicklingError):  # it died, or was stopped, in the middle
+        except (
+            OSError,
+            ValueError,
+            pickle.UnpicklingError,
+        ):  # it died, or was stopped, in the middle
             raise EOFError from None
         return records
 
 
 @contextmanager
-def open_evaluators(count: int, stop: Callable[[], bool], draw: Callable[[], None]) -> Iterator[Pool]:
+def open_evaluators(
+    count: int, stop: Callable[[], bool], draw: Callable[[], None]
+) -> Iterator[Pool]:
     """Yield an evaluation of bundles in processes, each waited for by a thread."""
     with ThreadPoolExecutor(count) as threads, Processes[Evaluator](stop, draw) as processes:
         task = partial(evaluate_elsewhere, processes, list[Evaluator]())

@@ -16,11 +16,22 @@ from ..core.session.run_scene import History
 from ..core.surface.features import Finding, make_table, summarize
 from ..core.surface.formed import Body, Formed, make_formed
 from ..core.surface.skins import SKINS
-from .arguments import RUN, command, formats, millimeters, say, seconds, told_as_options, whole_number
+from .arguments import (
+    RUN,
+    command,
+    formats,
+    millimeters,
+    say,
+    seconds,
+    told_as_options,
+    whole_number,
+)
 from .progress import table as aligned
 
 
-def list_choices(choices: Mapping[str, str | Format], form: str = "{}: {}", separator: str = "; ") -> str:
+def list_choices(
+    choices: Mapping[str, str | Format], form: str = "{}: {}", separator: str = "; "
+) -> str:
     """Write choices with their meanings."""
     return separator.join(form.format(*choice) for choice in choices.items())
 
@@ -31,14 +42,22 @@ USUAL = Finding()
 SURFACE = {
     "--skin": (SKINS, f"{list_choices(SKINS)}; default bilinear", "bilinear"),
     # 0 stands for the default in files alone.
-    "--resolution N": (whole_number(1, 64), "points per pitch; default: 1, or 4 for curved skins", 0),
+    "--resolution N": (
+        whole_number(1, 64),
+        "points per pitch; default: 1, or 4 for curved skins",
+        0,
+    ),
     "--threshold L": (
         millimeters,
         "least distance of a feature from the former surface, mm, or with a unit; "
         f"default {USUAL.threshold * 1e3:g} mm",
         USUAL.threshold,
     ),
-    "--smallest N": (int, f"least number of pins of a feature; default {USUAL.smallest}", USUAL.smallest),
+    "--smallest N": (
+        int,
+        f"least number of pins of a feature; default {USUAL.smallest}",
+        USUAL.smallest,
+    ),
     "--former T": (None, "instant of the former surface, s, or 'rest'; default: the start", "0"),
 }
 TIME = {"--time T": (seconds, "instant, s; default: the end")}
@@ -85,7 +104,11 @@ STEMS = {"solid": "surface", "surface": "skin", "pins": "pins", "features": "fea
 
 OPTIONS = {
     **RUN,
-    "--format F,...": (formats, f"{list_choices(FORMATS, '{} ({[0]})', ', ')}; default stl", ["stl"]),
+    "--format F,...": (
+        formats,
+        f"{list_choices(FORMATS, '{} ({[0]})', ', ')}; default stl",
+        ["stl"],
+    ),
     "--kind": (KINDS, f"{list_choices(KINDS)}; default solid", "solid"),
     **SURFACE,
     "--base-thickness L": (
@@ -107,13 +130,20 @@ def file_names(kinds: Iterable[str], kind: str = "solid") -> list[str]:
 
 
 def exported(
-    scene: Scene, history: History, row: int, kinds: Sequence[str], folder: Path, model: Model | None = None
+    scene: Scene,
+    history: History,
+    row: int,
+    kinds: Sequence[str],
+    folder: Path,
+    model: Model | None = None,
 ) -> list[Path]:
     """Write one row of a history in several formats, by default as the solid; return the files."""
     settings = model or Model(cap=scene.actuator.bore / 2.0)
     parts = make_bodies(make_formed(history, row), settings, Finding())
     names = file_names(kinds, settings.kind)
-    return [write(parts, folder / name, "mm", kind) for name, kind in zip(names, kinds, strict=True)]
+    return [
+        write(parts, folder / name, "mm", kind) for name, kind in zip(names, kinds, strict=True)
+    ]
 
 
 @command("write the formed surface of a run as mesh files", EXAMPLES, OPTIONS)
@@ -152,7 +182,9 @@ points of its crests.
 """
 
 
-@command("list the bosses and creases of a run", LISTING, RUN, SURFACE, TIME, {"--json": "write JSON"})
+@command(
+    "list the bosses and creases of a run", LISTING, RUN, SURFACE, TIME, {"--json": "write JSON"}
+)
 def list_features(arguments: Namespace) -> int:
     """List the features."""
     scene, formed = read_formed(arguments, "features")

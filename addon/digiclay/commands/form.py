@@ -102,14 +102,18 @@ def _laid(scene: Scene) -> tuple[Scene, Fitted]:
     # The run's folder says all there is to say, whatever becomes of the shape's file.
     shape = replace(scene.shape, heights=pack(laid.heights))
     name = Path(scene.shape.file).stem
-    return replace(scene, shape=shape, name=name, description=f"{name}, displayed and then formed."), laid
+    return replace(
+        scene, shape=shape, name=name, description=f"{name}, displayed and then formed."
+    ), laid
 
 
 def _evaluate(result: Result, row: int, laid: Fitted) -> tuple[Result, list[str]]:
     """Return the result with the data of its shape, displayed in a row, and their lines of text."""
     height, layout = result.history["height"], result.scene.layout
     error = float(np.abs(height[row] - laid.heights).max())
-    stands = next(i for i in range(row + 1) if np.abs(height[i] - laid.heights).max() <= error + 1e-9)
+    stands = next(
+        i for i in range(row + 1) if np.abs(height[i] - laid.heights).max() <= error + 1e-9
+    )
     change = height[-1] - height[row]
     area = layout.pitch * layout.row_spacing
     raised, lowered = (float(np.maximum(rise, 0.0).sum() * area) for rise in (change, -change))

@@ -139,7 +139,9 @@ def _card(card: Card) -> str:
     if card.error:
         why = f"<strong>failed</strong> <span>{escape(card.error)}</span>"
         return f'<article class="failed"><div><h2>{name}</h2>{why}<br>{links}</div></article>'
-    facts = "".join(f"<dt>{escape(fact)}</dt><dd>{escape(value)}</dd>" for fact, value in card.facts)
+    facts = "".join(
+        f"<dt>{escape(fact)}</dt><dd>{escape(value)}</dd>" for fact, value in card.facts
+    )
     return f"<article>{_picture(card)}<div><h2>{name}</h2><dl>{facts}</dl>{links}</div></article>"
 
 
@@ -150,4 +152,8 @@ def _picture(card: Card) -> str:
     kind = "png" if card.thumbnail.startswith(b"\x89PNG") else "jpeg"
     data = base64.b64encode(card.thumbnail).decode("ascii")
     shown = f'<img alt="{escape(card.name)}" src="data:image/{kind};base64,{data}">'
-    return f'<a class="picture" href="{escape(quote(card.leads))}">{shown}</a>' if card.leads else shown
+    return (
+        f'<a class="picture" href="{escape(quote(card.leads))}">{shown}</a>'
+        if card.leads
+        else shown
+    )

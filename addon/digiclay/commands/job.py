@@ -21,7 +21,18 @@ from ..core.studies.series import describe_error
 from ..plugins.method_loader import CODE, resolve_word
 from .arguments import command, load_by_option, say
 from .batch_folder import note_failure, read_batch, refresh_page
-from .job_steps import ERROR, FILES, PROGRESS, RUNS, TIMING, RunState, Tell, Work, check_outputs, judge_run
+from .job_steps import (
+    ERROR,
+    FILES,
+    PROGRESS,
+    RUNS,
+    TIMING,
+    RunState,
+    Tell,
+    Work,
+    check_outputs,
+    judge_run,
+)
 from .progress import Counted
 from .stop import FAILED, STOPPED, WRONG, Stop
 
@@ -55,7 +66,12 @@ OPTIONS = {
 GRACE = 20.0
 
 
-@command("run one job of a series from its files alone; for render farms", EXAMPLES, OPTIONS, listed=False)
+@command(
+    "run one job of a series from its files alone; for render farms",
+    EXAMPLES,
+    OPTIONS,
+    listed=False,
+)
 def carry_out(arguments: Namespace) -> int:
     """Do the job, by itself or as a process of a batch."""
     return _follow(arguments) if arguments.follow else _do_alone(arguments)
@@ -66,7 +82,9 @@ def _do_alone(arguments: Namespace) -> int:
     note_failure(arguments.job, "")
     try:
         with Stop() as stop, Counted(sys.stderr, arguments.job.name, "%") as bar:
-            outcome = _do_job(arguments, stop, lambda step, share: bar(100.0 * share, 100, f", {step}"))
+            outcome = _do_job(
+                arguments, stop, lambda step, share: bar(100.0 * share, 100, f", {step}")
+            )
     except DigiclayError as error:
         if not isinstance(error, BusyError):  # another process may still do it
             note_failure(arguments.job, one_line(error))

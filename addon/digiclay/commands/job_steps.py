@@ -28,7 +28,8 @@ from .gallery import of_heights, of_picture
 from .refusals import refuse_without_blender
 from .render import ARRAYS, draw_moving, draw_still, stage_moving
 
-#: Where a series keeps its runs, beside its jobs; what each took; and in there, the size of each file.
+#: Where a series keeps its runs, beside its jobs; what each took; and in there, the size of each
+#: file.
 RUNS, TIMING, FILES = "runs", "timing.json", "files"
 #: Seconds to wait for another process that makes or notes another film of the same run.
 PATIENCE = 20.0
@@ -49,7 +50,9 @@ def judge_run(job: Path, run: Path) -> RunState:
         return RunState.ABSENT
     if not all((run / name).is_file() for name in (SCENE, JOB)):
         return RunState.INCOMPLETE
-    if not (_is_same(job / SCENE, run / SCENE, load) and _is_same(job / JOB, run / JOB, read_outputs)):
+    if not (
+        _is_same(job / SCENE, run / SCENE, load) and _is_same(job / JOB, run / JOB, read_outputs)
+    ):
         return RunState.CHANGED
     if _read_code(job) != _read_code(run):
         return RunState.CHANGED
@@ -57,7 +60,11 @@ def judge_run(job: Path, run: Path) -> RunState:
     if timing is None:
         return RunState.INCOMPLETE
     sizes = timing.get(FILES)
-    whole = has_files(run, sizes) if isinstance(sizes, dict) else is_whole(run, load_recorded(run / SCENE))
+    whole = (
+        has_files(run, sizes)
+        if isinstance(sizes, dict)
+        else is_whole(run, load_recorded(run / SCENE))
+    )
     return RunState.WHOLE if whole else RunState.INCOMPLETE
 
 
@@ -88,7 +95,9 @@ def list_lacking(run: Path, outputs: Outputs) -> list[str]:
 def is_done(job: Path, run: Path) -> bool:
     """Return whether a job is done, its films too. `job`, `run`: as for `judge_run`."""
     try:
-        return judge_run(job, run) is RunState.WHOLE and not list_lacking(run, read_outputs(job / JOB))
+        return judge_run(job, run) is RunState.WHOLE and not list_lacking(
+            run, read_outputs(job / JOB)
+        )
     except (OSError, DigiclayError):
         return False
 
@@ -151,7 +160,9 @@ def check_outputs(scene: Scene, outputs: Outputs) -> None:
             raise OutputError(f"export: {error}.") from None
         require_surface(scene, "export")
     if (outputs.needs_blender or outputs.export) and scene.recorder is None:
-        raise OutputError("Pictures and exports need a recorder, and the scene has recorder = 'absent'.")
+        raise OutputError(
+            "Pictures and exports need a recorder, and the scene has recorder = 'absent'."
+        )
     if outputs.needs_blender:
         refuse_without_blender()
 
@@ -226,7 +237,9 @@ class Work:
         for kind in MOVING:
             if looks := getattr(outputs, kind):
                 with step(kind) as progress:
-                    if not draw_moving(scene, history, looks, out / f"{kind}.mp4", progress, stopped):
+                    if not draw_moving(
+                        scene, history, looks, out / f"{kind}.mp4", progress, stopped
+                    ):
                         raise KeyboardInterrupt
         with step("thumbnail"):
             if outputs.still:
@@ -299,5 +312,7 @@ class Work:
 
         out = self.run / f"{kind}.mp4"
         with stage_moving(run.scene, run.history, looks) as shots:
-            if not draw_frames(shots, list_missing(folder, frames), folder, out, progress, self.stopped):
+            if not draw_frames(
+                shots, list_missing(folder, frames), folder, out, progress, self.stopped
+            ):
                 raise KeyboardInterrupt

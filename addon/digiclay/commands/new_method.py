@@ -57,7 +57,9 @@ def carry_out(arguments: Namespace) -> int:
     if os.path.lexists(path) and not (arguments.overwrite and path.is_file()):
         raise OutputError(f"{path} is there already: choose another name, or --overwrite.")
     name = name_class(arguments.name)
-    text = Template(TEMPLATE.read_text(encoding="utf-8")).substitute({"Class": name, "file": path.name})
+    text = Template(TEMPLATE.read_text(encoding="utf-8")).substitute(
+        {"Class": name, "file": path.name}
+    )
     make_folder(path.parent)
     write_whole(path, text.encode())
     say(arguments, f"written to {path}", f"try: digiclay run slow_press --method {path}:{name}")

@@ -1,7 +1,7 @@
 """Commands outside the extension: ``digiclay paper``, ``study``, ``tune``, ``serve``, ``hands``; its suite.
 
-They are in packages beside this one, where those are installed. ``digiclay benchmark`` says where the
-benchmarks are.
+They are in packages beside this one, where those are installed. ``digiclay benchmark`` says where
+the benchmarks are.
 """
 
 from argparse import REMAINDER, ArgumentParser
@@ -17,10 +17,20 @@ BESIDE = __name__.removesuffix("digiclay.commands.outside")
 #: Commands of packages beside this one: package, module, extra, and what the list of commands says.
 COMMANDS = {
     "paper": ("digiclay_paper", "reproduce", "plots", "reproduce the paper's results"),
-    "study": ("digiclay_study", "study_command", "study", "find which parameters matter for which metric"),
+    "study": (
+        "digiclay_study",
+        "study_command",
+        "study",
+        "find which parameters matter for which metric",
+    ),
     "tune": ("digiclay_study", "tune_command", "study", "find the best trade-off of two metrics"),
     "serve": ("digiclay_serve", "serve_command", "serve", "run a session for other programs"),
-    "hands": ("digiclay_serve", "hands_command", "serve", "move the fingertips of a server by tracked hands"),
+    "hands": (
+        "digiclay_serve",
+        "hands_command",
+        "serve",
+        "move the fingertips of a server by tracked hands",
+    ),
 }
 #: The package and the module of ``digiclay compare --suite``.
 SUITE = ("digiclay_study", "suite_command")
@@ -34,7 +44,9 @@ def find_beside(package: str, module: str) -> ModuleType | None:
 
 def refuse_absent(name: str, extra: str) -> NoReturn:
     """Refuse a command of a package that is not installed."""
-    _refuse(f"digiclay {name} is not part of the extension: run 'pip install digiclay[{extra}]' first.")
+    _refuse(
+        f"digiclay {name} is not part of the extension: run 'pip install digiclay[{extra}]' first."
+    )
 
 
 def _refuse(rule: str) -> NoReturn:
@@ -48,7 +60,9 @@ def add(commands: Any) -> None:
             entry.add(commands)
         else:
             parser = _add_any(commands, name, help=f"{help} (not part of the extension)")
-            parser.set_defaults(carry_out=lambda _, name=name, extra=extra: refuse_absent(name, extra))
+            parser.set_defaults(
+                carry_out=lambda _, name=name, extra=extra: refuse_absent(name, extra)
+            )
     command = _add_any(commands, "benchmark", description="Where the benchmarks are.")
     command.set_defaults(carry_out=lambda _: _refuse(NO_BENCHMARK))
 

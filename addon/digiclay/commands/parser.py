@@ -49,14 +49,19 @@ class Parser(ArgumentParser):
     def error(self, message: str) -> NoReturn:
         """Print the error in the arguments, and exit."""
         hint = self._hint or self._misspelt()
-        self.exit(WRONG, one_line(f"{self.prog}: {message}.{hint} See '{self.prog} --help'.") + "\n")
+        self.exit(
+            WRONG, one_line(f"{self.prog}: {message}.{hint} See '{self.prog} --help'.") + "\n"
+        )
 
     def _misspelt(self) -> str:
         """Return a suggestion for an unknown option."""
         words = list(self._given)
         for word in words[: words.index("--")] if "--" in words else words:
             name = word.partition("=")[0]
-            if re.fullmatch("--?[A-Za-z][A-Za-z-]+", name) and name not in self._option_string_actions:
+            if (
+                re.fullmatch("--?[A-Za-z][A-Za-z-]+", name)
+                and name not in self._option_string_actions
+            ):
                 asked = _asked(name, list(self._option_string_actions))
                 return asked.replace("?", f" (not {name})?")
         return ""
@@ -66,7 +71,9 @@ class Parser(ArgumentParser):
         if action.choices is not None and value not in action.choices:
             choices = [str(choice) for choice in action.choices]
             self._hint = _asked(str(value), choices)
-            raise ArgumentError(action, f"invalid choice: {value!r} (choose from {', '.join(choices)})")
+            raise ArgumentError(
+                action, f"invalid choice: {value!r} (choose from {', '.join(choices)})"
+            )
 
     def parse_known_args(self, args: Sequence[str] | None = None, namespace: Any = None) -> Any:  # type: ignore[override]
         """Refuse unknown arguments here, where their command is known."""
@@ -99,7 +106,9 @@ def parser(first: str = "") -> ArgumentParser:
         allow_abbrev=False,
     )
     top.add_argument("--version", action="version", version=f"digiclay {__version__}")
-    commands = top.add_subparsers(title="commands", metavar="COMMAND", required=True, parser_class=Parser)
+    commands = top.add_subparsers(
+        title="commands", metavar="COMMAND", required=True, parser_class=Parser
+    )
     if first == "--version":
         return top
     for name in [first] if first in COMMANDS else COMMANDS:

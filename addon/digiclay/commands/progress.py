@@ -12,7 +12,8 @@ def table(head: Sequence[str], rows: Sequence[Sequence[str]], *, left: int = 1) 
     widths = [max(len(line[i]) for line in (head, *rows)) for i in range(len(head))]
     for line in (head, ["-" * width for width in widths], *rows):
         cells = (
-            c.ljust(w) if i < left else c.rjust(w) for i, (c, w) in enumerate(zip(line, widths, strict=True))
+            c.ljust(w) if i < left else c.rjust(w)
+            for i, (c, w) in enumerate(zip(line, widths, strict=True))
         )
         yield ("  " + "  ".join(cells)).rstrip()
 
@@ -40,7 +41,9 @@ class Line:
         self._drawn = time.monotonic()
         if self._quiet or not self._stream.isatty():
             return
-        width = shutil.get_terminal_size().columns - 1  # a longer one is wrapped, and would stay there
+        width = (
+            shutil.get_terminal_size().columns - 1
+        )  # a longer one is wrapped, and would stay there
         self._stream.write(f"\r{text[:width]}\033[K")
         self._stream.flush()
         self._shown = True
@@ -55,7 +58,9 @@ class Line:
         """Write how long the rest takes when a share from 0 to 1 was done in the time since the beginning."""
         if share <= 0.0:
             return ""
-        return f", {format_duration((time.monotonic() - self._started) * (1.0 - share) / share)} left"
+        return (
+            f", {format_duration((time.monotonic() - self._started) * (1.0 - share) / share)} left"
+        )
 
     def __exit__(self, *raised: object) -> None:
         if self._shown:

@@ -126,7 +126,9 @@ def _looks(arguments: Namespace) -> Still | Turntable | Film:
     if arguments.film and arguments.time is not None:
         raise DigiclayError("--time must not be given with --film: give --start and --stop.")
     names = ("engine", "color", "arrows", *options)
-    given = {name: getattr(arguments, name) for name in names if getattr(arguments, name) is not None}
+    given = {
+        name: getattr(arguments, name) for name in names if getattr(arguments, name) is not None
+    }
     if arguments.size is not None:
         given["width"], given["height"] = arguments.size
     return replace(STILL, **given) if kind is Still else kind(**given)
@@ -136,10 +138,16 @@ def sizes(scene: Scene) -> Record:
     """Return the sizes of the device for drawing."""
     from ..device.instant import find_ellipsoids
 
-    return {"pitch": scene.layout.pitch, "actuator": scene.actuator, "finger": find_ellipsoids(scene)}
+    return {
+        "pitch": scene.layout.pitch,
+        "actuator": scene.actuator,
+        "finger": find_ellipsoids(scene),
+    }
 
 
-def draw_still(scene: Scene, history: History, looks: Still, out: Path, row: int | None = None) -> Path:
+def draw_still(
+    scene: Scene, history: History, looks: Still, out: Path, row: int | None = None
+) -> Path:
     """Draw the instant of `looks`, or one row of a history; Blender is imported only now."""
     from ..pictures.still import render_still
 
@@ -177,7 +185,9 @@ def stage_moving(
     return stage_turntable(_find_instant(scene, history, looks, row), looks)
 
 
-def _find_instant(scene: Scene, history: History, looks: Still | Turntable, row: int | None) -> Instant:
+def _find_instant(
+    scene: Scene, history: History, looks: Still | Turntable, row: int | None
+) -> Instant:
     """Return a row of a history for drawing, by default the instant of `looks`."""
     from ..device.instant import Instant
 

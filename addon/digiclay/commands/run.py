@@ -67,7 +67,9 @@ def report(fit: Fitted) -> Iterator[str]:
     rows = [
         [
             trial.text,
-            f"> {fit.budget * 1e6:g}" if math.isinf(trial.departure) else f"{trial.departure * 1e6:.3g}",
+            f"> {fit.budget * 1e6:g}"
+            if math.isinf(trial.departure)
+            else f"{trial.departure * 1e6:.3g}",
             "" if math.isnan(trial.time) else f"{100 * trial.time:.0f} %",
             "left out" if trial.kept else "",
         ]
@@ -117,7 +119,11 @@ OPTIONS: dict[str, Any] = {
 
 
 @command(
-    "simulate a scene", EXAMPLES, add_scene, OPTIONS, description="Simulate a scene and write its folder."
+    "simulate a scene",
+    EXAMPLES,
+    add_scene,
+    OPTIONS,
+    description="Simulate a scene and write its folder.",
 )
 def carry_out(arguments: Namespace) -> int:
     """Run, write, and print a summary line."""
@@ -161,12 +167,16 @@ def _plan_extras(arguments: Namespace, result: Result) -> list[Extra]:
     if arguments.plots:
         from .render import PLOTS, plotted
 
-        extras.append(Extra(PLOTS, partial(plotted, scene, history), lambda run: ["plot", str(run)]))
+        extras.append(
+            Extra(PLOTS, partial(plotted, scene, history), lambda run: ["plot", str(run)])
+        )
     if arguments.render:
         from .render import PICTURE, STILL, draw_still
 
         draw = partial(draw_still, scene, history, STILL)
-        extras.append(Extra([PICTURE], lambda out: draw(out / PICTURE), lambda run: ["render", str(run)]))
+        extras.append(
+            Extra([PICTURE], lambda out: draw(out / PICTURE), lambda run: ["render", str(run)])
+        )
     return extras
 
 
@@ -196,7 +206,9 @@ def plan_meshes(
         options = ["--out", str(run / within)] if within else []
         return ["export", str(run), "--format", ",".join(kinds), *instant, *options]
 
-    return Extra([f"{within}/{name}" if within else name for name in file_names(kinds)], make, later)
+    return Extra(
+        [f"{within}/{name}" if within else name for name in file_names(kinds)], make, later
+    )
 
 
 def simulate(arguments: Namespace, scene: Scene, path: Path, stop: Stop) -> Result:
@@ -247,7 +259,9 @@ def write_run(
     out = claim.out
     say(arguments, *notes, result.summary(), f"written to {out}")
     if result.metrics.get("errors_absent") == UNJUDGED:
-        tell_stopped_before("its errors were estimated", ["run", str(out), "--out", str(out), "--overwrite"])
+        tell_stopped_before(
+            "its errors were estimated", ["run", str(out), "--out", str(out), "--overwrite"]
+        )
     for extra in skipped:
         tell_stopped_before(", ".join(extra.files), extra.later(out))
     if wrong:

@@ -8,12 +8,15 @@ from contextlib import contextmanager, suppress
 from types import FrameType
 from typing import Any
 
-#: Some jobs of a batch failed; what the user asked for cannot be done; stopped by Ctrl-C or SIGTERM.
+#: Some jobs of a batch failed; what the user asked for cannot be done; stopped by Ctrl-C or
+#: SIGTERM.
 FAILED, WRONG, STOPPED = 1, 2, 130
 
 
 #: What asks to stop; Windows has no SIGHUP.
-ASKING = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
+ASKING = [
+    getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
+]
 
 
 class Stop:

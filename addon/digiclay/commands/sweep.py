@@ -85,7 +85,11 @@ def carry_out(arguments: argparse.Namespace) -> int:
 
 
 def _draw_pictures(
-    out: Path, columns: list[Column], axes: list[Axis], records: dict[int, Record], names: tuple[str, ...]
+    out: Path,
+    columns: list[Column],
+    axes: list[Axis],
+    records: dict[int, Record],
+    names: tuple[str, ...],
 ) -> list[str]:
     """Draw the figures over one or two axes; return the messages."""
     if len(axes) > 2:

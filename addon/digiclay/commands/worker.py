@@ -1,7 +1,7 @@
 """Worker processes of a series on this machine: start and stop.
 
-Each runs this program once more, and stops when its standard input ends: so it does when it is asked to,
-and when the process that started it has died.
+Each runs this program once more, and stops when its standard input ends: so it does when it is
+asked to, and when the process that started it has died.
 """
 
 import importlib.util
@@ -48,10 +48,16 @@ def find_program(module: str = "") -> tuple[list[str], dict[str, str]]:
         return start_blender(bpy.app.binary_path), {}
     folders = [str(Path(__file__).resolve().parents[2]), os.environ.get("PYTHONPATH", "")]
     bundled = importlib.util.find_spec("trimesh") if PACKAGE.startswith("bl_ext.") else None
-    if bundled is not None and bundled.origin is not None:  # what an extension brings along is elsewhere
+    if (
+        bundled is not None and bundled.origin is not None
+    ):  # what an extension brings along is elsewhere
         folders.append(str(Path(bundled.origin).parents[1]))
     environment = {"PYTHONPATH": os.pathsep.join(filter(None, folders))}
-    return [sys.executable, "-m", f"{Path(__file__).resolve().parents[1].name}{module}"], environment
+    return [
+        sys.executable,
+        "-m",
+        f"{Path(__file__).resolve().parents[1].name}{module}",
+    ], environment
 
 
 def start_blender(program: str) -> list[str]:
@@ -73,7 +79,9 @@ class Process:
     def __init__(self, arguments: Sequence[str], module: str = "", **streams: Any) -> None:
         command, environment = find_program(module)
         # A group of its own: Ctrl-C on a terminal is for the process that started it.
-        apart: dict[str, Any] = {"creationflags": 0x200} if os.name == "nt" else {"start_new_session": True}
+        apart: dict[str, Any] = (
+            {"creationflags": 0x200} if os.name == "nt" else {"start_new_session": True}
+        )
         with explain_os_error("A process cannot be started", DigiclayError):
             self.process = subprocess.Popen(
                 [*command, *arguments],

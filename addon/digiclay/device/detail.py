@@ -1,7 +1,7 @@
 """Level of detail: whether the pins of a bed are too small in the 3D views to be drawn one by one.
 
-Below some pixels a pitch pins hide the form, and their rows make moire. A bed shown as "automatic" is then
-drawn as a skin, until its pins are clearly larger again in any view.
+Below some pixels a pitch pins hide the form, and their rows make moire. A bed shown as "automatic"
+is then drawn as a skin, until its pins are clearly larger again in any view.
 """
 
 from collections.abc import Iterator
@@ -15,7 +15,8 @@ from ..roles import is_bed, is_local
 from . import view
 from .node_tree import FAR
 
-#: Pitch below which the skin is drawn, and above which pins are drawn again, pixels at a UI scale of 1.
+#: Pitch below which the skin is drawn, and above which pins are drawn again, pixels at a UI scale
+#: of 1.
 SMALL, LARGE = 8.0, 10.0
 #: The draw handler that looks for changed views; without a window there is none.
 _handle: Any = None
@@ -79,7 +80,9 @@ def _pitch(bed: Object) -> float:
 
 def _look() -> None:
     """Have the beds follow once the drawing under way is done: while Blender draws, data must not change."""
-    changes = any(choose_far(pitch, view.is_far(bed)) != view.is_far(bed) for bed, pitch in _sizes())
+    changes = any(
+        choose_far(pitch, view.is_far(bed)) != view.is_far(bed) for bed, pitch in _sizes()
+    )
     if changes and not bpy.app.timers.is_registered(follow):
         bpy.app.timers.register(follow, first_interval=0.0)
 

@@ -4,11 +4,13 @@ Levels rather than a gradient, because a pin wears one of a few materials: that 
 view, in Workbench and in Cycles alike. No Blender.
 """
 
-#: Force from which on a pin has the last color, N; a gently pressing finger gives a cell a third of it.
+#: Force from which on a pin has the last color, N; a gently pressing finger gives a cell a third of
+#: it.
 TOP = 0.2
 #: sRGB of a pin that nothing presses.
 NO_FORCE = (0.78, 0.79, 0.80)
-#: sRGB of the levels in the order of the force: viridis in twelve even steps, its darkest end left out.
+#: sRGB of the levels in the order of the force: viridis in twelve even steps, its darkest end left
+#: out.
 COLORS = (
     (0.283, 0.116, 0.436),
     (0.269, 0.219, 0.510),

@@ -38,7 +38,8 @@ class Instant:
     mode: Codes
     #: (n,), on each pin, N, pressing down is positive.
     force: Floats
-    #: (7,), or (f, 7) of several: lowest point of the fingertip, m, and its orientation, w, x, y, z.
+    #: (7,), or (f, 7) of several: lowest point of the fingertip, m, and its orientation, w, x, y,
+    #: z.
     fingertip: Floats
     #: Distance between neighboring pins, m.
     pitch: float = Layout().pitch
@@ -116,5 +117,9 @@ def read(path: Path, index: int = -1) -> Instant:
         raise OutputError(f"{path} is not the history.npz of a run's folder.")
     run = finished_run.read_run(path.parent, *ARRAYS)
     scene = run.scene
-    sizes = {"pitch": scene.layout.pitch, "actuator": scene.actuator, "finger": find_ellipsoids(scene)}
+    sizes = {
+        "pitch": scene.layout.pitch,
+        "actuator": scene.actuator,
+        "finger": find_ellipsoids(scene),
+    }
     return Instant.of(run.history, index, **sizes)

@@ -1,7 +1,7 @@
 """Geometry nodes of a bed: pins, colored by mode or by force, arrows on them, the live skin, and the housing.
 
-The skin is weighted sums of the heights of the pins, in Blender's own code. It follows whatever moves the
-pins: a session, a bake, undo. It needs no data of its own in a tick.
+The skin is weighted sums of the heights of the pins, in Blender's own code. It follows whatever
+moves the pins: a session, a bake, undo. It needs no data of its own in a tick.
 """
 
 from collections import Counter, defaultdict
@@ -10,7 +10,18 @@ from collections.abc import Mapping
 from ..compat import Node, NodeInputs, NodeOutputs, NodeSocket, NodeTree, Object, bpy
 from ..core.base.modes import Mode
 from . import heat
-from .parts import FOLLOWING, HIGH, LOW, NEAREST, PAIR, PREVIOUS, VALUE, WEIGHTS, SkinMeshes, Sources
+from .parts import (
+    FOLLOWING,
+    HIGH,
+    LOW,
+    NEAREST,
+    PAIR,
+    PREVIOUS,
+    VALUE,
+    WEIGHTS,
+    SkinMeshes,
+    Sources,
+)
 from .skin_lattice import KINDS
 
 #: What an input of a node is given: a value, an output of another node, or a list of outputs.
@@ -23,8 +34,9 @@ LEAST_STRETCH = 0.02
 #: Names of the settings: colors by force, and arrows.
 COLOR_BY_FORCE, TOP_FORCE = "Color by Force", "Top Color at (N)"
 ARROWS, ARROW_LENGTH = "Force Arrows", "Arrow Length (mm/N)"
-#: Names of the settings: what is seen (0 automatic, 1 pins, 2 skin, 3 both), which skin, whether the pins
-#: are too small in the views for "automatic" to draw them, and whether the skin is tinted by their modes.
+#: Names of the settings: what is seen (0 automatic, 1 pins, 2 skin, 3 both), which skin, whether
+#: the pins are too small in the views for "automatic" to draw them, and whether the skin is tinted
+#: by their modes.
 FORM, MEMBRANE, FAR, TINT = "Form", "Membrane", "Far", "Tint"
 #: How long an arrow is drawn by default, mm for each N.
 LENGTH = 150.0
@@ -34,7 +46,9 @@ WIDTH, HEIGHT = 220.0, 180.0
 LEAST = 1e-3
 
 
-def node(tree: NodeTree, kind: str, inputs: Mapping[str, Value] | None = None, **settings: object) -> Node:
+def node(
+    tree: NodeTree, kind: str, inputs: Mapping[str, Value] | None = None, **settings: object
+) -> Node:
     """Add a node; each input gets a value, an output, or a list of outputs."""
     node = tree.nodes.new(kind)
     for name, value in settings.items():
@@ -192,7 +206,9 @@ SETTINGS = (
 def _form_switches(tree: NodeTree, settings: Node) -> tuple[NodeSocket, NodeSocket, NodeSocket]:
     """Add the nodes that tell whether pins, skin, and both are drawn."""
     form = settings.outputs[FORM]
-    automatic, pins, skin, both = (number(tree, "COMPARE", form, float(step), 0.5) for step in range(4))
+    automatic, pins, skin, both = (
+        number(tree, "COMPARE", form, float(step), 0.5) for step in range(4)
+    )
     # A picture has as many samples as it needs: there "automatic" means pins.
     in_view = node(tree, "GeometryNodeIsViewport").outputs["Is Viewport"]
     far = number(tree, "MULTIPLY", settings.outputs[FAR], in_view)
@@ -245,7 +261,9 @@ def _arrows_on_points(
     """Add the nodes that draw the arrows beside the pins."""
     force = attribute(tree, "force", "FLOAT")
     compared = {"A": force, "B": LEAST}
-    pressed = node(tree, "FunctionNodeCompare", compared, data_type="FLOAT", operation="GREATER_THAN")
+    pressed = node(
+        tree, "FunctionNodeCompare", compared, data_type="FLOAT", operation="GREATER_THAN"
+    )
     shape = node(tree, "GeometryNodeObjectInfo", {"Object": arrow, "As Instance": True})
     per_newton = number(tree, "MULTIPLY", settings.outputs[ARROW_LENGTH], unit)
     size = number(tree, "MULTIPLY", force, per_newton)
@@ -264,7 +282,9 @@ def _arrows_on_points(
     return switch(tree, "GEOMETRY", settings.outputs[ARROWS], pins, joined)
 
 
-def skin_nodes(tree: NodeTree, sources: SkinMeshes, pins: NodeSocket, kind: NodeSocket) -> NodeSocket:
+def skin_nodes(
+    tree: NodeTree, sources: SkinMeshes, pins: NodeSocket, kind: NodeSocket
+) -> NodeSocket:
     """Add the nodes that stretch a skin over pins; return its geometry."""
     names = [_prefixed(tree, words, kind) for words in WEIGHTS]
     height = read_height(tree)

@@ -25,7 +25,8 @@ CLAY, SHARE = (0.76, 0.70, 0.63), 0.2
 PLAIN = (Mode.REST, Mode.HOLD)
 #: Beginning of the roles of the skin's materials over pins of the other modes.
 TINTED = "skin_"
-#: sRGB of fingertips by number, again from the first on after the last: no two alike for any color vision.
+#: sRGB of fingertips by number, again from the first on after the last: no two alike for any color
+#: vision.
 FINGERS: tuple[Color, ...] = tuple(
     _hex(code)
     for code in (
@@ -77,7 +78,9 @@ def color_of(mode: Mode) -> Color:
 
 def mix_tint(color: Color) -> Color:
     """Return the color of the skin with a tint of another."""
-    red, green, blue = (clay + SHARE * (other - clay) for clay, other in zip(CLAY, color, strict=True))
+    red, green, blue = (
+        clay + SHARE * (other - clay) for clay, other in zip(CLAY, color, strict=True)
+    )
     return red, green, blue
 
 
@@ -100,4 +103,6 @@ def _recolor(material: bpy.types.Material | None, color: Color) -> None:
 def _material(mode: Mode, of: str = "") -> bpy.types.Material | None:
     """Return the material of a mode, or of the skin over it, when the file has one of its own."""
     role = of + mode.name.lower()
-    return next((item for item in bpy.data.materials if item.get(ROLE) == role and not item.library), None)
+    return next(
+        (item for item in bpy.data.materials if item.get(ROLE) == role and not item.library), None
+    )

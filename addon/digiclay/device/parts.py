@@ -21,7 +21,8 @@ from .skin_lattice import Pass, SkinLattice, choose_parts, make_lattice
 SKIN = (0.91, 0.60, 0.47)
 CASE = (0.13, 0.14, 0.16)
 ARROW = (0.80, 0.05, 0.05)
-#: How much of the fingertip is left when one looks through it for the arrows, and of the skin for the pins.
+#: How much of the fingertip is left when one looks through it for the arrows, and of the skin for
+#: the pins.
 CLEAR, CLEAR_CLAY = 0.25, 0.6
 #: Space between the outermost pins and the wall, and the wall's thickness, in pitches.
 GAP, WALL = 0.85, 1.7
@@ -35,8 +36,16 @@ FINGERTIP_NAME = "Digital Clay Fingertip"
 TOO_MANY = "A bed has at most {} fingertips (got {})."
 #: Half the edge of the cube that a palm is drawn as, m.
 PALM_SIZE = 9e-3
-#: Attributes of the meshes: neighbors for the slope, neighbors for the sum, and what is stored on the way.
-PREVIOUS, FOLLOWING, LOW, HIGH, VALUE, PAIR = "previous", "following", "low", "high", "value", "pair"
+#: Attributes of the meshes: neighbors for the slope, neighbors for the sum, and what is stored on
+#: the way.
+PREVIOUS, FOLLOWING, LOW, HIGH, VALUE, PAIR = (
+    "previous",
+    "following",
+    "low",
+    "high",
+    "value",
+    "pair",
+)
 #: Attribute of the faces of the skin: the nearest pin.
 NEAREST = "pin"
 #: Attributes of the weights: their first half; the other is the name of the skin.
@@ -55,7 +64,9 @@ def marked(
     return thing
 
 
-def material(name: str, color: tuple[float, float, float], roughness: float, alpha: float = 1.0) -> Material:
+def material(
+    name: str, color: tuple[float, float, float], roughness: float, alpha: float = 1.0
+) -> Material:
     """Return the material of a part, as the user may have changed it, or make it."""
     existing = next((m for m in bpy.data.materials if m.get(roles.ROLE) == name), None)
     if existing is not None:
@@ -82,7 +93,8 @@ class SkinMeshes(NamedTuple):
 class Sources(NamedTuple):
     """Objects drawn by a bed's geometry nodes, in a collection outside all Blender scenes."""
 
-    #: First one pin per mode, then one per level of force, in the order of their codes; then the others.
+    #: First one pin per mode, then one per level of force, in the order of their codes; then the
+    #: others.
     collection: Collection
     #: An arrow of length 1 that points down and ends at the origin.
     arrow: Object
@@ -100,7 +112,9 @@ def make_sources(instant: Instant, length: float, deck: float, rim: float) -> So
     mesh = bridge.mesh("Digital Clay Pin", shape, smooth_below=1.2)
     mesh.materials.append(None)
     looks = [(mode.name.lower(), COLORS[mode]) for mode in Mode]
-    looks += [(f"force_{level:02d}", color) for level, color in enumerate((heat.NO_FORCE, *heat.COLORS))]
+    looks += [
+        (f"force_{level:02d}", color) for level, color in enumerate((heat.NO_FORCE, *heat.COLORS))
+    ]
     collection = bpy.data.collections.new("Digital Clay Parts")
     # The node that reads the collection sorts it by name: hence the number in front.
     for code, (look, color) in enumerate(looks):
@@ -255,6 +269,8 @@ def color_fingertip(tip: Object, number: int, *, clear: bool) -> None:
     ball = roles.ellipsoid(tip)
     if ball is not None:
         index = (number - 1) % len(FINGER_COLORS)
-        kind, color = (f"fingertip_{index + 1}", FINGER_COLORS[index]) if index else ("fingertip", SKIN)
+        kind, color = (
+            (f"fingertip_{index + 1}", FINGER_COLORS[index]) if index else ("fingertip", SKIN)
+        )
         name, alpha = (f"{kind}_clear", CLEAR) if clear else (kind, 1.0)
         ball.material_slots[0].material = material(name, color, roughness=0.4, alpha=alpha)

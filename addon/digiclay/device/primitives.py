@@ -37,7 +37,9 @@ def _revolve(profile: Sequence[tuple[float, float]], segments: int) -> Shape:
     angle = np.arange(segments) * (2 * math.pi / segments)
     circle = np.column_stack([np.cos(angle), np.sin(angle), np.zeros(segments)])
     pole = circle[:1] * 0.0
-    return loft([(circle * radius if radius > 0.0 else pole) + [0.0, 0.0, z] for radius, z in profile])
+    return loft(
+        [(circle * radius if radius > 0.0 else pole) + [0.0, 0.0, z] for radius, z in profile]
+    )
 
 
 def rod(radius: float, length: float, segments: int = 24, dome: float = 0.4) -> Shape:
@@ -50,7 +52,9 @@ def rod(radius: float, length: float, segments: int = 24, dome: float = 0.4) -> 
 def ball(segments: int = 64) -> Shape:
     """Return the unit sphere."""
     turns = np.linspace(-math.pi / 2, math.pi / 2, segments // 2 + 1)[1:-1]
-    return _revolve([(0.0, -1.0), *((math.cos(t), math.sin(t)) for t in turns), (0.0, 1.0)], segments)
+    return _revolve(
+        [(0.0, -1.0), *((math.cos(t), math.sin(t)) for t in turns), (0.0, 1.0)], segments
+    )
 
 
 def arrow(radius: float, segments: int = 16) -> Shape:
@@ -59,7 +63,9 @@ def arrow(radius: float, segments: int = 16) -> Shape:
     return _revolve([(0.0, 0.0), (radius, 0.3), (shaft, 0.3), (shaft, 1.0), (0.0, 1.0)], segments)
 
 
-def housing(half: tuple[float, float], wall: float, bottom: float, deck: float, rim: float) -> Shape:
+def housing(
+    half: tuple[float, float], wall: float, bottom: float, deck: float, rim: float
+) -> Shape:
     """Return an open box with rounded corners: the case the pins stand in."""
     bevel = 0.22 * wall
     round_edge = [
@@ -68,7 +74,11 @@ def housing(half: tuple[float, float], wall: float, bottom: float, deck: float, 
     ]
     outside = [_ring(half, wall - inset, z) for inset, z in reversed(round_edge)]
     inside = [_ring(half, inset, z) for inset, z in round_edge]
-    return loft([_ring(half, wall, bottom), *outside, *inside, _ring(half, 0.0, deck)], first=True, last=True)
+    return loft(
+        [_ring(half, wall, bottom), *outside, *inside, _ring(half, 0.0, deck)],
+        first=True,
+        last=True,
+    )
 
 
 def _ring(half: tuple[float, float], grow: float, z: float, steps: int = 9) -> Floats:
@@ -76,6 +86,8 @@ def _ring(half: tuple[float, float], grow: float, z: float, steps: int = 9) -> F
     radius = 0.04 * min(half)
     quarter = np.linspace(0.0, math.pi / 2, steps)
     turns = np.concatenate([quarter + corner * math.pi / 2 for corner in range(4)])
-    middle = np.repeat([[1, 1], [-1, 1], [-1, -1], [1, -1]], steps, axis=0) * (np.array(half) - radius)
+    middle = np.repeat([[1, 1], [-1, 1], [-1, -1], [1, -1]], steps, axis=0) * (
+        np.array(half) - radius
+    )
     xy = middle + (radius + grow) * np.column_stack([np.cos(turns), np.sin(turns)])
     return np.column_stack([xy, np.full(len(xy), z)])

@@ -1,7 +1,8 @@
 """Repair of beds and their fingertips after copy, delete and hide.
 
-Blender copies, deletes and hides the objects that are selected, not those that belong to them. The first part
-here finds what is missing or left over then and puts it right; the second, a timer, decides when.
+Blender copies, deletes and hides the objects that are selected, not those that belong to them. The
+first part here finds what is missing or left over then and puts it right; the second, a timer,
+decides when.
 """
 
 from collections.abc import Iterable, Iterator
@@ -47,10 +48,11 @@ EYE, SWITCHES = 1, ((2, "hide_viewport"), (4, "hide_render"))
 class Faults(NamedTuple):
     """Missing and surplus objects of a bed; not to be stored, since undo invalidates them."""
 
-    #: Beds, and palms, that have come without fingertips of their own: copies, and beds of older files. And
-    #: fingertips that were copied without their ellipsoid, which cannot be selected.
+    #: Beds, and palms, that have come without fingertips of their own: copies, and beds of older
+    #: files. And fingertips that were copied without their ellipsoid, which cannot be selected.
     bare: list[Object]
-    #: Fingertips that were copied on their bed, or have come from another one, and that bed: further ones.
+    #: Fingertips that were copied on their bed, or have come from another one, and that bed:
+    #: further ones.
     loose: list[tuple[Object, Object]]
     #: Fingertips, palms, ellipsoids and housings whose bed or fingertip is gone.
     left: list[Object]
@@ -67,7 +69,9 @@ def mark_parts() -> frozenset[int]:
         ball = ellipsoid(tip)
         if ball is not None and tip.get(BALL) != ball:
             tip[BALL] = ball
-        if ball is not None and not any(ball.lock_location):  # an older file: it could not be clicked on
+        if ball is not None and not any(
+            ball.lock_location
+        ):  # an older file: it could not be clicked on
             parts.lock_in_place(ball)
         cases = [child for child in bed.children if child.get(ROLE) == HOUSING]
         for part in filter(None, (tip, ball, *cases)):
@@ -82,15 +86,27 @@ def find_faults(known: frozenset[int], mended: frozenset[int] = frozenset()) -> 
     tips = _standing(FINGERTIP)
     bare += [tip for tip in tips if _lacks_part(tip, BALL, known, mended)]
     beds = _standing(BED)
-    held, tips_of_beds = {bed.get(name) for bed in beds for name in FINGERS}, {tip for _, _, tip in _tips()}
+    held, tips_of_beds = (
+        {bed.get(name) for bed in beds for name in FINGERS},
+        {tip for _, _, tip in _tips()},
+    )
     # Held, but by another bed: it was given to this one.
     come = [tip for tip in tips if (tip in held) == (tip.session_uid in known - mended)]
-    loose = [(tip, bed) for tip in come if tip not in tips_of_beds and (bed := owner_of(tip)) in beds]
+    loose = [
+        (tip, bed) for tip in come if tip not in tips_of_beds and (bed := owner_of(tip)) in beds
+    ]
     mine = [thing for thing in bpy.data.objects if thing.get(OWNED) and not thing.library]
     # Deleted along with its bed a fingertip may stand nowhere, and have no user any more.
     left = [thing for thing in mine if not thing.users or (is_linked(thing) and _is_orphan(thing))]
-    shown = {thing for scene in bpy.data.scenes for thing in scene.objects if thing.get(ROLE) in (PIN, BAKE)}
-    strewn = [thing for thing in shown if thing.session_uid not in known - mended and not thing.library]
+    shown = {
+        thing
+        for scene in bpy.data.scenes
+        for thing in scene.objects
+        if thing.get(ROLE) in (PIN, BAKE)
+    }
+    strewn = [
+        thing for thing in shown if thing.session_uid not in known - mended and not thing.library
+    ]
     return Faults(bare, loose, left, strewn)
 
 
@@ -180,13 +196,15 @@ def _lacking(owner: Object, known: frozenset[int], mended: frozenset[int]) -> It
 def _holder(part: Object, owner: Object) -> Object | None:
     """Return the holder of a part: its parent, or the bed of its palm unless the palm is the owner."""
     above = part.parent
-    return above.parent if above is not None and above.get(ROLE) == PALM and above != owner else above
+    return (
+        above.parent if above is not None and above.get(ROLE) == PALM and above != owner else above
+    )
 
 
 def _lacks_part(owner: Object, name: str, known: frozenset[int], mended: frozenset[int]) -> bool:
     """Return whether an object without a part of its own is to get one."""
-    # A copy is to get one: it holds the part of its original. So is a bed that has come without any.
-    # An object whose part the user has deleted or detached is not.
+    # A copy is to get one: it holds the part of its original. So is a bed that has come without
+    # any. An object whose part the user has deleted or detached is not.
     part, new = owner.get(name), owner.session_uid not in known
     if part is None:
         return name == FINGER and (new or (FINGER not in owner and owner.session_uid in mended))
@@ -198,13 +216,16 @@ def _lacks_part(owner: Object, name: str, known: frozenset[int], mended: frozens
 
 def _is_orphan(part: Object) -> bool:
     """Return whether nothing that stands has this part any more."""
-    kind, names = {ELLIPSOID: (FINGERTIP, (BALL,)), PALM: (BED, (HAND,))}.get(part[ROLE], (BED, FINGERS))
+    kind, names = {ELLIPSOID: (FINGERTIP, (BALL,)), PALM: (BED, (HAND,))}.get(
+        part[ROLE], (BED, FINGERS)
+    )
     owner = owner_of(part, kind)
     if owner is not None and is_linked(owner):
         return False
     if part.parent is not None and part.parent.get(ROLE) == PALM:  # which was deleted, or its bed
         return True
-    # With its parent cleared or exchanged by hand it is still held by its bed, and stays as long as that.
+    # With its parent cleared or exchanged by hand it is still held by its bed, and stays as long as
+    # that.
     return not any(
         thing.get(name) == part and is_linked(thing) for thing in bpy.data.objects for name in names
     )
@@ -238,8 +259,12 @@ def _complete(owner: Object) -> None:
     except DigiclayError:  # settings that do not go together: a session will say so
         scene = resolve({})
     give_fingertip(bed, scene)
-    if view.is_drawn(bed) and view.housing_of(bed) is None:  # of an older file, where it is an object
-        view.add_modifier(bed, Instant.at_rest(scene.layout, scene.actuator, find_ellipsoids(scene)[:1]))
+    if (
+        view.is_drawn(bed) and view.housing_of(bed) is None
+    ):  # of an older file, where it is an object
+        view.add_modifier(
+            bed, Instant.at_rest(scene.layout, scene.actuator, find_ellipsoids(scene)[:1])
+        )
     view.hold_parts(bed)
 
 
@@ -287,7 +312,9 @@ def _duplicate(thing: Object, parent: Object, owner: Object) -> Object:
     copy = thing.copy()
     own_curves(copy)
     copy.parent = parent
-    if thing.parent is None or ROLE not in thing.parent:  # it stands on its bed as the other one on its own
+    if (
+        thing.parent is None or ROLE not in thing.parent
+    ):  # it stands on its bed as the other one on its own
         copy.matrix_parent_inverse.identity()
         home = owner_of(thing) or parent
         copy.matrix_basis = home.matrix_world.inverted() @ thing.matrix_world
@@ -307,7 +334,9 @@ def _remove(left: list[Object]) -> None:
         for collection in part.users_collection:
             collection.objects.unlink(part)
     # Also parts that Blender kept only because deleted objects still held them.
-    bpy.data.batch_remove([thing for thing in bpy.data.objects if thing.get(OWNED) and not thing.users])
+    bpy.data.batch_remove(
+        [thing for thing in bpy.data.objects if thing.get(OWNED) and not thing.users]
+    )
 
 
 def _unlink(thing: Object) -> None:
@@ -349,16 +378,19 @@ def _hide_along(owner: Object, part: Object) -> None:
 def _list_layers(*things: Object) -> list[ViewLayer]:
     """Return the view layers in which all of some objects stand."""
     layers = (layer for scene in bpy.data.scenes for layer in scene.view_layers)
-    return [layer for layer in layers if all(layer.objects.get(each.name) == each for each in things)]
+    return [
+        layer for layer in layers if all(layer.objects.get(each.name) == each for each in things)
+    ]
 
 
 #: Time until the next look while an operator is under way, s.
 AGAIN = 0.1
-#: Operators with one of these push an undo step when they are done; until then nothing is to be changed.
+#: Operators with one of these push an undo step when they are done; until then nothing is to be
+#: changed.
 STEPS = {"UNDO", "UNDO_GROUPED", "MACRO"}
 
-#: Maximum number of repair passes: a repair may leave over a fingertip that only a copy's bed still held, and
-#: its ellipsoid.
+#: Maximum number of repair passes: a repair may leave over a fingertip that only a copy's bed still
+#: held, and its ellipsoid.
 PASSES = 3
 
 
@@ -415,8 +447,8 @@ def _repair(faults: Faults) -> None:
 def _repeat_step(came: str) -> bool:
     """Undo or redo one more step, unless something was done since; return whether one was."""
     operator = getattr(bpy.ops.ed, came)
-    # Both free the operators that are listed, and one that is was run later. It may be shown by F9, and
-    # Blender crashes when what its panel shows is freed.
+    # Both free the operators that are listed, and one that is was run later. It may be shown by F9,
+    # and Blender crashes when what its panel shows is freed.
     if operator.poll() and not bpy.context.window_manager.operators:
         operator()
     return bool(_watch.came)
@@ -467,7 +499,8 @@ def _is_busy(windows: Iterable[Window]) -> bool:
     )
 
 
-#: Handlers by the names of Blender's lists: objects may have come or gone, undo or redo has come to a step.
+#: Handlers by the names of Blender's lists: objects may have come or gone, undo or redo has come to
+#: a step.
 HANDLERS = {
     "depsgraph_update_post": note_change,
     "undo_post": bpy.app.handlers.persistent(lambda *_: _repair_soon("undo")),

@@ -1,8 +1,8 @@
 """Points of the live skin, and their weights: heights of the skin from heights of the pins; no Blender.
 
-The skin is interpolated along the rows of pins, then across them. For each of the two passes the points
-and their weights are prepared once. What remains for a new state is, at every point, a weighted sum of
-heights and slopes of two neighbors.
+The skin is interpolated along the rows of pins, then across them. For each of the two passes the
+points and their weights are prepared once. What remains for a new state is, at every point, a
+weighted sum of heights and slopes of two neighbors.
 
 *smooth* and *membrane* are those of `core.surface.skins`.
 """
@@ -40,7 +40,8 @@ class Weights(NamedTuple):
 class Pass(NamedTuple):
     """Interpolation along one direction."""
 
-    #: (k,), neighbors of each of the k values that are interpolated, for its slope; itself at an end.
+    #: (k,), neighbors of each of the k values that are interpolated, for its slope; itself at an
+    #: end.
     previous: Indices
     following: Indices
     #: (m,), the two values each of the m points is between.
@@ -109,7 +110,9 @@ def make_lattice(instant: Instant, parts: int) -> SkinLattice:
     faces = _join(surface, edge.size)
     middle = place[faces].mean(axis=1)
     row = np.rint((middle[:, 1] - y[0]) / spacing).clip(0, rows - 1).astype(np.int32)
-    column = np.rint((middle[:, 0] - starts[row]) / instant.pitch).clip(0, columns - 1).astype(np.int32)
+    column = (
+        np.rint((middle[:, 0] - starts[row]) / instant.pitch).clip(0, columns - 1).astype(np.int32)
+    )
     return SkinLattice(along, across, place, sunk, faces, row * columns + column)
 
 
@@ -140,7 +143,8 @@ def _weigh(share: Floats, cap: float) -> dict[str, Weights]:
     square, cube = share**2, share**3
     rise = 3.0 * square - 2.0 * cube
     smooth = Weights(
-        np.column_stack([1.0 - rise, cube - 2.0 * square + share]), np.column_stack([rise, cube - square])
+        np.column_stack([1.0 - rise, cube - 2.0 * square + share]),
+        np.column_stack([rise, cube - square]),
     )
     line, none = flatten_share(share, cap), np.zeros_like(share)
     return {

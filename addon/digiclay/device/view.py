@@ -34,8 +34,8 @@ from . import parts
 from .instant import Instant
 from .node_tree import ARROWS, CASE, COLOR_BY_FORCE, FAR, FORM, SOURCES, bed_nodes
 
-#: What the color of a pin can tell; and forms of a bed in view: its pins, a live skin over them, or both. In
-#: the order of the numbers in the settings of the geometry nodes.
+#: What the color of a pin can tell; and forms of a bed in view: its pins, a live skin over them, or
+#: both. In the order of the numbers in the settings of the geometry nodes.
 COLORINGS, FORMS = ("mode", "force"), ("automatic", "pins", "skin", "both")
 #: Where a bed keeps the form that it had before its skin was toggled, until a form is chosen.
 BEFORE = "digiclay_form_before"
@@ -67,7 +67,9 @@ def build(instant: Instant, collection: Collection, lowest: float | None = None)
 def make_cells(instant: Instant) -> Mesh:
     """Make the mesh of a bed at an instant."""
     cells = bridge.points("Digital Clay", len(instant.height))
-    bridge.write_cells(cells, instant.position, instant.height, mode=instant.mode, force=instant.force)
+    bridge.write_cells(
+        cells, instant.position, instant.height, mode=instant.mode, force=instant.force
+    )
     return cells
 
 
@@ -90,15 +92,18 @@ def add_modifier(bed: Object, instant: Instant) -> None:
 
 def hold_parts(bed: Object) -> None:
     """Have what a bed is drawn with stay out of the scene when the bed is appended to another file."""
-    # Blender puts an appended collection of objects that stand in no scene into the scene, unless an
-    # empty instances it. The fingertip is one; it shows nothing of it, since its instancing is off.
+    # Blender puts an appended collection of objects that stand in no scene into the scene, unless
+    # an empty instances it. The fingertip is one; it shows nothing of it, since its instancing is
+    # off.
     for tip in fingertips_of(bed).values():
         tip.instance_collection = sources_of(bed)
 
 
 def show(bed: Object, instant: Instant) -> None:
     """Show another instant of the same bed, the poses of its fingertips included."""
-    bridge.write_cells(bed.data, instant.position, instant.height, mode=instant.mode, force=instant.force)
+    bridge.write_cells(
+        bed.data, instant.position, instant.height, mode=instant.mode, force=instant.force
+    )
     bridge.place_fingertips(bed, instant.fingertips, instant.fingers)
 
 

@@ -103,7 +103,8 @@ def _scene(bed: Object) -> Scene:
 
 #: Edges of walls and base sharper than this stay sharp when a user shades them smooth, too, rad.
 SHARP = 0.7
-#: Least part of its normal by which a face that faces up does so: walls are vertical but for rounding.
+#: Least part of its normal by which a face that faces up does so: walls are vertical but for
+#: rounding.
 UPWARDS = 1e-6
 
 

@@ -10,7 +10,8 @@ from ..compat import bpy
 from ..core.base.errors import ParameterError
 from ..core.shapes.heightmap import READERS, refuse_too_many
 
-#: Most pixels that are handed over: Blender gives four 32-bit numbers for each. More are scaled down by it.
+#: Most pixels that are handed over: Blender gives four 32-bit numbers for each. More are scaled
+#: down by it.
 MOST = 4_000_000
 
 

@@ -62,7 +62,9 @@ def read_relief(thing: Object, bed: Object, depsgraph: Depsgraph) -> ShapeMesh:
 def show_relief(bed: Object, relief: Relief, shape: Shape) -> tuple[Fitted, float]:
     """Display a relief on a bed as `shape` requests; return the fit, and what the display is off by, m."""
     scene = properties.scene_of(bed)
-    return _show(bed, scene, shape, fit_relief(shape, relief, make_grid(scene.layout), scene.actuator))
+    return _show(
+        bed, scene, shape, fit_relief(shape, relief, make_grid(scene.layout), scene.actuator)
+    )
 
 
 def show_file(bed: Object, shape: Shape) -> tuple[Fitted, float]:
@@ -82,7 +84,9 @@ def _show(bed: Object, scene: Scene, shape: Shape, laid: Fitted) -> tuple[Fitted
     (state,) = deque(periods(system, fingers, begin(system), max(1, round(count))), maxlen=1)
     off = float(np.abs(state.row(0) - display.heights).max())
     poses, grid = bridge.poses(bed), make_grid(scene.layout)
-    for pose, finger in zip(poses, find_ellipsoids(scene), strict=True):  # above the shape where it is higher
+    for pose, finger in zip(
+        poses, find_ellipsoids(scene), strict=True
+    ):  # above the shape where it is higher
         touch = find_touch_height(grid, state.row(0), finger, float(pose[0]), float(pose[1]))
         pose[2] = max(pose[2], touch + CLEARANCE)
     # All that can fail is done: from here on the bed changes.

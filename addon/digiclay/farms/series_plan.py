@@ -1,7 +1,8 @@
 """Tasks of a job series on a render farm, and their files for OpenJD, Flamenco and OpenCue.
 
-Of each job: the run, the frames of its films in ranges, one task per film that encodes them; last, the page.
-Each task is a command of digiclay that does nothing, with exit code 0, where it is done already.
+Of each job: the run, the frames of its films in ranges, one task per film that encodes them; last,
+the page. Each task is a command of digiclay that does nothing, with exit code 0, where it is done
+already.
 """
 
 import json
@@ -40,7 +41,8 @@ class Task:
     needs: tuple[str, ...] = ()
     #: Whether it draws.
     blender: bool = False
-    #: First frames of the parts of a film, a task each, up to the number of its frames; none: one task.
+    #: First frames of the parts of a film, a task each, up to the number of its frames; none: one
+    #: task.
     frames: range = range(0)
 
     def list_arguments(self, series: str) -> list[str]:
@@ -92,7 +94,9 @@ def split_frames(tasks: Sequence[Task]) -> list[Task]:
         for first in task.frames:
             text = f"{first}-{min(first + task.frames.step, task.frames.stop) - 1}"
             name, options = f"{task.name} {text}", (*task.options, FRAME_OPTION, text)
-            parts[task.name].append(replace(task, name=name, options=options, needs=needs, frames=range(0)))
+            parts[task.name].append(
+                replace(task, name=name, options=options, needs=needs, frames=range(0))
+            )
     return [part for group in parts.values() for part in group]
 
 
@@ -118,7 +122,8 @@ class Submission:
 Written = tuple[dict[str, str], list[str]]
 #: Characters of a step's name, and seconds a task gets to stop by itself.
 LONGEST, GRACE = 64, 30
-#: Names of the parameter that is the program, by the first of its arguments: the others fit that kind alone.
+#: Names of the parameter that is the program, by the first of its arguments: the others fit that
+#: kind alone.
 PROGRAMS = {"-m": "Python", "--background": "Blender", "": "Digiclay"}
 
 
@@ -219,7 +224,13 @@ def write_flamenco(submission: Submission) -> Written:
         },
     }
     script, job = f"flamenco/{SCRIPT.name}", "flamenco/job.json"
-    post = ("curl", "--header", "Content-Type: application/json", "--data-binary", f"@{submission.find(job)}")
+    post = (
+        "curl",
+        "--header",
+        "Content-Type: application/json",
+        "--data-binary",
+        f"@{submission.find(job)}",
+    )
     return {script: SCRIPT.read_text(encoding="utf-8"), job: format_json(table).decode()}, [
         f"once: put {submission.find(script)} into the folder 'scripts' beside flamenco-manager, "
         "and restart it",

@@ -41,7 +41,8 @@ def find_bed(uid: int, name: str) -> Object | None:
         bed = next((thing for thing in bpy.data.objects if thing.session_uid == uid), None)
     if bed is None or bed.get(ROLE) != BED:  # one that was converted can come back by undo
         return None
-    # Blender looks through all objects of all scenes for `users_scene`: only a bed not shown is worth that.
+    # Blender looks through all objects of all scenes for `users_scene`: only a bed not shown is
+    # worth that.
     return bed if _is_shown(bpy.context, bed) or bed.users_scene else None
 
 
@@ -56,7 +57,9 @@ def blocking_reason(context: Context, bed: Object, pins: int | None = None) -> s
     if bpy.app.is_job_running("RENDER"):
         return localize("a render is under way")
     if not _is_shown(context, bed):
-        return localize("no window shows its scene, or its collection is left out: show it to go on")
+        return localize(
+            "no window shows its scene, or its collection is left out: show it to go on"
+        )
     # A mesh can also be edited through another object that shares it.
     if bed.mode != "OBJECT":
         return localize("the bed is being edited: go back to Object Mode to go on")
@@ -76,7 +79,9 @@ def blocking_reason(context: Context, bed: Object, pins: int | None = None) -> s
         if not _is_shown(context, tip):
             return localize("{} is in no visible scene: link it to a collection to go on", tip.name)
         if not np.isfinite(matrix).all():
-            return localize("{} has no finite location: clear its location, or undo that, to go on", tip.name)
+            return localize(
+                "{} has no finite location: clear its location, or undo that, to go on", tip.name
+            )
         if abs(np.linalg.det(matrix[:3, :3])) < 1e-12:
             return localize("{} is scaled to nothing: clear its scale to go on", tip.name)
     return ""
@@ -93,7 +98,9 @@ def find_obstacle(context: Context, bed: Object, use: Use) -> str:
     if context.view_layer.objects.get(bed.name) != bed:
         return localize("The bed is not in this view layer: show its scene or collection first")
     if use is not Use.MEASURE and not (is_local(bed) and is_local(bed.data)):
-        return localize("The bed is linked from another file: make it local first (Object > Relations)")
+        return localize(
+            "The bed is linked from another file: make it local first (Object > Relations)"
+        )
     if use is Use.CHANGE or bed.mode != "OBJECT":
         return ""
     layout = bed.digiclay.layout
@@ -112,10 +119,15 @@ def active_session(context: Context) -> tuple[Object, Running] | None:
     return None if session is None else (bed, session)
 
 
-#: The state by `core.session.snapshot`, poses and numbers of the fingertips at it, the last tick; and in JSON
-#: the tick in which the stroke began that is being formed, or 0, those of the gestures before, and the
-#: strokes that are to be formed from that state, by `strokes.drawn`.
-STATE, POSE, NUMBERS, TICK = "digiclay_state", "digiclay_pose", "digiclay_fingers", "digiclay_moment"
+#: The state by `core.session.snapshot`, poses and numbers of the fingertips at it, the last tick;
+#: and in JSON the tick in which the stroke began that is being formed, or 0, those of the gestures
+#: before, and the strokes that are to be formed from that state, by `strokes.drawn`.
+STATE, POSE, NUMBERS, TICK = (
+    "digiclay_state",
+    "digiclay_pose",
+    "digiclay_fingers",
+    "digiclay_moment",
+)
 QUEUE = "digiclay_strokes"
 
 
@@ -124,7 +136,8 @@ def write(bed: Object, running: Running, before: Running | None = None) -> None:
 
     No stroke stands there half-formed: it is there as drawn, with the state it begins from.
     """
-    # The tick counts on even while nothing moves: undo reads anew only what is other bytes in a step.
+    # The tick counts on even while nothing moves: undo reads anew only what is other bytes in a
+    # step.
     bed[TICK] = running.tick
     if before is not None and _identify(running) == _identify(before):
         return
@@ -143,7 +156,11 @@ def write(bed: Object, running: Running, before: Running | None = None) -> None:
 
 def _identify(running: Running) -> tuple[object, ...]:
     """Return what tells apart what is written of sessions."""
-    return running.standing.snapshot, running.stroke_start, *(stroke.number for stroke in running.drawn)
+    return (
+        running.standing.snapshot,
+        running.stroke_start,
+        *(stroke.number for stroke in running.drawn),
+    )
 
 
 def put(running: Running) -> None:

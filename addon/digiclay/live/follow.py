@@ -1,7 +1,7 @@
 """Following of a server: fingertips of a session are where those of `digiclay serve` are. No Blender.
 
-A tick looks for datagrams and never waits for one. UDP suits that: a pose that is lost is not missed, since
-the next one is newer, and a server that stalls leaves nothing half-read.
+A tick looks for datagrams and never waits for one. UDP suits that: a pose that is lost is not
+missed, since the next one is newer, and a server that stalls leaves nothing half-read.
 """
 
 import ipaddress
@@ -28,7 +28,8 @@ LIFTED = 1.0
 LOCAL = "localhost"
 RULE = "The address must be HOST:PORT, such as 127.0.0.1:8766, with a numeric host (got {})."
 OFFLINE = (
-    "{} is another machine: allow online access in Preferences > System, or follow a server on this machine."
+    "{} is another machine: allow online access in Preferences > System, "
+    "or follow a server on this machine."
 )
 
 
@@ -68,7 +69,10 @@ def read_fingers(data: bytes) -> dict[int, Floats] | None:
     head = _pad(FINGERS) + _pad(",h" + count * "hdddddddd")
     if not data.startswith(head) or len(data) != len(head) + 8 + count * FINGER.size:
         return None
-    poses = {identity: _check_pose(pose) for identity, _, *pose in FINGER.iter_unpack(data[len(head) + 8 :])}
+    poses = {
+        identity: _check_pose(pose)
+        for identity, _, *pose in FINGER.iter_unpack(data[len(head) + 8 :])
+    }
     return {identity: pose for identity, pose in poses.items() if pose is not None}
 
 
@@ -88,7 +92,8 @@ def _pad(word: str) -> bytes:
 
 #: Poses a second asked for: some between two ticks.
 RATE = 120.0
-#: Time between two subscriptions, and that after which a server is silent, s: its end is reported within 2 s.
+#: Time between two subscriptions, and that after which a server is silent, s: its end is reported
+#: within 2 s.
 RENEW, SILENT = 1.0, 1.5
 #: Words about a server whose port is closed, and about one that sends nothing.
 ENDED = "No server at {}: it has ended, or is not started yet"
@@ -111,8 +116,8 @@ class Following:
     heard: float | None = None
     #: The newest one (7,); None before the first.
     pose: Floats | None = None
-    #: The newest ones by identity, of a server with several fingertips; and the identity of each fingertip of
-    #: the bed, () before.
+    #: The newest ones by identity, of a server with several fingertips; and the identity of each
+    #: fingertip of the bed, () before.
     fingers: Mapping[int, Floats] = field(default_factory=dict)
     seats: tuple[int | None, ...] = ()
     #: Whether its silence has been reported.
@@ -161,7 +166,9 @@ def follow(uid: int, now: float) -> tuple[Floats | None, str]:
     if following is None:
         return None, ""
     if now - following.asked >= RENEW:
-        with suppress(OSError):  # the port is closed now, or the network is busy: it is repeated soon
+        with suppress(
+            OSError
+        ):  # the port is closed now, or the network is busy: it is repeated soon
             following.door.send(pack_subscription(following.token, RATE))
         following = replace(following, asked=now)
     (pose, fingers, closed), words = _receive(following), ""
@@ -173,7 +180,9 @@ def follow(uid: int, now: float) -> tuple[Floats | None, str]:
     elif not following.silent and (closed or now - heard >= SILENT):
         # Nobody presses on when the server is gone.
         gone = (
-            None if following.pose is None else np.array([*following.pose[:2], LIFTED, *following.pose[3:]])
+            None
+            if following.pose is None
+            else np.array([*following.pose[:2], LIFTED, *following.pose[3:]])
         )
         following = replace(following, pose=gone, fingers={}, silent=True)
         words = localize(ENDED if closed else UNHEARD, following.address)
@@ -186,8 +195,8 @@ def follow(uid: int, now: float) -> tuple[Floats | None, str]:
 def place(uid: int, poses: Floats) -> Floats:
     """Return the poses (f, 7) of a bed's fingertips with those of the server: one for each identity.
 
-    An identity that appears gets that of one that is gone, whose place it may have taken, or else the first
-    that has none; the fingertip of one that is gone is lifted.
+    An identity that appears gets that of one that is gone, whose place it may have taken, or else
+    the first that has none; the fingertip of one that is gone is lifted.
     """
     following, placed = SERVERS.by_bed[uid], poses.copy()
     before = (*following.seats, *[None] * len(poses))[: len(poses)]

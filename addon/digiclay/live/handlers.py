@@ -24,8 +24,8 @@ STOPPED = "was stopped; the bed keeps its state"
 VIEW, WINDOW = ("3D View", "VIEW_3D"), ("Window", "EMPTY")
 #: The keymap in which Alt S clears the scale: its keys precede those of the view.
 OBJECT = ("Object Mode", "EMPTY")
-#: Keymap, operator, key, and modifier keys. Without a session, or a bed, the operators decline, and the key
-#: has its usual effect.
+#: Keymap, operator, key, and modifier keys. Without a session, or a bed, the operators decline, and
+#: the key has its usual effect.
 KEYS: tuple[tuple[tuple[str, str], str, str, dict[str, bool]], ...] = (
     (VIEW, "digiclay.session_pause", "P", {}),
     (VIEW, "digiclay.session_step", "P", {"shift": True}),
@@ -55,11 +55,15 @@ def clear_recovery(path: str = "", *_: object) -> None:
         if not number:
             continue
         bed = find_bed(session.uid, session.name)
-        if bed is not None and number in [entry.number for entry in takes.list_takes(bed)]:  # not undone
+        if bed is not None and number in [
+            entry.number for entry in takes.list_takes(bed)
+        ]:  # not undone
             takes.remove(bed, number)
             # A copy saved elsewhere is not the file Blender asks about before it closes it.
             if session.recording and path and path == bpy.data.filepath:
-                later = replace(later, recording=replace(session.recording, saved=session.recording.count))
+                later = replace(
+                    later, recording=replace(session.recording, saved=session.recording.count)
+                )
         running.put(later)
 
 
@@ -79,7 +83,9 @@ def save_copy() -> str:
     try:
         bpy.ops.wm.save_as_mainfile(filepath=str(file_path()), copy=True, check_existing=False)
     except RuntimeError as error:
-        return localize("It could not be saved for recovery: {}", str(error).removeprefix("Error: ").strip())
+        return localize(
+            "It could not be saved for recovery: {}", str(error).removeprefix("Error: ").strip()
+        )
     return localize("Restore it with File > Recover > Auto Save: {}", file_path().name)
 
 
@@ -114,7 +120,9 @@ HANDLERS = {
     "save_pre": write_recovery,
     "save_post": clear_recovery,
     "save_post_fail": bpy.app.handlers.persistent(lambda *_: clear_recovery()),
-    "load_pre": bpy.app.handlers.persistent(lambda *_: end_with_file("ended: another file was loaded")),
+    "load_pre": bpy.app.handlers.persistent(
+        lambda *_: end_with_file("ended: another file was loaded")
+    ),
 }
 
 
@@ -131,7 +139,11 @@ def end(how: str, *sessions: Running) -> None:
     """End sessions, by default all, with words on how; their beds keep states, and takes of recordings."""
     clear_recovery()
     sessions = sessions or running.list_sessions()
-    words = [localize("The session of {} {}", ", ".join(session.name for session in sessions), localize(how))]
+    words = [
+        localize(
+            "The session of {} {}", ", ".join(session.name for session in sessions), localize(how)
+        )
+    ]
     try:
         words += filter(None, [tick.stop(session.uid) for session in sessions])
     finally:  # whatever cannot be stored, none of them stays listed without a loop

@@ -120,7 +120,9 @@ def draw(header: Header, context: Context) -> None:
     """Draw the keys of a running session in the status bar."""
     row = header.layout.row()
     paused = all(session.paused for session in running.list_sessions())
-    row.label(text="Digital Clay paused" if paused else "Digital Clay", icon="PAUSE" if paused else "PLAY")
+    row.label(
+        text="Digital Clay paused" if paused else "Digital Clay", icon="PAUSE" if paused else "PLAY"
+    )
     row.label(text=" Stop", icon="EVENT_ESC")
     row.label(text="Resume" if paused else "Pause", icon="EVENT_P")
     step = row.row(align=True)

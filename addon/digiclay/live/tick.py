@@ -38,7 +38,9 @@ class Note(NamedTuple):
 def start(context: Context, bed: Object) -> list[Note]:
     """Begin a session of a bed from its stored state; raise DigiclayError if settings or scale forbid it."""
     if is_baked(bed):
-        raise DigiclayError(f"{bed.name} plays a baked session: free the bake in the Takes panel first.")
+        raise DigiclayError(
+            f"{bed.name} plays a baked session: free the bake in the Takes panel first."
+        )
     context.view_layer.update()
     obstacle = beds.find_obstacle(context, bed, beds.Use.FORM)
     if obstacle:
@@ -57,7 +59,14 @@ def start(context: Context, bed: Object) -> list[Note]:
     if lines and stood is not None:  # the fingertip has come along a stroke, which begins anew
         poses = running.match_poses(stood, was, poses, numbers)
     begun, fault = sculpting.begin_session(
-        bed.session_uid, bed.name, scene, poses, beds.read_snapshot(bed), beds.read_tick(bed), numbers, was
+        bed.session_uid,
+        bed.name,
+        scene,
+        poses,
+        beds.read_snapshot(bed),
+        beds.read_tick(bed),
+        numbers,
+        was,
     )
     begun = stored.add_strokes(begun, lines)
     show(bed, replace(begun, settings=settings))
@@ -65,7 +74,9 @@ def start(context: Context, bed: Object) -> list[Note]:
         place_fingers(context, bed, begun)
     damaged = len(lines) - len(begun.strokes)
     words = (
-        localize("Stored press strokes that cannot be read ({}) were left out", damaged) if damaged else ""
+        localize("Stored press strokes that cannot be read ({}) were left out", damaged)
+        if damaged
+        else ""
     )
     faults = [Note("WARNING", f"{bed.name}: {each}") for each in (fault, words) if each]
     return [*(Note("INFO", words) for words in notes if words), *faults]
@@ -75,7 +86,9 @@ def stop(uid: int) -> str:
     """End a session: its bed keeps the state, and a take of the recording; return words about the take."""
     ended = running.TABLE.sessions.get(uid)
     bed = find_bed(uid, ended.name) if ended else None
-    if ended is not None and bed is not None and ended.stroke_start:  # so that what is drawn is complete
+    if (
+        ended is not None and bed is not None and ended.stroke_start
+    ):  # so that what is drawn is complete
         back = sculpting.restore(ended, ended.standing.snapshot, ended.standing.poses)
         show(bed, replace(back, strokes=ended.strokes, stroke_start=None))
     running.drop(uid)
@@ -140,7 +153,11 @@ def take_up(context: Context, bed: Object, session: Running) -> Running:
 
 def has_strokes() -> bool:
     """Return whether a session has a stroke to finish that the hand has drawn, and is free to do so."""
-    free = (session for session in running.list_sessions() if not (session.paused or session.blocking_reason))
+    free = (
+        session
+        for session in running.list_sessions()
+        if not (session.paused or session.blocking_reason)
+    )
     return any(session.strokes and not session.strokes[0].held for session in free)
 
 
@@ -190,7 +207,9 @@ def _advance_session(
         running.put(waiting)
         beds.write(bed, waiting, session)
         if reason != before.blocking_reason:
-            yield Note("WARNING", localize("The session of {} waits: {}", bed.name, reason), session.uid)
+            yield Note(
+                "WARNING", localize("The session of {} waits: {}", bed.name, reason), session.uid
+            )
         return
     if before.blocking_reason:
         yield Note("INFO", localize("The session of {} goes on", bed.name), session.uid)
@@ -207,7 +226,9 @@ def _advance_session(
     except (DivergenceError, MethodError) as error:
         back = sculpting.restore(session, session.standing.snapshot, session.standing.poses)
         later = replace(drop_strokes(back), paused=True)
-        yield Note("ERROR", localize("The session of {} is paused: {}", bed.name, error), session.uid)
+        yield Note(
+            "ERROR", localize("The session of {} is paused: {}", bed.name, error), session.uid
+        )
     running.put(later)
     # Whatever is written into the bed, Blender draws.
     if loop.LOOP.in_haste and later.finished_strokes == session.finished_strokes:
@@ -218,7 +239,12 @@ def _advance_session(
         _move_fingers(bed, later, max(1, len(following.seats) if following else 0))
     beds.write(bed, later, before)
     # Drawing costs most: where nothing has changed, nothing is redrawn.
-    if before.stale or before.blocking_reason or changes or not np.array_equal(seen, _visible_rows(later)):
+    if (
+        before.stale
+        or before.blocking_reason
+        or changes
+        or not np.array_equal(seen, _visible_rows(later))
+    ):
         view.show_state(bed, later.system, later.state)
     if moved:  # One evaluation of pins and fingertip takes less time than one of each.
         _evaluate(context)
@@ -229,7 +255,9 @@ def find_moment(context: Context) -> float | None:
     scene, screen = context.scene, context.screen
     if screen is None or not screen.is_animation_playing:
         return None
-    return float((scene.frame_current + scene.frame_subframe) * scene.render.fps_base / scene.render.fps)
+    return float(
+        (scene.frame_current + scene.frame_subframe) * scene.render.fps_base / scene.render.fps
+    )
 
 
 def _visible_rows(session: Running) -> Floats:
@@ -246,7 +274,9 @@ def _read_changes(context: Context, bed: Object, session: Running) -> tuple[str,
     bridge.keep_sizes(bed)
     try:
         settings = properties.read_stored_settings(bed)
-        changed = settings != session.settings or properties.find_layout_mismatch(bed, session.scene.layout)
+        changed = settings != session.settings or properties.find_layout_mismatch(
+            bed, session.scene.layout
+        )
         if session.stale or session.blocking_reason or changed:
             session, words = _take_settings(bed, session)
             session = replace(session, settings=settings)
@@ -268,7 +298,11 @@ def _take_settings(bed: Object, session: Running) -> tuple[Running, str]:
     changed, words = sculpting.change_scene(session, scene, numbers, bridge.poses(bed))
     # A take is of one scene: what was recorded under the former one is not lost.
     ended = len(session.strokes) - len(changed.strokes)
-    dropped = localize("Press strokes ended unfinished ({}): their fingertip is gone", ended) if ended else ""
+    dropped = (
+        localize("Press strokes ended unfinished ({}): their fingertip is gone", ended)
+        if ended
+        else ""
+    )
     words = ". ".join(filter(None, (words or dropped, takes.keep_recording(bed, session))))
     for tip, finger in zip(fingertips_of(bed).values(), find_ellipsoids(scene), strict=True):
         bridge.resize_fingertip(tip, finger)

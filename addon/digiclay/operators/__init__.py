@@ -9,7 +9,10 @@ import pkgutil
 from ..compat import bpy
 from . import add_bed, add_fingers, export_mesh, session_loop
 
-MODULES = [importlib.import_module(f"{__name__}.{module.name}") for module in pkgutil.iter_modules(__path__)]
+MODULES = [
+    importlib.import_module(f"{__name__}.{module.name}")
+    for module in pkgutil.iter_modules(__path__)
+]
 CLASSES: tuple[type, ...] = tuple(
     kind
     for module in MODULES

@@ -37,7 +37,9 @@ def end_in_order(step: Callable[..., Result]) -> Callable[..., Result]:
             words = str(error)
         except Exception as error:
             traceback.print_exc()  # a fault of the extension: the console has what a report of it needs
-            words = localize("Error in the extension: {}: {}", type(error).__name__, one_line(error))
+            words = localize(
+                "Error in the extension: {}: {}", type(error).__name__, one_line(error)
+            )
         if step.__name__ == "modal":
             self.give_up(context, words)
         clear_status()
@@ -215,8 +217,8 @@ def millimeters(name: str, default: float, words: str, **limits: Any) -> Any:
     return number(f"{name} (mm)", words, default=1e3 * default, **limits)
 
 
-#: Text in the status bar by the name of the workspace: Blender keeps it with that, and a modal operator
-#: outlives the one it was started in.
+#: Text in the status bar by the name of the workspace: Blender keeps it with that, and a modal
+#: operator outlives the one it was started in.
 _TOLD: dict[str, str] = {}
 
 

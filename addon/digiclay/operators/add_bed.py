@@ -134,8 +134,12 @@ class AddBed(Placed, Action, Operator):
         items=[(name, title(name), kind.meaning) for name, kind in ARRANGEMENTS.items()],
         default=DEFAULT.arrangement,
     )
-    method: choice("Method", "Control method of the cells", items=method_items(), default=next(iter(METHODS)))
-    preset: choice("Preset", "Fluid, valves and all other parameters of a custom preset", items=offered)
+    method: choice(
+        "Method", "Control method of the cells", items=method_items(), default=next(iter(METHODS))
+    )
+    preset: choice(
+        "Preset", "Fluid, valves and all other parameters of a custom preset", items=offered
+    )
     scale: number(
         "Scale (cm/mm)",
         "Scale of the device: centimeters in Blender per millimeter of the device",
@@ -161,7 +165,10 @@ class AddBed(Placed, Action, Operator):
             if not self.properties.is_property_set(name):  # called by a script
                 setattr(self, name, value)
         layout = Layout(
-            rows=self.rows, columns=self.columns, pitch=to_si(self.pitch, 3), arrangement=self.arrangement
+            rows=self.rows,
+            columns=self.columns,
+            pitch=to_si(self.pitch, 3),
+            arrangement=self.arrangement,
         )
         bed = add(context, make_scene(self.preset, layout, self.method, BEDS[self.bed].share))
         bed.scale = (self.scale,) * 3
@@ -184,7 +191,9 @@ def rebuild_bed(operator: Operator, context: Context) -> None:
 
 def add(context: Context, scene: Scene) -> Object:
     """Add the device of a scene, at rest, in the context's collection; return its bed."""
-    return add_shown(context, scene, Instant.at_rest(scene.layout, scene.actuator, find_ellipsoids(scene)))
+    return add_shown(
+        context, scene, Instant.at_rest(scene.layout, scene.actuator, find_ellipsoids(scene))
+    )
 
 
 def add_shown(context: Context, scene: Scene, instant: Instant) -> Object:
@@ -211,7 +220,9 @@ def rebuild(bed: Object) -> Scene:
     instant = Instant.at_rest(scene.layout, scene.actuator, find_ellipsoids(scene))
     mesh, drawing = bed.data, view.find_modifier(bed)
     bed.data = view.make_cells(instant)
-    if drawing is not None:  # it stays, and with it how the bed is colored; only what it draws is another
+    if (
+        drawing is not None
+    ):  # it stays, and with it how the bed is colored; only what it draws is another
         tree = drawing.node_group
         view.add_modifier(bed, instant)
         _discard(tree)
@@ -230,7 +241,9 @@ def _discard(tree: NodeTree) -> None:
     """Remove the nodes that drew pins, with the pins; a copy of the bed may still be drawn by them."""
     if tree.users:
         return
-    inputs = [getattr(socket, "default_value", None) for node in tree.nodes for socket in node.inputs]
+    inputs = [
+        getattr(socket, "default_value", None) for node in tree.nodes for socket in node.inputs
+    ]
     collections = {thing for thing in inputs if isinstance(thing, bpy.types.Collection)}
     objects = {thing for thing in inputs if isinstance(thing, bpy.types.Object)}
     objects.update(*(collection.objects for collection in collections))
@@ -324,7 +337,10 @@ class OpenScene(AddSceneAction, FileAction, Operator):
         "Sample",
         items=[
             *((f"session:{name}", title(name), "A session") for name in list_samples()),
-            *((f"shape:{name}", title(name), "A shape on a bed of 25 × 25 pins") for name in list_shapes()),
+            *(
+                (f"shape:{name}", title(name), "A shape on a bed of 25 × 25 pins")
+                for name in list_shapes()
+            ),
         ],
     ),
 )

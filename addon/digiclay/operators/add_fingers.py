@@ -18,9 +18,11 @@ from .action import action
 from .add_bed import select_only
 from .poll_messages import cannot_form
 
-#: Distance that new fingertips keep from others, m: the masters of nearer ones would disturb each other.
+#: Distance that new fingertips keep from others, m: the masters of nearer ones would disturb each
+#: other.
 APART = 18e-3
-#: Fingertips of a right hand that lies relaxed, from its palm: x, y, m, thumb first; and where its wrist is.
+#: Fingertips of a right hand that lies relaxed, from its palm: x, y, m, thumb first; and where its
+#: wrist is.
 HAND = ((-30e-3, -6e-3), (-18e-3, 18e-3), (0.0, 24e-3), (18e-3, 19e-3), (30e-3, 4e-3))
 WRIST = (2e-3, -70e-3)
 #: How far beside the bed a place is looked for, m, and the steps.
@@ -58,7 +60,9 @@ def add_hand(operator: Operator, context: Context) -> None:
     palm.location = np.array([x, y, _find_top(bed)]) * bridge.SCALE
     palm.location.z += 2.0 * devices.read_finger(bed.digiclay).height * bridge.SCALE
     context.view_layer.update()
-    tips = _add(bed, np.column_stack([places + np.array([x, y]), np.arctan2(away[:, 1], away[:, 0])]), palm)
+    tips = _add(
+        bed, np.column_stack([places + np.array([x, y]), np.arctan2(away[:, 1], away[:, 0])]), palm
+    )
     select_only(context, palm)
     reveal(context, bed, [tip[BALL] for tip in tips])
 
@@ -96,7 +100,9 @@ def _add(bed: Object, places: Floats, palm: Object | None = None) -> list[Object
         tip = parts.make_fingertip(bed, number, palm)
         devices.give_settings(bed, tip)
         parts.color_fingertip(tip, number, clear=bool(view.read_setting(bed, ARROWS, False)))
-        tip.location = np.array([x, y, top + devices.read_finger(tip.digiclay).height]) * bridge.SCALE
+        tip.location = (
+            np.array([x, y, top + devices.read_finger(tip.digiclay).height]) * bridge.SCALE
+        )
         if palm is not None:
             tip.location -= palm.location
         tip.rotation_quaternion = np.cos(heading / 2.0), 0.0, 0.0, np.sin(heading / 2.0)

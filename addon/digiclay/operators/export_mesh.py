@@ -29,7 +29,8 @@ from .poll_messages import cannot_change, cannot_form, from_rest, no_collection,
 MODEL, FINDING = list_quantities(Model), list_quantities(Finding)
 #: Space between the bed and what is put beside it, in widths of the bed.
 GAP = 0.35
-#: Which place beside its bed a mesh has that was made here, 0: none; what is made next has another one.
+#: Which place beside its bed a mesh has that was made here, 0: none; what is made next has another
+#: one.
 MADE = "digiclay_made"
 
 
@@ -130,7 +131,9 @@ class MakeMesh(SurfaceOptions, Operator):
     bl_options = {"REGISTER", "UNDO"}
     needs = no_surface, no_collection
 
-    beside: flag("Beside the Bed", "Place the mesh beside the bed instead of on its surface", default=True)
+    beside: flag(
+        "Beside the Bed", "Place the mesh beside the bed instead of on its surface", default=True
+    )
 
     def draw(self, context: Context) -> None:
         self.layout.use_property_split = True
@@ -193,16 +196,32 @@ def forget_surface(operator: Operator, context: Context) -> None:
 #: Entries of the menu: words, icon, and the properties they stand for.
 ENTRIES: tuple[tuple[str, str, dict[str, Any]], ...] = (
     ("Solid for printing (.3mf)", "MESH_CUBE", {"kind": "solid", "file_format": "3mf"}),
-    ("Solid, smooth (.stl)", "MESH_ICOSPHERE", {"kind": "solid", "skin": "smooth", "file_format": "stl"}),
+    (
+        "Solid, smooth (.stl)",
+        "MESH_ICOSPHERE",
+        {"kind": "solid", "skin": "smooth", "file_format": "stl"},
+    ),
     ("Pins, stepped (.stl)", "SORTSIZE", {"kind": "pins", "file_format": "stl"}),
-    ("Surface with its features as groups (.obj)", "SURFACE_DATA", {"kind": "surface", "file_format": "obj"}),
-    ("Surface with force and mode (.ply)", "POINTCLOUD_DATA", {"kind": "surface", "file_format": "ply"}),
+    (
+        "Surface with its features as groups (.obj)",
+        "SURFACE_DATA",
+        {"kind": "surface", "file_format": "obj"},
+    ),
+    (
+        "Surface with force and mode (.ply)",
+        "POINTCLOUD_DATA",
+        {"kind": "surface", "file_format": "ply"},
+    ),
     (
         "Bosses and creases, one file each (.stl)",
         "MOD_BOOLEAN",
         {"kind": "features", "file_format": "stl", "separate": True},
     ),
-    ("Solid for the web (.glb)", "WORLD", {"kind": "solid", "skin": "smooth", "file_format": "glb"}),
+    (
+        "Solid for the web (.glb)",
+        "WORLD",
+        {"kind": "solid", "skin": "smooth", "file_format": "glb"},
+    ),
 )
 
 #: Axes under the names of Blender's own exporter.
@@ -220,13 +239,15 @@ class ExportMesh(SurfaceOptions, Operator):
     filepath: bpy.props.StringProperty(subtype="FILE_PATH", options={"SKIP_PRESET"})
     check_existing: bpy.props.BoolProperty(default=True, options={"HIDDEN", "SKIP_PRESET"})
     filter_glob: bpy.props.StringProperty(
-        default=";".join(f"*{find_suffix(kind)}" for kind in FORMATS), options={"HIDDEN", "SKIP_PRESET"}
+        default=";".join(f"*{find_suffix(kind)}" for kind in FORMATS),
+        options={"HIDDEN", "SKIP_PRESET"},
     )
     file_format: choice(
         "Format",
         "Format of the file",
         items=[
-            (name, name.upper().replace("_", " "), sentence(kind.meaning)) for name, kind in FORMATS.items()
+            (name, name.upper().replace("_", " "), sentence(kind.meaning))
+            for name, kind in FORMATS.items()
         ],
         default="stl",
     )
@@ -236,9 +257,15 @@ class ExportMesh(SurfaceOptions, Operator):
         items=[(name, name, f"Lengths in {name}") for name in UNITS],
         default="mm",
     )
-    forward_axis: choice("Forward Axis", "Forward axis of an OBJ", items=AXIS_ITEMS, default="NEGATIVE_Z")
-    up_axis: choice("Up Axis", "Upward axis of an OBJ; slicers expect Z", items=AXIS_ITEMS, default="Y")
-    separate: flag("One File per Feature", "Write each feature into a file of its own", default=False)
+    forward_axis: choice(
+        "Forward Axis", "Forward axis of an OBJ", items=AXIS_ITEMS, default="NEGATIVE_Z"
+    )
+    up_axis: choice(
+        "Up Axis", "Upward axis of an OBJ; slicers expect Z", items=AXIS_ITEMS, default="Y"
+    )
+    separate: flag(
+        "One File per Feature", "Write each feature into a file of its own", default=False
+    )
 
     def invoke(self, context: Context, event: Event) -> Result:
         """Open the file browser, with the name of the bed."""
@@ -307,7 +334,9 @@ class ExportMesh(SurfaceOptions, Operator):
         other = find_suffix(current) if current else ""
         if current == self.file_format:
             return path
-        return path.with_name(path.name[: len(path.name) - len(other)] + find_suffix(self.file_format))
+        return path.with_name(
+            path.name[: len(path.name) - len(other)] + find_suffix(self.file_format)
+        )
 
 
 def _format_of(name: str) -> str:

@@ -20,10 +20,14 @@ def pick_pins(bed: Object, pins: Iterable[int]) -> None:
     """Choose the pins whose heights the overlay shows: at most 6 different ones of the bed."""
     chosen, count = tuple(pins), len(bed.data.vertices)
     if len(chosen) > PICKED or len(set(chosen)) != len(chosen):
-        raise DigiclayError(f"Display.picked must be at most {PICKED} different pins (got {list(chosen)}).")
+        raise DigiclayError(
+            f"Display.picked must be at most {PICKED} different pins (got {list(chosen)})."
+        )
     unknown = [pin for pin in chosen if not 0 <= pin < count]
     if unknown:
-        raise DigiclayError(f"Display.picked must be pins 0 to {count - 1} of {bed.name} (got {unknown[0]}).")
+        raise DigiclayError(
+            f"Display.picked must be pins 0 to {count - 1} of {bed.name} (got {unknown[0]})."
+        )
     bed.digiclay_display.picked = (*chosen, *[view.NO_PIN] * (PICKED - len(chosen)))
     views.redraw()
 
@@ -55,12 +59,15 @@ class PickPins(Modal, Operator):
 
     def _click(self, context: Context, event: Event) -> Result:
         """Pick or drop the pin under the mouse; a click beside the bed is passed to what lies there."""
-        # The view it was started in may be gone by now: another workspace, another editor in its place.
+        # The view it was started in may be gone by now: another workspace, another editor in its
+        # place.
         area, region = _under(context.window.screen, event)
         if region is None:
             return {"PASS_THROUGH"}
         with context.temp_override(area=area, region=region):
-            target = aim.find_target(bpy.context, (event.mouse_x - region.x, event.mouse_y - region.y))
+            target = aim.find_target(
+                bpy.context, (event.mouse_x - region.x, event.mouse_y - region.y)
+            )
         if target is None or target.bed != bed_of(context):
             return {"PASS_THROUGH"}
         present = view.picked_pins(target.bed)

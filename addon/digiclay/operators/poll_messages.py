@@ -1,7 +1,7 @@
 """Reasons for disabled operators: each returns a message, or an empty text.
 
-An operator lists its own as `needs`; Blender shows the message of the first that is not met. Those about a
-bed come after `no_bed`.
+An operator lists its own as `needs`; Blender shows the message of the first that is not met. Those
+about a bed come after `no_bed`.
 """
 
 from __future__ import annotations
@@ -58,7 +58,8 @@ in_object_mode = Need(lambda context: context.mode == "OBJECT", "This is Object 
 no_collection = Need(
     lambda context: (
         not (
-            context.collection == context.scene.collection  # always shown, and unmarked in a new scene
+            context.collection
+            == context.scene.collection  # always shown, and unmarked in a new scene
             or context.view_layer.active_layer_collection.is_visible
         )
     ),
@@ -94,9 +95,12 @@ no_window = Need(
     "A live session needs a window; takes can be baked without",
 )
 no_session = Need(
-    lambda context: not active_session(context), "No session runs on the active bed: start one first"
+    lambda context: not active_session(context),
+    "No session runs on the active bed: start one first",
 )
-no_undriven = Need(lambda context: not running.list_sessions() or context.window is None, "No session runs")
+no_undriven = Need(
+    lambda context: not running.list_sessions() or context.window is None, "No session runs"
+)
 # At any other time the key Esc has other uses.
 driven = Need(lambda context: not loop.is_aside(), "The session uses this key itself")
 no_server = Need(
@@ -112,7 +116,9 @@ no_tool_in_view = Need(
 no_view = Need(lambda context: not _has_view(context), "Pins are picked in a 3D view")
 no_pins = Need(lambda context: not view.picked_pins(bed_of(context)), "No pins are picked")
 no_gesture = Need(
-    lambda context: not (active := active_session(context)) or not (active[1].gestures or active[1].strokes),
+    lambda context: (
+        not (active := active_session(context)) or not (active[1].gestures or active[1].strokes)
+    ),
     "There is no gesture to take back: the fingertip has not touched the bed",
 )
 

@@ -28,7 +28,9 @@ class ApplyPreset(Action, Operator):
     @classmethod
     def description(cls, context: Context, chosen: OperatorProperties) -> str:
         """Return the description of the chosen preset."""
-        return PRESET_WORDS.get(chosen.preset, "A preset of your own: every parameter but the layout")
+        return PRESET_WORDS.get(
+            chosen.preset, "A preset of your own: every parameter but the layout"
+        )
 
     def perform(self, context: Context) -> None:
         """Set the parameters; a session that runs on the bed goes on with them."""
@@ -49,7 +51,9 @@ class SavePreset(Action, Operator):
     bl_label = "Save Digital Clay Preset"
     needs = (no_bed,)
 
-    name: text("Name", "Name of the preset; a preset of that name is replaced", maxlen=own_presets.LONGEST)
+    name: text(
+        "Name", "Name of the preset; a preset of that name is replaced", maxlen=own_presets.LONGEST
+    )
 
     def invoke(self, context: Context, event: Event) -> Result:
         self.name = bed_of(context).digiclay.own_preset

@@ -40,11 +40,13 @@ KEYS = (
 class AdjustMixin(Drawing):
     """Mixin of an operator that changes one number by the mouse or the keyboard.
 
-    A subclass reads, writes, parses and names its number, in SI, of a bed or of the settings of the tool.
+    A subclass reads, writes, parses and names its number, in SI, of a bed or of the settings of the
+    tool.
     """
 
     needs = no_tool_in_view, no_finger
-    #: Range of the number, the steps it takes with Ctrl held down, and its change a pixel at a UI scale of 1.
+    #: Range of the number, the steps it takes with Ctrl held down, and its change a pixel at a UI
+    #: scale of 1.
     low: float
     high: float
     snap: float
@@ -54,7 +56,8 @@ class AdjustMixin(Drawing):
     factor: float
     #: Returns the number with its name and unit.
     describe: Callable[[float], str]
-    #: Returns outlines (k, 2), m, about the place pointed at, by fingertip, its turn (wxyz), depth, value.
+    #: Returns outlines (k, 2), m, about the place pointed at, by fingertip, its turn (wxyz), depth,
+    #: value.
     outlines: Callable[[Fingertip, Any, float, float], list[Any]]
 
     def read(self, bed: Object, settings: OperatorProperties) -> float:
@@ -143,7 +146,9 @@ class AdjustMixin(Drawing):
         settings = brush.tool_settings(context)
         depth = 1e-3 * settings.depth if settings else DEEPEST
         rims = self.outlines(bridge.finger_of(tip), bridge.pose(tip)[3:], depth, self._shown())
-        places = [tool.close(np.column_stack([rim, np.zeros(len(rim))]) + self.center) for rim in rims]
+        places = [
+            tool.close(np.column_stack([rim, np.zeros(len(rim))]) + self.center) for rim in rims
+        ]
         middle = bridge.project(context, bed, self.center[None])[0]
         tool.draw_on_bed(context, bed, places, self.words, (middle[0], middle[1]))
 
@@ -188,7 +193,10 @@ class AdjustSize(AdjustMixin, Operator):
         """Return the widest section of the fingertip, and what of it touches."""
         share = value / (2.0 * finger.width)
         scaled = Fingertip(finger.length * share, finger.width * share, finger.height * share)
-        return [find_contact_outline(scaled, turn, np.inf), find_contact_outline(scaled, turn, depth)]
+        return [
+            find_contact_outline(scaled, turn, np.inf),
+            find_contact_outline(scaled, turn, depth),
+        ]
 
 
 class AdjustDepth(AdjustMixin, Operator):
@@ -231,7 +239,10 @@ class AdjustStrength(AdjustMixin, Operator):
 
     def outlines(self, finger: Fingertip, turn: Floats, depth: float, value: float) -> list[Any]:
         """Return what of the fingertip touches at the whole depth, and at the share of it."""
-        return [find_contact_outline(finger, turn, depth), find_contact_outline(finger, turn, depth * value)]
+        return [
+            find_contact_outline(finger, turn, depth),
+            find_contact_outline(finger, turn, depth * value),
+        ]
 
 
 @action(
@@ -243,7 +254,9 @@ class AdjustStrength(AdjustMixin, Operator):
 def scale_size(operator: Operator, context: Context) -> None:
     """Scale the fingertip; its blister follows"""
     bed: Object = brush.bed_in_use(context)
-    devices.set_size(devices.find_first(bed), devices.read_size(devices.find_first(bed)) * operator.scalar)
+    devices.set_size(
+        devices.find_first(bed), devices.read_size(devices.find_first(bed)) * operator.scalar
+    )
 
 
 class TakeFinger(Action, Operator):
@@ -266,7 +279,9 @@ class TakeFinger(Action, Operator):
         kind = FINGERS[chosen.kind]
         axes = (kind.finger.length, kind.finger.width, kind.finger.height)
         measures = " × ".join(f"{2e3 * axis:g}" for axis in axes)
-        return localize("{} mm: {}. The blister follows, the contact law stays", measures, kind.source)
+        return localize(
+            "{} mm: {}. The blister follows, the contact law stays", measures, kind.source
+        )
 
     def perform(self, context: Context) -> None:
         bed: Object = brush.bed_in_use(context)

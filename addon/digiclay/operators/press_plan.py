@@ -42,7 +42,11 @@ class PlaceCenter(Drawing, Operator):
             with context.temp_override(region=self.region):
                 target = find_pressed(self, bpy.context, xy)
             if target is not None:
-                self.uid, self.grid, self.height = target.bed.session_uid, target.grid, target.height.copy()
+                self.uid, self.grid, self.height = (
+                    target.bed.session_uid,
+                    target.grid,
+                    target.height.copy(),
+                )
                 self.center = float(target.point[0]), float(target.point[1])
                 brush.put_center(settings, *self.center)
         elif event.type in ("MOUSEMOVE", "LEFTMOUSE") and self.uid:
@@ -50,7 +54,9 @@ class PlaceCenter(Drawing, Operator):
             with context.temp_override(region=self.region):
                 point = bed and aim.hit_point(bpy.context, bed, self.grid, self.height, xy)
             if point is not None:
-                brush.turn_axis(settings, float(point[0]) - self.center[0], float(point[1]) - self.center[1])
+                brush.turn_axis(
+                    settings, float(point[0]) - self.center[0], float(point[1]) - self.center[1]
+                )
             if event.type == "LEFTMOUSE":
                 return self.end(context, "FINISHED")
         else:
@@ -63,7 +69,9 @@ class PlaceCenter(Drawing, Operator):
         context = bpy.context
         bed, settings = brush.bed_in_use(context), brush.tool_settings(context)
         if bed is not None and settings is not None and context.area == area:
-            tool.draw_on_bed(context, bed, tool.find_axes(*aim.read_surface(bed), settings), "", (0.0, 0.0))
+            tool.draw_on_bed(
+                context, bed, tool.find_axes(*aim.read_surface(bed), settings), "", (0.0, 0.0)
+            )
 
 
 class NoteKeys(Polled, Operator):
@@ -92,7 +100,9 @@ def _tell_all(operator: Operator, context: Context, kind: Brush) -> Result | Non
     return None
 
 
-@action("digiclay.press_locks_invert", "Invert Locks", no_tool_in_view, no_finger, options=("UNDO",))
+@action(
+    "digiclay.press_locks_invert", "Invert Locks", no_tool_in_view, no_finger, options=("UNDO",)
+)
 def invert_locks(operator: Operator, context: Context) -> Result | None:
     """Lock the pins that are not locked, and unlock those that are"""
     return _tell_all(operator, context, Brush.INVERT_LOCKS)

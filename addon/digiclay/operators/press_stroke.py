@@ -46,7 +46,9 @@ WHEELS = {"WHEELUPMOUSE": WHEEL, "WHEELDOWNMOUSE": -WHEEL}
 KEYS = "{}  |  Ctrl and wheel: depth or height  |  Esc or right click: take the stroke back"
 KEYS_PLAIN = "{}  |  Esc or right click: take the stroke back"
 #: Reports where a brush cannot work.
-NO_BLISTER = "{} needs a blister, which the method {} lacks: choose Virtual master or Cell states (Control)"
+NO_BLISTER = (
+    "{} needs a blister, which the method {} lacks: choose Virtual master or Cell states (Control)"
+)
 HIDDEN = "{} hides the bed here: press beside it, look from elsewhere, or hide it (H)"
 RECOVERS = "These pins will not stay: the method {} moves all pins back"
 #: Result of a press on something else: Blender shows no reports of an operator that only passes.
@@ -125,7 +127,9 @@ class PressSettings:
         step=50,
     )
     use_pressure: flag(
-        "Pen Pressure", "Pen pressure scales depth, height and strength, up to their values", default=True
+        "Pen Pressure",
+        "Pen pressure scales depth, height and strength, up to their values",
+        default=True,
     )
     pressure_curve: choice(
         "Pressure Curve",
@@ -160,7 +164,8 @@ class Press(PressSettings, Modal, Operator):
         session = open_session(self, context, target.bed, self.kind)
         if session is None:
             return {"CANCELLED"}
-        # The hand draws on the surface it has seen when it began, not on pins that give way under it.
+        # The hand draws on the surface it has seen when it began, not on pins that give way under
+        # it.
         self.uid, self.grid, self.surface = session.uid, target.grid, target.height.copy()
         self.full = 1e-3 * getattr(self, brush.amount_name(self.kind))
         self.pressure, self.lean = 1.0, (0.0, 0.0)
@@ -169,7 +174,9 @@ class Press(PressSettings, Modal, Operator):
         self.lagged = place = float(target.point[0]), float(target.point[1])
         depth, share = self._amount()
         images = brush.find_images(self)
-        stroke = start(0, *place, depth, images, self.kind, share, self.lean, accumulate=self.accumulate)
+        stroke = start(
+            0, *place, depth, images, self.kind, share, self.lean, accumulate=self.accumulate
+        )
         session, self.number = queue_stroke(session, stroke)
         running.put(session)
         self._show(context)
@@ -185,7 +192,9 @@ class Press(PressSettings, Modal, Operator):
         stroke = session and find_stroke(session, self.number)
         if session is None or stroke is None:
             if bed is None or session is None:
-                inform(self, "The press stroke ended: its session or bed was removed", level="WARNING")
+                inform(
+                    self, "The press stroke ended: its session or bed was removed", level="WARNING"
+                )
             return self._end({"CANCELLED", "PASS_THROUGH"})
         pressed = event.value == "PRESS"
         if pressed and (event.type in ("ESC", "RIGHTMOUSE") or _is_undo_key(context, event)):
@@ -201,7 +210,8 @@ class Press(PressSettings, Modal, Operator):
         elif event.type == "LEFTMOUSE":
             self._move(context, bed, event)
             self._change(let_go)
-            # A press while it is down: another operator has had the release. That one is another stroke.
+            # A press while it is down: another operator has had the release. That one is another
+            # stroke.
             again = {"PASS_THROUGH"} if event.value == "PRESS" else set()
             return self._end({"FINISHED"} | again)
         else:
@@ -278,7 +288,10 @@ def _is_undo_key(context: Context, event: Event) -> bool:
         item.idname == "ed.undo"
         and item.active
         and item.type == event.type
-        and all(bool(getattr(item, key)) == getattr(event, key) for key in ("ctrl", "shift", "alt", "oskey"))
+        and all(
+            bool(getattr(item, key)) == getattr(event, key)
+            for key in ("ctrl", "shift", "alt", "oskey")
+        )
         for item in (keymap.keymap_items if keymap else ())
     )
 
@@ -291,7 +304,9 @@ def find_pressed(operator: Operator, context: Context, xy: Place) -> aim.Target 
     return target if hider is None else None
 
 
-def open_session(operator: Operator, context: Context, bed: Object, kind: Brush) -> running.Running | None:
+def open_session(
+    operator: Operator, context: Context, bed: Object, kind: Brush
+) -> running.Running | None:
     """Return the session of a bed for a stroke, started if there is none; or report why it cannot be."""
     try:
         if running.find(bed) is None:
@@ -303,7 +318,9 @@ def open_session(operator: Operator, context: Context, bed: Object, kind: Brush)
             session = tick.take_up(context, bed, session)
             tick.show(bed, session)
         if session is None:
-            raise DigiclayError(f"The session of {bed.name} could not be started; its panel says why.")
+            raise DigiclayError(
+                f"The session of {bed.name} could not be started; its panel says why."
+            )
     except (DigiclayError, RuntimeError) as error:
         operator.report({"ERROR"}, str(error).removeprefix("Error: ").strip())
         return None
@@ -311,7 +328,11 @@ def open_session(operator: Operator, context: Context, bed: Object, kind: Brush)
         names = brush.LABELS[kind], title(session.scene.method)
         inform(operator, NO_BLISTER, *map(localize, names), level="ERROR")
         return None
-    if kind in (Brush.SMOOTH, *STAMPS) and session.scene.control and METHODS[session.scene.method].recovers:
+    if (
+        kind in (Brush.SMOOTH, *STAMPS)
+        and session.scene.control
+        and METHODS[session.scene.method].recovers
+    ):
         inform(operator, RECOVERS, localize(title(session.scene.method)), level="WARNING")
     if session.paused:
         words = localize("The session is paused: the fingertip follows after it resumes")

@@ -1,7 +1,8 @@
 """Live sessions: their modal operator, with ticks, Esc and Blender's auto save, and the actions on them.
 
-Blender postpones its automatic saving for as long as any modal operator runs, so a session of an hour
-would be lost in a crash. The operator therefore ends for a moment every so often, and is started anew.
+Blender postpones its automatic saving for as long as any modal operator runs, so a session of an
+hour would be lost in a crash. The operator therefore ends for a moment every so often, and is
+started anew.
 """
 
 import time
@@ -71,7 +72,11 @@ class LoopMixin(Ticking):
         """Tick with the timer; pass every other event on."""
         if self.token != loop.token():
             return {"CANCELLED"}
-        if event.type == "ESC" and event.value == "PRESS" and not self.newer & _other_operators(context):
+        if (
+            event.type == "ESC"
+            and event.value == "PRESS"
+            and not self.newer & _other_operators(context)
+        ):
             return {"FINISHED"} if _stop(self, context) else {"RUNNING_MODAL"}
         now = time.perf_counter()
         if event.type != "TIMER" or not loop.is_due(context, now):
@@ -167,7 +172,9 @@ class FinishStrokes(Ticking, Modal, Operator):
         return set(result)
 
 
-@action("digiclay.session_escape", "Stop Sessions", poll.driven, options=("INTERNAL",), in_any_mode=True)
+@action(
+    "digiclay.session_escape", "Stop Sessions", poll.driven, options=("INTERNAL",), in_any_mode=True
+)
 def escape(operator: Operator, context: Context) -> None:
     """Stop the sessions while none of their operators receives the key"""
     _stop(operator, context)
@@ -224,7 +231,9 @@ def leave_mode(context: Context) -> None:
         bpy.ops.object.mode_set(mode="OBJECT")
 
 
-@action("digiclay.leave_mode", "Back to Object Mode", poll.no_bed, poll.in_object_mode, in_any_mode=True)
+@action(
+    "digiclay.leave_mode", "Back to Object Mode", poll.no_bed, poll.in_object_mode, in_any_mode=True
+)
 def to_object_mode(operator: Operator, context: Context) -> None:
     """Leave this mode for Object Mode, in which beds are sculpted, with the Press tool in hand"""
     leave_mode(context)
@@ -258,7 +267,9 @@ class Session(LoopMixin, Action, Operator):
         bed = bed_of(context)
         leave_mode(context)
         notes = tick.start(context, bed)
-        notes = notes or [tick.Note("INFO", localize("The session of {} runs: Esc stops it", bed.name))]
+        notes = notes or [
+            tick.Note("INFO", localize("The session of {} runs: Esc stops it", bed.name))
+        ]
         self.tell([note._replace(uid=bed.session_uid) for note in notes])
         handlers.watch()
         views.follow()
@@ -298,14 +309,20 @@ def step_session(operator: Operator, context: Context) -> None:
     loop.redraw_status()
 
 
-@action("digiclay.session_stop", "Stop Session", poll.no_session, options=("UNDO",), in_any_mode=True)
+@action(
+    "digiclay.session_stop", "Stop Session", poll.no_session, options=("UNDO",), in_any_mode=True
+)
 def stop_session(operator: Operator, context: Context) -> None:
     """Stop the session of the bed; the bed keeps its state, from which another session continues"""
     handlers.end(handlers.STOPPED, _session(context)[1])
 
 
 @action(
-    "digiclay.session_rewind", "Take Back a Gesture", poll.session_waits, poll.no_gesture, options=("UNDO",)
+    "digiclay.session_rewind",
+    "Take Back a Gesture",
+    poll.session_waits,
+    poll.no_gesture,
+    options=("UNDO",),
 )
 def rewind_session(operator: Operator, context: Context) -> None:
     """Undo the last gesture: bed and fingertip return to its start"""
@@ -313,7 +330,9 @@ def rewind_session(operator: Operator, context: Context) -> None:
     back = sculpting.rewind(session)
     if session.recording is not None and back.recording is None:
         words = takes.keep_recording(bed, session)
-        operator.report({"INFO"}, words or localize("The recording ended: the gesture began before it"))
+        operator.report(
+            {"INFO"}, words or localize("The recording ended: the gesture began before it")
+        )
     tick.bring_back(context, bed, back)
 
 
@@ -364,7 +383,9 @@ class FollowServer(Action, Operator):
     in_any_mode = True
     needs = (poll.no_session,)
 
-    address: text("Address", "Address and port that the server prints for OSC", default="127.0.0.1:8766")
+    address: text(
+        "Address", "Address and port that the server prints for OSC", default="127.0.0.1:8766"
+    )
     token: text("Token", "Token that the server prints; no file keeps it", subtype="PASSWORD")
 
     def invoke(self, context: Context, event: Event) -> Result:

@@ -24,7 +24,11 @@ FITS = (
     ("cover", "Fill the Bed", "As small as still fills the bed; what extends beyond it is cut off"),
     ("stretch", "Stretch", "Exactly as large as the bed, whatever its proportions"),
     ("actual", "Own Size", "At its own size, in the middle of the bed"),
-    ("placed", "Where It Is", "At its own size and place; what is beyond floor or stroke is cut off"),
+    (
+        "placed",
+        "Where It Is",
+        "At its own size and place; what is beyond floor or stroke is cut off",
+    ),
 )
 RELIEFS = (
     ("rise", "Given Rise", "The given rise from its lowest to its highest point"),
@@ -51,9 +55,14 @@ class Shaped(Action):
     y: millimeters("Back", DEFAULT.y, "Shift of its middle from the bed's along y", **LENGTH)
     relief: choice("Height", "Height of the shape", items=RELIEFS, default=DEFAULT.relief)
     rise: millimeters(
-        "Rise", DEFAULT.rise, "From its lowest to its highest point; a negative value inverts it", **LENGTH
+        "Rise",
+        DEFAULT.rise,
+        "From its lowest to its highest point; a negative value inverts it",
+        **LENGTH,
     )
-    foot: millimeters("Foot", DEFAULT.foot, "Where its lowest point lies above the bed at rest", **LENGTH)
+    foot: millimeters(
+        "Foot", DEFAULT.foot, "Where its lowest point lies above the bed at rest", **LENGTH
+    )
 
     def tell(self, bed: Object, laid: Any, off: float) -> None:
         """Report what `shape_show` has displayed, and its parts beyond the bed."""
@@ -85,7 +94,11 @@ def _updated_bed(context: Context) -> Object:
 
 def _others(context: Context, bed: Object) -> list[Object]:
     """Return the selected objects with a surface that are no part of a bed."""
-    return [thing for thing in context.selected_objects if thing != bed and shape_show.has_surface(thing)]
+    return [
+        thing
+        for thing in context.selected_objects
+        if thing != bed and shape_show.has_surface(thing)
+    ]
 
 
 def _not_two(context: Context) -> str:
@@ -93,7 +106,11 @@ def _not_two(context: Context) -> str:
     count = len(_others(context, bed_of(context)))
     if count > 1:
         return localize("Select one object besides the bed, not {}", count)
-    return "" if count else "Select the object first, then the bed with Shift: its upper side is displayed"
+    return (
+        ""
+        if count
+        else "Select the object first, then the bed with Shift: its upper side is displayed"
+    )
 
 
 @action("digiclay.shape_from_object", "Shape from Object", *NEEDS, _not_two, bases=(Shaped,))
@@ -154,7 +171,14 @@ def keep_shape(operator: Operator, context: Context) -> None:
     operator.report({"INFO"}, words)
 
 
-@action("digiclay.shape_remove", "Remove Shape", cannot_change, session_runs, no_shape, options=("UNDO",))
+@action(
+    "digiclay.shape_remove",
+    "Remove Shape",
+    cannot_change,
+    session_runs,
+    no_shape,
+    options=("UNDO",),
+)
 def remove_shape(operator: Operator, context: Context) -> None:
     """Remove the bed's shape: sessions begin at rest; the formed surface stays until then"""
     settings = bed_of(context).digiclay

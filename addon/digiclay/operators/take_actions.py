@@ -106,7 +106,9 @@ class ExportTake(FileAction, Operator):
         numbers = takes.list_fingers(bed_of(context), entry.number, len(take.scene.fingers))
         if len(numbers) > 1 and numbers[-1] > len(numbers):  # a scene file counts its own from 1 on
             numbering = ", ".join(f"{row} = {number}" for row, number in enumerate(numbers, 1))
-            scene = replace(scene, description="Numbers of the fingers here = on the bed: " + numbering)
+            scene = replace(
+                scene, description="Numbers of the fingers here = on the bed: " + numbering
+            )
         write_whole(file, format_scene(scene).encode())
         inform(self, "{} written to {}", entry.name, file)
 
@@ -266,7 +268,9 @@ class ReplayTake(TimedAction, Operator):
         recorded = snapshot.load(self._system, self._take.end)
         away = 1e6 * float(np.abs(self._state.row(0) - recorded.row(0)).max())
         if self.parts == 1:
-            words = localize("Replayed {}: it ends {:.3g} µm away, as another version can", seconds, away)
+            words = localize(
+                "Replayed {}: it ends {:.3g} µm away, as another version can", seconds, away
+            )
             self.report({"WARNING"}, words)
         else:
             words = localize("steps {} times finer end {:.3g} µm away", self.parts, away)
@@ -353,7 +357,9 @@ class Bake(TimedAction, Operator):
             self.cancel(context)
             return {"FINISHED"}
         context.window_manager.progress_update(100.0 * share)
-        show_status(context, localize("{}: {:.0f} %     Esc: stop", localize(self.bl_label), 100.0 * share))
+        show_status(
+            context, localize("{}: {:.0f} %     Esc: stop", localize(self.bl_label), 100.0 * share)
+        )
         return {"RUNNING_MODAL"}
 
     def cancel(self, context: Context) -> None:

@@ -72,7 +72,9 @@ def _dot(dot: Dot) -> None:
     _fill(rim, [(0, i, i + 1) for i in range(1, CORNERS - 1)], dot.color, 1.0)
 
 
-def _fill(points: Floats, triangles: list[tuple[int, int, int]], color: Color, alpha: float) -> None:
+def _fill(
+    points: Floats, triangles: list[tuple[int, int, int]], color: Color, alpha: float
+) -> None:
     """Fill a convex shape."""
     shader: Any = gpu.shader.from_builtin("UNIFORM_COLOR")
     batch = batch_for_shader(shader, "TRIS", {"pos": points.astype(np.float32)}, indices=triangles)

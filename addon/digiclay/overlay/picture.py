@@ -23,7 +23,8 @@ CURVES: tuple[Color, ...] = (
 )
 #: How often discs that overlap are moved apart at most: a hand takes some ten.
 ROUNDS = 40
-#: Contrast that the Web Content Accessibility Guidelines ask of letters, if possible, at least, and of lines.
+#: Contrast that the Web Content Accessibility Guidelines ask of letters, if possible, at least, and
+#: of lines.
 INK, LETTERS, LINES = 7.0, 4.5, 3.0
 BLACK, WHITE = (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)
 

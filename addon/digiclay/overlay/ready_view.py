@@ -15,14 +15,22 @@ from .views import find_free_room, find_taken
 SIDEBAR = 280.0
 #: Space about a bed, of the room it has.
 SPACE = 0.04
-#: Distances tried, in nearest ones, until a bed is whole from above too: within as much of the view.
+#: Distances tried, in nearest ones, until a bed is whole from above too: within as much of the
+#: view.
 FARTHER, ABOVE = (1.0, 1.05, 1.1, 1.15, 1.2, 1.25), 0.95
-#: Least square of the level part of a view's direction that is divided by: from above there is none.
+#: Least square of the level part of a view's direction that is divided by: from above there is
+#: none.
 LEVEL = 0.01
-#: Shading of a 3D view nobody has changed; and what differs where a relief is to be seen: a matcap, as in
-#: Blender's Sculpting workspace, but lit from one side; edges are brightened, and valleys darkened.
+#: Shading of a 3D view nobody has changed; and what differs where a relief is to be seen: a matcap,
+#: as in Blender's Sculpting workspace, but lit from one side; edges are brightened, and valleys
+#: darkened.
 FACTORY = {"type": "SOLID", "light": "STUDIO", "color_type": "MATERIAL", "show_cavity": False}
-RELIEF = {"light": "MATCAP", "studio_light": "basic_side.exr", "show_cavity": True, "cavity_type": "SCREEN"}
+RELIEF = {
+    "light": "MATCAP",
+    "studio_light": "basic_side.exr",
+    "show_cavity": True,
+    "cavity_type": "SCREEN",
+}
 #: Marks screens whose views were lit once: what the user does then remains.
 LIT = "digiclay_lit"
 
@@ -38,7 +46,12 @@ def find_view(context: Context) -> tuple[Area, Region] | None:
 def light(context: Context) -> None:
     """Light the 3D view in use for reliefs, once a screen, unless its shading was changed."""
     shown, screen = find_view(context), context.screen
-    if shown is None or screen is None or not preferences.get(context).light_relief or screen.get(LIT):
+    if (
+        shown is None
+        or screen is None
+        or not preferences.get(context).light_relief
+        or screen.get(LIT)
+    ):
         return
     shading = shown[0].spaces.active.shading
     lit = any(each.name == RELIEF["studio_light"] for each in context.preferences.studio_lights)
@@ -59,7 +72,10 @@ def frame(context: Context, bed: Object) -> None:
         looking.view_perspective = "PERSP"
         looking.update()
     context.view_layer.update()
-    axes, parallel = np.array(looking.view_rotation.to_matrix()), looking.view_perspective == "ORTHO"
+    axes, parallel = (
+        np.array(looking.view_rotation.to_matrix()),
+        looking.view_perspective == "ORTHO",
+    )
     lens = np.diag(np.array(looking.window_matrix))[:2]
     balls = [(tip[BALL], tip[BALL]) for tip in fingertips_of(bed).values() if tip.get(BALL)]
     corners = _list_corners([(view.housing_of(bed), bed), (bed, bed), *balls])
@@ -72,7 +88,8 @@ def frame(context: Context, bed: Object) -> None:
         eye = find_eye((corners - middle) @ axes, lens, free, taken, parallel, farther)
         if eye is None:
             return
-        # The view turns about a place over or under the middle, so that it shows the bed from above as well.
+        # The view turns about a place over or under the middle, so that it shows the bed from above
+        # as well.
         aside = axes[:, :2] @ eye[:2]
         depth = -float(aside[:2] @ back[:2]) / max(float(back[:2] @ back[:2]), LEVEL)
         looking.view_location = middle + aside + depth * back
@@ -91,14 +108,18 @@ def reveal(context: Context, bed: Object, things: Iterable[Object]) -> None:
     context.view_layer.update()
     (free, taken), region = _find_room(context, bed, *shown), shown[1]
     points = np.concatenate([_place(_list_points(thing), thing) for thing in things])
-    clip = np.column_stack([points, np.ones(len(points))]) @ np.array(region.data.perspective_matrix).T
+    clip = (
+        np.column_stack([points, np.ones(len(points))]) @ np.array(region.data.perspective_matrix).T
+    )
     places = 0.5 * (clip[:, :2] / clip[:, 3:] + 1.0) * [region.width, region.height]
     seen = (clip[:, 3] > 0.0) & ((places >= free[0]) & (places <= free[1])).all(axis=1)
     if not (seen & ~((places > taken[0]) & (places < taken[1])).all(axis=1)).all():
         frame(context, bed)
 
 
-def _find_room(context: Context, bed: Object, area: Area, region: Region, sidebar: float = 0.0) -> Floats:
+def _find_room(
+    context: Context, bed: Object, area: Area, region: Region, sidebar: float = 0.0
+) -> Floats:
     """Return the free part of a view and the overlay's box in it, (2, 2, 2), pixels, beside a `sidebar`."""
     room = find_free_room(area, region, {"UI": sidebar * context.preferences.system.ui_scale})
     return np.reshape([room, find_taken(context, bed, room)], (2, 2, 2))
@@ -109,10 +130,10 @@ def find_eye(
 ) -> Floats | None:
     """Return the nearest eye (3,) that sees all between points (k, 3) in a room, nothing in a box; or None.
 
-    Axes are those of the view: right, up, to the eye; the origin is amidst the points. `lens` (2,): size in
-    the view of a length of 1 at a distance of 1. `room`, and `box` in a corner of it: lower and upper corners
-    (2, 2), -1 to 1. Seen in parallel the third number is the distance that scales the view. `farther`: times
-    the nearest.
+    Axes are those of the view: right, up, to the eye; the origin is amidst the points. `lens` (2,):
+    size in the view of a length of 1 at a distance of 1. `room`, and `box` in a corner of it: lower
+    and upper corners (2, 2), -1 to 1. Seen in parallel the third number is the distance that scales
+    the view. `farther`: times the nearest.
     """
     cuts, along = np.linspace(0.0, 1.0, 6), np.linspace(0.0, 1.0, 12)[:, None, None, None]
     lines = (points + along * (points[:, None] - points)).reshape(-1, 3)
@@ -123,17 +144,22 @@ def find_eye(
             part[end, axis] += cut * (box[1 - end, axis] - room[end, axis])
             if (part[0] < part[1]).all():
                 eye = place_eye(points, lens, part, parallel, farther)
-                seen = lens * (lines[:, :2] - eye[:2]) / (eye[2] - (0.0 if parallel else lines[:, 2:]))
+                seen = (
+                    lens * (lines[:, :2] - eye[:2]) / (eye[2] - (0.0 if parallel else lines[:, 2:]))
+                )
                 if not ((box[0] < seen) & (seen < box[1])).all(axis=1).any():
                     eyes.append(eye)
     return min(eyes, key=lambda eye: round(float(eye[2]), 6)) if eyes else None
 
 
-def place_eye(points: Floats, lens: Floats, room: Floats, parallel: bool, farther: float = 1.0) -> Floats:
+def place_eye(
+    points: Floats, lens: Floats, room: Floats, parallel: bool, farther: float = 1.0
+) -> Floats:
     """Return the nearest eye (3,) that sees points (k, 3) in a room, in the middle if it can: `find_eye`."""
     low, high = room + SPACE * (room[1] - room[0]) * [[1.0], [-1.0]]
     depth = 0.0 * points[:, 2:] if parallel else points[:, 2:]
-    # The eye at z sees a point at x right of `low`: lens (x - eye) >= low (z - depth); and so left of `high`.
+    # The eye at z sees a point at x right of `low`: lens (x - eye) >= low (z - depth); and so left
+    # of `high`.
     most = (points[:, :2] + low * depth / lens).min(axis=0)
     least = (points[:, :2] + high * depth / lens).max(axis=0)
     z = farther * float(((least - most) * lens / (high - low)).max())
@@ -146,7 +172,9 @@ def _list_corners(things: list[tuple[Object, Matrix]]) -> Floats:
     boxes = []
     for shape, placed in things:
         points = _list_points(shape)
-        corners = np.stack(np.meshgrid(*zip(points.min(axis=0), points.max(axis=0), strict=True)), axis=-1)
+        corners = np.stack(
+            np.meshgrid(*zip(points.min(axis=0), points.max(axis=0), strict=True)), axis=-1
+        )
         boxes.append(_place(corners.reshape(-1, 3), placed))
     return np.concatenate(boxes)
 

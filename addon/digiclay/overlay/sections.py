@@ -12,7 +12,19 @@ from ..core.base.modes import Mode
 from ..core.model.touch import MOST_FORCE, MOST_INDENTATION
 from ..device import heat
 from ..ui_text import localize
-from .picture import LINES, Box, Color, Dot, Line, Look, Picture, Words, make_legible, round_axis, scale_curve
+from .picture import (
+    LINES,
+    Box,
+    Color,
+    Dot,
+    Line,
+    Look,
+    Picture,
+    Words,
+    make_legible,
+    round_axis,
+    scale_curve,
+)
 
 #: Sizes at a UI scale of 1, pixels: letters, small letters, a row of letters, the curves of a plot.
 LETTERS, SMALL, ROW, PLOT = 12.0, 10.0, 17.0, 58.0
@@ -22,7 +34,8 @@ LETTER = 0.57
 GAP = 6.0
 #: Width of the number and force of a fingertip, and of the numbers of an axis.
 FINGER, LABEL = 85.0, 40.0
-#: Set points that the axis of the force shows at most: a hard knock is drawn up to its end, and no further.
+#: Set points that the axis of the force shows at most: a hard knock is drawn up to its end, and no
+#: further.
 MOST = 5.0
 #: Shortest axes, N and mm: a quiet force is not drawn as a wild one.
 LEAST_FORCE, LEAST_SPAN = 0.1, 1.0
@@ -39,7 +52,8 @@ class Readings:
     waiting: bool
     #: Simulated over real time of the last second; None before there is one.
     factor: float | None
-    #: Estimated errors of the heights, m, and of a cell's force, N; None before there is an estimate.
+    #: Estimated errors of the heights, m, and of a cell's force, N; None before there is an
+    #: estimate.
     errors: tuple[float, float] | None
     #: Total force asked for now, N.
     set_point: float | None
@@ -114,7 +128,9 @@ class Pen:
         self.row("", localize("last {:g} s", self.readings.seconds), small=True)
         return box
 
-    def level(self, box: Box, y: float, color: Color, width: float, *, dashed: bool = False) -> None:
+    def level(
+        self, box: Box, y: float, color: Color, width: float, *, dashed: bool = False
+    ) -> None:
         """Draw a level line across the box of a plot; one that is dashed leaves the axis legible."""
         start = box.x + (LABEL * self.scale if dashed else 0.0)
         line = np.array([[start, y], [box.x + box.width, y]])
@@ -144,7 +160,9 @@ def error_message(errors: Sequence[float] | None) -> str:
     """Return the text of the estimated errors of a height, m, and of a cell's force, N."""
     if errors is None:
         return localize("Solver error: not estimated yet")
-    return localize("Solver error: about {}, {}", _size(errors[0] * 1e6, "µm"), _size(errors[1] * 1e3, "mN"))
+    return localize(
+        "Solver error: about {}, {}", _size(errors[0] * 1e6, "µm"), _size(errors[1] * 1e3, "mN")
+    )
 
 
 def effort_message(effort: tuple[float, ...]) -> str:
@@ -160,7 +178,11 @@ def force_message(force: float, *, beyond: bool = False, hardest: float | None =
         return localize("{:.3g} N: no finger", force)
     if (force if hardest is None else hardest) > MOST_FORCE:
         return localize("{:.1f} N: beyond {:g} N", force, MOST_FORCE)
-    return localize("{:.2f} N: beyond {:g} mm", force, MOST_INDENTATION * 1e3) if beyond else f"{force:.2f} N"
+    return (
+        localize("{:.2f} N: beyond {:g} mm", force, MOST_INDENTATION * 1e3)
+        if beyond
+        else f"{force:.2f} N"
+    )
 
 
 def describe_state(readings: Readings) -> str:
@@ -186,7 +208,9 @@ def _draw_force(pen: Pen) -> None:
     asked = "" if readings.set_point is None else localize(words, readings.set_point)
     pen.row(localize("Total force  {}", _tell_force(readings)), asked)
     # A sum would flatten the force of each.
-    curves = list(zip(readings.finger_force.T, (color for _, color in readings.fingers), strict=False))
+    curves = list(
+        zip(readings.finger_force.T, (color for _, color in readings.fingers), strict=False)
+    )
     curves = curves or [(readings.force, pen.look.force)]
     recent, asked_for = readings.time >= readings.window[0], readings.set_point or 0.0
     largest = max(float(curve[recent].max(initial=0.0)) for curve, _ in curves)
@@ -216,7 +240,9 @@ def _tell_force(readings: Readings) -> str:
     """Return the text of the total force now; empty before there is one."""
     if not readings.force.size:
         return ""
-    return force_message(float(readings.force[-1]), beyond=readings.beyond, hardest=readings.hardest)
+    return force_message(
+        float(readings.force[-1]), beyond=readings.beyond, hardest=readings.hardest
+    )
 
 
 def _draw_heights(pen: Pen) -> None:
@@ -320,10 +346,13 @@ def find_room(width: float, height: float, covered: list[tuple[str, float]]) -> 
     return deep["LEFT"], deep["BOTTOM"], width - deep["RIGHT"], height - deep["TOP"]
 
 
-def find_covered(room: Room, scale: float, corner: str, box: Box | None = None, fingers: int = 0) -> Room:
+def find_covered(
+    room: Room, scale: float, corner: str, box: Box | None = None, fingers: int = 0
+) -> Room:
     """Return left, bottom, right and top of what the overlay takes of a corner of a room, pixels.
 
-    `box`: that of the overlay; None: of a compact one that tells the forces of so many fingers, two in a row.
+    `box`: that of the overlay; None: of a compact one that tells the forces of so many fingers, two
+    in a row.
     """
     left, bottom, right, top = room
     wide, tall = COMPACT.width * scale, (2 * PADDING + ROW * (2 + math.ceil(fingers / 2))) * scale

@@ -1,7 +1,7 @@
 """Overlay in the 3D views during live sessions.
 
-The draw handler is there only while a session runs whose bed has the overlay enabled: one that is off costs
-nothing. `follow` is called after each start and end of a session.
+The draw handler is there only while a session runs whose bed has the overlay enabled: one that is
+off costs nothing. `follow` is called after each start and end of a session.
 """
 
 import math
@@ -46,7 +46,9 @@ def follow() -> None:
     """Draw the overlay if a live session has it enabled, and remove it otherwise."""
     if any(_is_wanted(bed) for bed in _beds()):
         if not shown():
-            HANDLER.handle = bpy.types.SpaceView3D.draw_handler_add(_draw, (), "WINDOW", "POST_PIXEL")
+            HANDLER.handle = bpy.types.SpaceView3D.draw_handler_add(
+                _draw, (), "WINDOW", "POST_PIXEL"
+            )
             bpy.app.timers.register(_again, first_interval=QUIET)
     else:
         stop()
@@ -135,12 +137,20 @@ def _choose_bed(context: Context) -> Object | None:
     return active if active in beds else beds[0] if beds else None
 
 
-def find_free_room(area: Area, region: Region, closed: Mapping[str, float] = MappingProxyType({})) -> Room:
+def find_free_room(
+    area: Area, region: Region, closed: Mapping[str, float] = MappingProxyType({})
+) -> Room:
     """Return the part of a view, pixels, that toolbar, sidebar and headers leave free.
 
     `closed`: how wide or high regions are to be taken that are closed, by their types.
     """
-    sides = {"TOOLS": "LEFT", "UI": "RIGHT", "HEADER": "TOP", "TOOL_HEADER": "TOP", "ASSET_SHELF": "BOTTOM"}
+    sides = {
+        "TOOLS": "LEFT",
+        "UI": "RIGHT",
+        "HEADER": "TOP",
+        "TOOL_HEADER": "TOP",
+        "ASSET_SHELF": "BOTTOM",
+    }
     covered = []
     for other in area.regions:
         lies_over = other.x < region.x + region.width and other.x + other.width > region.x
@@ -186,14 +196,22 @@ def _draw() -> None:
     picture = Picture()
     if context.region_data == context.space_data.region_3d:
         content = FULL if bed.digiclay_display.overlay_full else COMPACT
-        room, corner = find_free_room(context.area, context.region), preferences.get(context).overlay_corner
+        room, corner = (
+            find_free_room(context.area, context.region),
+            preferences.get(context).overlay_corner,
+        )
         picture = lay_out(read_session(bed, session, colors), chosen, room, scale, content, corner)
     _mark(context, bed, session, chosen, picture, scale)
     draw(picture, context.region.width, context.region.height)
 
 
 def _mark(
-    context: Context, bed: Object, session: running.Running, colors: Look, picture: Picture, scale: float
+    context: Context,
+    bed: Object,
+    session: running.Running,
+    colors: Look,
+    picture: Picture,
+    scale: float,
 ) -> None:
     """Add dots on picked pins in the colors of their curves, and numbered ones beside several fingertips.
 

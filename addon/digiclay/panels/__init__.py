@@ -3,8 +3,8 @@
 from ..compat import bpy
 from . import display, parameters, press_options, session, shape_exchange
 
-#: A panel before its sub-panels: Session (with Shapes and Takes), Show and Export for a sculptor, and the
-#: Laboratory for a researcher.
+#: A panel before its sub-panels: Session (with Shapes and Takes), Show and Export for a sculptor,
+#: and the Laboratory for a researcher.
 CLASSES: tuple[type, ...] = (
     *session.CLASSES,
     *display.CLASSES,

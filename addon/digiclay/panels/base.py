@@ -40,14 +40,27 @@ def declare(
     """Return a decorator that makes a class for Blender of its one method, the docstring included."""
 
     def make(function: Callable[..., Any]) -> Any:
-        attributes = {"bl_idname": idname, "bl_label": label, method: function, "__doc__": function.__doc__}
-        return type(function.__name__, bases, attributes | {"__module__": function.__module__} | entries)
+        attributes = {
+            "bl_idname": idname,
+            "bl_label": label,
+            method: function,
+            "__doc__": function.__doc__,
+        }
+        return type(
+            function.__name__, bases, attributes | {"__module__": function.__module__} | entries
+        )
 
     return make
 
 
 def panel(
-    idname: str, label: str, order: int, *, parent: str = "", closed: bool = True, with_bed: bool = True
+    idname: str,
+    label: str,
+    order: int,
+    *,
+    parent: str = "",
+    closed: bool = True,
+    with_bed: bool = True,
 ) -> Callable[[Callable[[Sidebar, Context], None]], Any]:
     """Return a decorator that makes a panel of its `draw`, a sub-panel of `parent` if that is given."""
 

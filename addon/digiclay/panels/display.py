@@ -14,7 +14,16 @@ from ..core.scene.assembly import assemble
 from ..core.session import snapshot
 from ..core.session.recent_trace import PICKED, SPAN
 from ..device import heat, view
-from ..device.node_tree import ARROW_LENGTH, ARROWS, COLOR_BY_FORCE, FORM, LENGTH, MEMBRANE, TINT, TOP_FORCE
+from ..device.node_tree import (
+    ARROW_LENGTH,
+    ARROWS,
+    COLOR_BY_FORCE,
+    FORM,
+    LENGTH,
+    MEMBRANE,
+    TINT,
+    TOP_FORCE,
+)
 from ..live import beds
 from ..overlay import views
 from ..overlay.ready_view import reveal
@@ -51,7 +60,8 @@ def _write_forces(bed: Object) -> None:
             system = assemble(properties.scene_of(bed))
             view.show_state(bed, system, snapshot.load(system, stored))
     except DigiclayError:
-        # The bed is edited, or its settings have changed since the state was kept: what was last drawn stays.
+        # The bed is edited, or its settings have changed since the state was kept: what was last
+        # drawn stays.
         return
 
 
@@ -62,7 +72,9 @@ def _in_nodes(
 
     def put(display: Any, value: Any) -> None:
         if view.has_setting(display.id_data, name):
-            write(display.id_data, value) if write else view.write_setting(display.id_data, name, value)
+            write(display.id_data, value) if write else view.write_setting(
+                display.id_data, name, value
+            )
 
     return {"get": lambda display: view.read_setting(display.id_data, name, default), "set": put}
 
@@ -214,7 +226,9 @@ CLASSES = (show, details)
 def register() -> None:
     """Register the properties and hang them onto objects."""
     bpy.utils.register_class(Display)
-    bpy.types.Object.digiclay_display = bpy.props.PointerProperty(type=Display, name="Digital Clay Display")
+    bpy.types.Object.digiclay_display = bpy.props.PointerProperty(
+        type=Display, name="Digital Clay Display"
+    )
 
 
 def unregister() -> None:

@@ -26,7 +26,9 @@ def start(sidebar: Sidebar, context: Context) -> None:
     column.label(text="Select a bed or its fingertip,")
     column.label(text="or add a new device:")
     column.operator("mesh.digital_clay_add", text="Add Digital Clay", icon="MESH_GRID")
-    draw_lines(sidebar.layout, running.last_message(), "INFO")  # a session may have ended with its file
+    draw_lines(
+        sidebar.layout, running.last_message(), "INFO"
+    )  # a session may have ended with its file
 
 
 @menu("DIGICLAY_MT_presets", "Presets")
@@ -68,7 +70,9 @@ def control(sidebar: Sidebar, context: Context) -> None:
     method = method_of(settings)
     if method not in list_methods():
         draw_lines(
-            sidebar.layout, localize("{}: no such method is loaded. See the preferences", method), "ERROR"
+            sidebar.layout,
+            localize("{}: no such method is loaded. See the preferences", method),
+            "ERROR",
         )
 
 
@@ -105,10 +109,15 @@ def section_panel(section: str, parent: str, order: int, words: str = "") -> typ
                 if number > 1:
                     column.label(text=localize("Fingertip {}", number))
             group = part_group(settings, section)
-            quantities = list_quantities(import_parameters(section, method_of(bed_of(context).digiclay)))
-            for name in (WHOLE + name if quantity.whole else name for name, quantity in quantities.items()):
+            quantities = list_quantities(
+                import_parameters(section, method_of(bed_of(context).digiclay))
+            )
+            for name in (
+                WHOLE + name if quantity.whole else name for name, quantity in quantities.items()
+            ):
                 row = column.row(align=True)
-                # A number's label stands in its field: beside it the sidebar would cut off the unit.
+                # A number's label stands in its field: beside it the sidebar would cut off the
+                # unit.
                 row.use_property_split = group.bl_rna.properties[name].type in BESIDE
                 row.use_property_decorate = False
                 row.prop(group, name)

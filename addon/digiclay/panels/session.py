@@ -30,7 +30,9 @@ def session_panel(sidebar: Sidebar, context: Context) -> None:
             row.operator("digiclay.leave_mode", icon="LOOP_BACK")
         _buttons(column, session)
         if session.recording is not None:
-            column.label(text=localize("Recording: {:.1f} s", _measure_recording(session)), icon="REC")
+            column.label(
+                text=localize("Recording: {:.1f} s", _measure_recording(session)), icon="REC"
+            )
     row = sidebar.layout.row(align=True)
     row.operator("digiclay.add_fingertip", icon="ADD")
     row.operator_menu_enum("digiclay.add_hand", "side", icon="VIEW_PAN")

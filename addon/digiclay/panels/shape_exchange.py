@@ -22,7 +22,9 @@ def shapes(sidebar: Sidebar, context: Context) -> None:
     column.operator("digiclay.shape_from_object", icon="OBJECT_DATA")
     column.operator_context = "INVOKE_DEFAULT"
     column.operator("digiclay.shape_from_file", text="Shape from File...", icon="FILE_FOLDER")
-    column.operator_menu_enum("digiclay.shape_sample", "sample", text="Sample Shape", icon="RNDCURVE")
+    column.operator_menu_enum(
+        "digiclay.shape_sample", "sample", text="Sample Shape", icon="RNDCURVE"
+    )
     if not settings.use_shape:
         sidebar.layout.label(text="No shape: sessions begin at rest", icon="INFO")
     else:
@@ -70,7 +72,9 @@ def features(sidebar: Sidebar, context: Context) -> None:
             listed.label(text="...")
     has_reference = formed_bed.has_reference(bed)
     column = layout.column(align=True)
-    column.label(text="Measured from the kept surface" if has_reference else "Measured from the bed at rest")
+    column.label(
+        text="Measured from the kept surface" if has_reference else "Measured from the bed at rest"
+    )
     row = column.row(align=True)
     row.operator("digiclay.keep_surface")
     row.operator("digiclay.forget_surface")

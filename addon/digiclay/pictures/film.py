@@ -51,7 +51,11 @@ def encode_film(frames: list[Path], out: Path, looks: Moving) -> Path:
     scene.view_settings.view_transform = "Standard"
     scene.frame_start, scene.frame_end = 1, len(frames)
     render = scene.render
-    render.resolution_x, render.resolution_y, render.resolution_percentage = looks.width, looks.height, 100
+    render.resolution_x, render.resolution_y, render.resolution_percentage = (
+        looks.width,
+        looks.height,
+        100,
+    )
     render.fps, render.fps_base = looks.rate, 1.0
     to_video(render)
     partial = frames[0].with_name("film.mp4")
@@ -84,8 +88,8 @@ def is_whole_film(data: bytes) -> bool:
     return at == len(data) and b"moov" in kinds
 
 
-#: How far beside and above the pins a fingertip may be that is to be in the frame, m: it stays there when it
-#: lifts from a session; for more the bed would be small.
+#: How far beside and above the pins a fingertip may be that is to be in the frame, m: it stays
+#: there when it lifts from a session; for more the bed would be small.
 NEAR, LIFTED = 0.01, 0.03
 Progress = Callable[[int, int], None]
 
@@ -115,7 +119,8 @@ def stage_film(
 ) -> Iterator[Shots]:
     """Set the stage for the frames of a film.
 
-    `plotted`: what a force is called, and the force (t,), N, or the forces (t, f) of several fingertips.
+    `plotted`: what a force is called, and the force (t,), N, or the forces (t, f) of several
+    fingertips.
 
     `sizes`: `pitch`, `actuator`, `finger` of `Instant.of`.
     """
@@ -134,7 +139,11 @@ def stage_film(
             margins=(left, right, below + (SHARE if looks.strip else 0.0), above),
         )
         time, (called, force) = history["time"], plotted
-        chart = draw_force_plot(front, time[used], force[used], set_point, called) if looks.strip else None
+        chart = (
+            draw_force_plot(front, time[used], force[used], set_point, called)
+            if looks.strip
+            else None
+        )
 
         def show(frame: int) -> None:
             row = int(rows[frame])
@@ -176,7 +185,8 @@ def _visible_points(bed: Object, history: Mapping[str, Array], rows: Cells, size
     ways = np.indices((3, 3, 3)).reshape(3, -1) - 1.0
     extremes = np.unique((places @ ways).argmax(axis=0) // (len(places) // len(poses)))
     clouds = [
-        np.column_stack([position, level]) * SCALE for level in (height.min(axis=0), height.max(axis=0))
+        np.column_stack([position, level]) * SCALE
+        for level in (height.min(axis=0), height.max(axis=0))
     ]
     for at in extremes:
         view.show(bed, Instant(**{**vars(instant), "fingertip": poses[at]}))

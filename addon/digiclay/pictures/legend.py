@@ -25,7 +25,8 @@ INK, FADED = (0.10, 0.12, 0.15), (0.30, 0.33, 0.37)
 LEFT = -0.94
 #: How low the legend may reach, in half heights: below it a film has its strip.
 LOWEST = -0.50
-#: Sizes of letters that can still be read, pixels: ordinary ones, what must be read beside them, and notes.
+#: Sizes of letters that can still be read, pixels: ordinary ones, what must be read beside them,
+#: and notes.
 READ, READ_BESIDE, READ_NOTE = 11.0, 10.0, 9.0
 #: What Workbench's studio light leaves of a color that looks straight at the camera, measured.
 STUDIO = 0.48
@@ -89,14 +90,21 @@ class Front:
         self.scene.collection.objects.link(part)
         return part
 
-    def write(self, body: str, size: float, x: float, y: float, color: Color, align: str = "LEFT") -> Object:
+    def write(
+        self, body: str, size: float, x: float, y: float, color: Color, align: str = "LEFT"
+    ) -> Object:
         """Write a text at a place; return the object, whose `data.body` may be changed."""
         text = bpy.data.curves.new(body, "FONT")
         text.body, text.size, text.align_x = body, size, align
         return self.put(bpy.data.objects.new(body, text), x, y, color)
 
     def box(
-        self, name: str, low: tuple[float, float], high: tuple[float, float], color: Color, layer: int
+        self,
+        name: str,
+        low: tuple[float, float],
+        high: tuple[float, float],
+        color: Color,
+        layer: int,
     ) -> Object:
         """Fill a rectangle from its lower left to its upper right corner; its origin is the lower left."""
         width, height = high[0] - low[0], high[1] - low[1]
@@ -109,7 +117,9 @@ def write_mode_legend(front: Front, modes: Sequence[Mode]) -> None:
     """List modes down the picture's left side, each with a dot of its color; small pictures explain none."""
     size, small = front.letter, front.note
     turns = np.linspace(0.0, 2.0 * math.pi, 49)[:-1]
-    disc = primitives.loft([np.column_stack([np.cos(turns), np.sin(turns), 0.0 * turns])], last=True)
+    disc = primitives.loft(
+        [np.column_stack([np.cos(turns), np.sin(turns), 0.0 * turns])], last=True
+    )
     left, y = LEFT * front.width, 0.86 * front.height
     for mode in modes:
         name = mode.name.lower().replace("_", " ")
@@ -141,7 +151,11 @@ def write_force_legend(front: Front) -> None:
     x, small = left + 1.5 * size, front.readable(front.note)
     for level in range(0, count, 3):
         force = 1e3 * heat.TOP * level / len(heat.COLORS)
-        label = "none" if level == 0 else f"{force:.0f} mN" + (" and more" if level == count - 1 else "")
+        label = (
+            "none"
+            if level == 0
+            else f"{force:.0f} mN" + (" and more" if level == count - 1 else "")
+        )
         # Level 0 is no force at all; every other ends at its force.
         front.write(label, small, x, low + step * (level + (0.3 if level == 0 else 0.75)), FADED)
 
@@ -150,7 +164,8 @@ def flat(name: str, color: Color) -> Material:
     """Make a material of one color that no light changes. `color` (float, float, float)."""
     material = bpy.data.materials.new(name)
     *light, alpha = linear(color)
-    # What Workbench shows. It lights everything, so what it takes is given first, as far as the hue allows.
+    # What Workbench shows. It lights everything, so what it takes is given first, as far as the hue
+    # allows.
     brighter = min(1.0 / STUDIO, 1.0 / max(light))
     material.diffuse_color = (*(part * brighter for part in light), alpha)
     material.roughness = 1.0
@@ -162,12 +177,19 @@ def flat(name: str, color: Color) -> Material:
     return material
 
 
-#: Part of the picture's height the strip takes, and what of it is left to the letters above the curve.
+#: Part of the picture's height the strip takes, and what of it is left to the letters above the
+#: curve.
 SHARE, LETTERS = 0.20, 0.30
 #: Most columns the curve is drawn with.
 MOST = 600
-#: sRGB: the whole session's force, what of it has been, the set point, and what lies behind; behind several.
-TO_COME, BEEN, ASKED, PAPER = (0.52, 0.57, 0.64), (0.00, 0.45, 0.70), (0.84, 0.37, 0.00), (0.93, 0.94, 0.95)
+#: sRGB: the whole session's force, what of it has been, the set point, and what lies behind; behind
+#: several.
+TO_COME, BEEN, ASKED, PAPER = (
+    (0.52, 0.57, 0.64),
+    (0.00, 0.45, 0.70),
+    (0.84, 0.37, 0.00),
+    (0.93, 0.94, 0.95),
+)
 DARK = (0.20, 0.22, 0.25)
 #: Least force the strip's height stands for, N.
 LEAST = 0.05
@@ -204,7 +226,9 @@ class ForcePlot:
             been.data.update()
         behind = self.cursor.location.z / self.been[0].location.z
         self.cursor.location.x = (self.been[0].location.x + now) * behind
-        forces = " to ".join(dict.fromkeys(f"{part:.2f}" for part in (np.min(force), np.max(force))))
+        forces = " to ".join(
+            dict.fromkeys(f"{part:.2f}" for part in (np.min(force), np.max(force)))
+        )
         self.force.data.body = f"{self.called} {forces} N"
         self.time.data.body = f"{time:.2f} s"
 
@@ -225,7 +249,9 @@ def draw_force_plot(
     several, columns = force.ndim > 1, force.reshape(len(force), -1)
     paper, ink = (DARK, PAPER) if several else (PAPER, INK)
     # Columns, each with its largest force.
-    starts = np.unique(np.linspace(0, len(time), min(len(time), MOST), endpoint=False).astype(np.intp))
+    starts = np.unique(
+        np.linspace(0, len(time), min(len(time), MOST), endpoint=False).astype(np.intp)
+    )
     lasts = max(float(time[-1] - time[0]), 1e-9)
     place = (time[starts] - time[0]) * ((right - left) / lasts)
     high = np.maximum.reduceat(columns, starts, axis=0).T * (rise / top)

@@ -62,7 +62,8 @@ def camera_place(points: Floats, axes: Floats, low: Floats, high: Floats) -> Flo
 def outline(bed: Object) -> Floats:
     """Return points of housing, fingertip and pin tops, (k, 3), Blender units; the bed is at the origin."""
     clouds = []
-    # The housing's shape is that of an object which stands in no scene: what it is drawn by is the bed.
+    # The housing's shape is that of an object which stands in no scene: what it is drawn by is the
+    # bed.
     meshes = [(part, part.data) for part in (bed, *bed.children_recursive) if part.type == "MESH"]
     case = view.housing_of(bed)
     if case is not None and case.parent != bed:

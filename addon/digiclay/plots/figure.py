@@ -50,7 +50,9 @@ STYLE: dict[str, Any] = {
 
 
 @contextmanager
-def empty(width: float, height: float, style: Mapping[str, Any] = STYLE, **options: Any) -> Iterator[Figure]:
+def empty(
+    width: float, height: float, style: Mapping[str, Any] = STYLE, **options: Any
+) -> Iterator[Figure]:
     """Give an empty figure, inches, in a style that also holds for what is drawn on it."""
     try:
         from matplotlib import rc_context
@@ -71,7 +73,9 @@ def canvas(width: float, height: float, title: str = "") -> Iterator[tuple[Figur
         if title:
             figure.text(0.3 / width, 1.0 - 0.33 / height, title, fontsize=14, fontweight="bold")
 
-        def place(label: str, left: float, bottom: float, across: float, up: float, **looks: Any) -> Any:
+        def place(
+            label: str, left: float, bottom: float, across: float, up: float, **looks: Any
+        ) -> Any:
             box = (left / width, bottom / height, across / width, up / height)
             return figure.add_axes(box, label=label, **looks)
 
@@ -87,8 +91,8 @@ def legend_above(axes: Axes, columns: int = 6) -> None:
 def save(figure: Figure, out: str | Path) -> Path:
     """Write a figure, whole or not at all, and return its path; OutputError when it cannot.
 
-    As an SVG if its name ends so, with its letters as outlines and the same bytes every time; else as
-    a PNG. What an artist marks as rasterized is pixels in an SVG.
+    As an SVG if its name ends so, with its letters as outlines and the same bytes every time; else
+    as a PNG. What an artist marks as rasterized is pixels in an SVG.
     """
     content, path = io.BytesIO(), Path(out)
     if path.suffix == ".svg":

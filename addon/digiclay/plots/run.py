@@ -22,15 +22,22 @@ LETTERS = "ABCDEF"
 #: Lines of fingers beyond the sixth have the same colors again.
 STYLES = ("-", ":", (0, (1, 1, 4, 1)), (0, (8, 1)), (0, (3, 1)), (0, (6, 2, 1, 2)))
 #: Metrics in the picture of a session.
-FIGURES = ("rfd", "rfd_shaping", "max_total_force", "contact_loss_share", "lag_mean", "height_range")
+FIGURES = (
+    "rfd",
+    "rfd_shaping",
+    "max_total_force",
+    "contact_loss_share",
+    "lag_mean",
+    "height_range",
+)
 
 
 def session_cells(history: History) -> list[int]:
     """Choose up to six cells along the fingertip path in contact, evenly spaced.
 
     They are different, in the order in which the fingertip passes them, the first and the last
-    contact among them. Without any contact they are those that moved most. Of several fingertips each of the
-    first six has the cell under it in the middle of its contact.
+    contact among them. Without any contact they are those that moved most. Of several fingertips
+    each of the first six has the cell under it in the middle of its contact.
     """
     count = len(LETTERS)
     if "finger_force" in history:
@@ -41,7 +48,8 @@ def session_cells(history: History) -> list[int]:
         return sorted(np.argsort(-np.ptp(height, axis=0), kind="stable")[:count].tolist())
     finger = array(history, "fingertip")[touching, :2]
     stretch, pressed = np.hypot(*np.diff(finger, axis=0).T), np.diff(touching) == 1
-    # The way through the air to the next place is one step at most: its ends are worth a cell, no more.
+    # The way through the air to the next place is one step at most: its ends are worth a cell, no
+    # more.
     stretch[~pressed] = np.minimum(stretch[~pressed], stretch[pressed].sum() / (count - 2))
     traveled = np.concatenate([[0.0], np.cumsum(stretch)])
     steps = np.linspace(0.0, traveled[-1], count)
@@ -63,22 +71,33 @@ def _find_middle_cells(history: History) -> list[int]:
 def session_figure(history: History, set_point: SetPoint | None) -> Figure:
     """Draw heights of chosen cells and the total force over time, as the paper's Fig. 8 does.
 
-    Of several fingertips it is the force of each. Without a `set_point` neither it nor a deviation from it is
-    shown. The axes are, by label: ``heights``, ``force``, ``map`` with its ``scale``, and ``figures``.
+    Of several fingertips it is the force of each. Without a `set_point` neither it nor a deviation
+    from it is shown. The axes are, by label: ``heights``, ``force``, ``map`` with its ``scale``,
+    and ``figures``.
     """
     several = "finger_force" in history
     letters = [str(number) for number in range(1, len(LINES) + 1)] if several else LETTERS
     time, height = array(history, "time"), array(history, "height")
     with canvas(12.5, 6.3) as (figure, place):
         heights, plan = place("heights", 0.8, 2.95, 6.95, 3.0), place("map", 8.62, 3.1, 3.12, 2.85)
-        force, figures = place("force", 0.8, 0.65, 6.95, 1.7), place("figures", 8.62, 0.65, 3.78, 1.7)
+        force, figures = (
+            place("force", 0.8, 0.65, 6.95, 1.7),
+            place("figures", 8.62, 0.65, 3.78, 1.7),
+        )
         draw_map(plan, history, "Where the cells are")
         for name, color, cell in zip(letters, LINES, session_cells(history), strict=False):
             heights.plot(time, height[:, cell] * MM, color=color, label=name)
             spot = array(history, "position")[cell] * MM
-            disc = {"markersize": 16, "markeredgecolor": color, "markeredgewidth": 2.6, "clip_on": False}
+            disc = {
+                "markersize": 16,
+                "markeredgecolor": color,
+                "markeredgewidth": 2.6,
+                "clip_on": False,
+            }
             plan.plot(*spot, "o", color="white", **disc)
-            plan.annotate(name, spot, fontsize=10, fontweight="bold", ha="center", va="center_baseline")
+            plan.annotate(
+                name, spot, fontsize=10, fontweight="bold", ha="center", va="center_baseline"
+            )
         heights.set_ylim(ends(np.array(heights.get_ylim()), 2.0))
         heights.set(ylabel="height (mm)", xlim=ends(time, 0.1))
         heights.set_title("Heights of cells under the fingers" if several else "Heights of cells")
@@ -86,8 +105,12 @@ def session_figure(history: History, set_point: SetPoint | None) -> Figure:
         shade_contact(heights, history)
         wanted, label = None, ""
         if set_point is not None:
-            fingers = [set_point.total(sum_cells(finger).following) for finger in split_fingers(history)]
-            wanted = np.fmax.reduce(fingers)  # the same of all fingers, where it does not depend on cells
+            fingers = [
+                set_point.total(sum_cells(finger).following) for finger in split_fingers(history)
+            ]
+            wanted = np.fmax.reduce(
+                fingers
+            )  # the same of all fingers, where it does not depend on cells
             label = f"set point {set_point.force:g} N{' per cell' if set_point.per_cell else ''}"
         draw_force(force, history, wanted, label)
         force.set(xlabel="time (s)", ylabel="force (N)", ylim=(0.0, None), xlim=ends(time, 0.1))
@@ -102,18 +125,24 @@ def session_figure(history: History, set_point: SetPoint | None) -> Figure:
 def draw_force(axes: Axes, history: History, wanted: ArrayLike | None, label: str) -> None:
     """Draw the total force over time, the one asked for (t,), N, dashed, and when the fingertip touches.
 
-    Of several fingertips the force of each, the first six in the colors of their cells; the legend has the
-    first one of each further style.
+    Of several fingertips the force of each, the first six in the colors of their cells; the legend
+    has the first one of each further style.
     """
     time, asked = array(history, "time"), LINES[1]
     if "finger_force" in history:
         asked = INK
         for number, force in enumerate(array(history, "finger_force").T):
             again, color = divmod(number, len(LINES))
-            look: dict[str, Any] = {"color": LINES[color], "linestyle": STYLES[again], "linewidth": 1.1}
+            look: dict[str, Any] = {
+                "color": LINES[color],
+                "linestyle": STYLES[again],
+                "linewidth": 1.1,
+            }
             axes.plot(time, force, label=str(number + 1) if again and not color else None, **look)
     else:
-        axes.plot(time, array(history, "total_force"), color=INK, linewidth=1.3, label="total force")
+        axes.plot(
+            time, array(history, "total_force"), color=INK, linewidth=1.3, label="total force"
+        )
     if wanted is not None:
         axes.plot(time, wanted, color=asked, linewidth=1.3, linestyle=DASHES, label=label)
     full = len(axes.get_lines()) > 4 * len(LINES)  # of the legend's line
@@ -135,8 +164,11 @@ def surface_figure(history: History) -> Figure:
     with its ``scale``. Raises ParameterError when the bed is a single row or column.
     """
     with canvas(12.5, 5.5) as (figure, place):
-        # The relief is cut off at the edge of its axes, so they reach under the title and the margins.
-        draw_relief(place("relief", -0.6, -0.75, 8.1, 6.7, projection="3d", computed_zorder=False), history)
+        # The relief is cut off at the edge of its axes, so they reach under the title and the
+        # margins.
+        draw_relief(
+            place("relief", -0.6, -0.75, 8.1, 6.7, projection="3d", computed_zorder=False), history
+        )
         figure.text(0.3 / 12.5, 5.14 / 5.5, "Final surface, to scale")
         plan = place("map", 7.5, 0.65, 4.3, 4.4)
         draw_map(plan, history, "From above")
@@ -148,7 +180,9 @@ def _write_figures(axes: Axes, metrics: dict[str, float | None]) -> None:
     """Write the metrics of a session as text."""
     axes.set_axis_off()
     axes.set_title("Metrics")
-    names = [name for name in FIGURES if metrics["set_point"] is not None or not name.startswith("rfd")]
+    names = [
+        name for name in FIGURES if metrics["set_point"] is not None or not name.startswith("rfd")
+    ]
     for line, name in enumerate(names):
         value, metric, y = metrics[name], METRICS[name], 0.92 - 0.158 * line
         text = "–" if value is None else f"{value * metric.factor:.3g} {metric.shown}"

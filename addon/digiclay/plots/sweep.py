@@ -68,17 +68,26 @@ def _draw_line(axes: Axes, column: Column, values: Floats, label: str) -> None:
         axes.set_xticks(positions, [str(value) for value in column.values])
         axes.set_xlim(-0.5, len(values) - 0.5)
     order, missing = np.argsort(positions), positions[np.isnan(values)]
-    axes.plot(positions[order], values[order], look, color=LINES[0], markersize=6 if column.numeric else 8)
+    axes.plot(
+        positions[order], values[order], look, color=LINES[0], markersize=6 if column.numeric else 8
+    )
     if missing.size:
         across = axes.get_xaxis_transform()
         axes.plot(
-            missing, np.full(missing.size, 0.03), "x", color=LINES[1], transform=across, label="no result"
+            missing,
+            np.full(missing.size, 0.03),
+            "x",
+            color=LINES[1],
+            transform=across,
+            label="no result",
         )
         axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.0)
     axes.set(xlabel=along, ylabel=label)
 
 
-def _draw_map(axes: Axes, scale: Axes, columns: Sequence[Column], values: Floats, label: str) -> None:
+def _draw_map(
+    axes: Axes, scale: Axes, columns: Sequence[Column], values: Floats, label: str
+) -> None:
     """Draw a heat map: every point one cell of equal size, the first axis to the right."""
     shown: Any = np.ma.masked_invalid(values.T)  # type: ignore[no-untyped-call]
     names: tuple[Any, ...] = axes.set_xlabel, axes.set_ylabel
@@ -163,7 +172,9 @@ def comparison(
             force.plot(time, total, color=colors[method], linewidth=1.4, label=method)
             force.plot(time, wanted, color=colors[method], zorder=2.5, **dashed)
         force.plot([], [], color=INK, label="set points", **dashed)
-        force.set(xlabel="time (s)", ylabel="force (N)", ylim=(0.0, None), title=called.capitalize())
+        force.set(
+            xlabel="time (s)", ylabel="force (N)", ylim=(0.0, None), title=called.capitalize()
+        )
         force.set_xlim(0.0, max(float(time[-1]) for time, _, _ in forces.values()))
         legend_above(force)
         for number, key in enumerate(PANELS):
@@ -171,7 +182,12 @@ def comparison(
             row, column = divmod(number, 4)
             bottom = 0.3 + (1 - row) * (high + 0.85)
             axes = place(key, 0.4 + 3.02 * column, bottom, 2.35, high)
-            _bars(axes, [metrics[method][key] for method in metrics], list(colors.values()), metric.factor)
+            _bars(
+                axes,
+                [metrics[method][key] for method in metrics],
+                list(colors.values()),
+                metric.factor,
+            )
             axes.set_title(metric.title, fontsize=11)
     return figure
 

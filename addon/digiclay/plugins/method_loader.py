@@ -25,7 +25,14 @@ from uuid import uuid4
 from ..core.base.errors import MethodError, ParameterError
 from ..core.base.quantity import Quantity
 from ..core.control.blister import Blister
-from ..core.control.methods import METHODS, ControlParameters, Method, add_method, list_added, list_methods
+from ..core.control.methods import (
+    METHODS,
+    ControlParameters,
+    Method,
+    add_method,
+    list_added,
+    list_methods,
+)
 from ..core.control.own_method import MOST_ROWS, Guarded, OwnMethod, describe_failure, guard
 from ..core.files.run_folder import write_whole
 from ..core.files.tables import Record
@@ -99,7 +106,9 @@ def find_installed(name: str) -> MethodSource | None:
         return None
     if len(points) > 1:
         owners = ", ".join(sorted(points))
-        raise MethodError(f"The method {name} must be offered by one installed package (got {owners}).")
+        raise MethodError(
+            f"The method {name} must be offered by one installed package (got {owners})."
+        )
     (point,) = points.values()
     owner = f"{point.dist.name} {point.dist.version}" if point.dist else point.module
     try:
@@ -111,8 +120,8 @@ def find_installed(name: str) -> MethodSource | None:
     return MethodSource(name, file, point.attr, "", owner, point.module, digest)
 
 
-#: Names that are no parameters: in the section [control] of a scene file, among a method's functions, and
-#: among those of Blender's properties.
+#: Names that are no parameters: in the section [control] of a scene file, among a method's
+#: functions, and among those of Blender's properties.
 TAKEN = (
     "method",
     "begin",
@@ -142,7 +151,9 @@ KINDS = (bool, int, float, str, tuple)
 def list_classes(module: ModuleType) -> list[type]:
     """Return the control methods that a module defines itself."""
     kinds = [kind for kind in vars(module).values() if isinstance(kind, type)]
-    return [k for k in kinds if issubclass(k, ControlParameters) and k.__module__ == module.__name__]
+    return [
+        k for k in kinds if issubclass(k, ControlParameters) and k.__module__ == module.__name__
+    ]
 
 
 def check_class(label: str, kind: Any) -> None:
@@ -181,7 +192,10 @@ def _check_field(field: dataclasses.Field[Any], refuse: Refuse) -> None:
     if not isinstance(declared, Quantity):
         refuse(f"the field {field.name} must be declared with quantity(default, meaning, unit=...)")
     if field.name in TAKEN or field.name.startswith("_"):
-        refuse(f"a field must not begin with an underscore, nor be called {', '.join(TAKEN)}", field.name)
+        refuse(
+            f"a field must not begin with an underscore, nor be called {', '.join(TAKEN)}",
+            field.name,
+        )
     if not isinstance(field.default, KINDS):
         kinds = ", ".join(kind.__name__ for kind in KINDS)
         refuse(f"the default of {field.name} must be a {kinds}", type(field.default).__name__)
@@ -222,7 +236,10 @@ class OwnRow(Method):
 
     def build(self, parameters: Any, device: Any) -> Guarded:
         """Return its controller for a device, guarded; MethodError when that cannot be built."""
-        source, info = self.source, copy.deepcopy(device)  # whatever it does to it, the bed's is another
+        source, info = (
+            self.source,
+            copy.deepcopy(device),
+        )  # whatever it does to it, the bed's is another
         return guard(lambda: parameters.build(info), source.label, source.file, info.period)
 
 
@@ -265,7 +282,9 @@ def load_class(kind: type) -> str:
     if row and row.import_parameters() is kind:
         return name
     if row and not (isinstance(row, OwnRow) and is_in_memory(row.source)):
-        raise MethodError(f"{kind.__name__}: the name {name} must be unique (another method has it).")
+        raise MethodError(
+            f"{kind.__name__}: the name {name} must be unique (another method has it)."
+        )
     # What its functions refer to can change: no two classes are known to be the same.
     add_class(name, MethodSource(kind.__name__, "", kind.__name__, "", "", "", uuid4().hex), kind)
     return name
@@ -284,7 +303,9 @@ def name_method(attribute: str) -> str:
 def add_source(name: str, source: MethodSource) -> OwnRow:
     """Load a method's code and put it into the table of methods, in place of one of the same name."""
     if name in METHODS:
-        raise MethodError(f"{source.label}: the class must not have the name of the built-in method {name}.")
+        raise MethodError(
+            f"{source.label}: the class must not have the name of the built-in method {name}."
+        )
     module = _import(source)
     kind = getattr(module, source.attribute, None)
     if kind is None:
@@ -292,7 +313,9 @@ def add_source(name: str, source: MethodSource) -> OwnRow:
             f"{source.label.partition(':')[0]}:{kind.__name__}" for kind in list_classes(module)
         )
         rule = f"must have the class {source.attribute}"
-        raise MethodError(f"{source.label}: the file {rule} (it has {there or 'no control method'}).")
+        raise MethodError(
+            f"{source.label}: the file {rule} (it has {there or 'no control method'})."
+        )
     return add_class(name, source, kind)
 
 
@@ -318,7 +341,9 @@ def add_class(name: str, source: MethodSource, kind: Any) -> OwnRow:
     )
 
     def reduce(parameters: ControlParameters) -> tuple[Callable[..., Any], tuple[Any, ...]]:
-        values = {field.name: getattr(parameters, field.name) for field in dataclasses.fields(parameters)}
+        values = {
+            field.name: getattr(parameters, field.name) for field in dataclasses.fields(parameters)
+        }
         return restore_parameters, (name, source, values)
 
     copyreg.pickle(kind, reduce)
@@ -421,7 +446,11 @@ def find_code(scene: Scene) -> MethodSource | None:
 def refuse_former(scene: Scene) -> None:
     """Refuse to change a scene whose method is of another class than the one loaded last under its name."""
     row = list_added().get(scene.method)
-    if isinstance(row, OwnRow) and scene.control is not None and type(scene.control) is not row.kind:
+    if (
+        isinstance(row, OwnRow)
+        and scene.control is not None
+        and type(scene.control) is not row.kind
+    ):
         rule = "must be of the code that was loaded last under its name"
         raise MethodError(f"The scene's method {scene.method} {rule}: make the scene again.")
 
@@ -490,7 +519,9 @@ def _load_file(path: Path, refused: list[str]) -> list[str]:
         label = f"{path.name}:{kind.__name__}"
         try:
             if name in list_added():
-                raise MethodError(f"{label}: the method's name {name} must be unique in this folder.")
+                raise MethodError(
+                    f"{label}: the method's name {name} must be unique in this folder."
+                )
             add_class(name, source._replace(label=label, attribute=kind.__name__), kind)
         except MethodError as error:
             refused.append(str(error))

@@ -63,7 +63,9 @@ def look_at(context: Context, xy: Place) -> tuple[Target | None, Object | None]:
             target, nearest, eye = Target(bed, cells, height, point), distance, origin
     if target is None:
         return None, None
-    return target, find_hider(context, target.bed, _place(target.bed, eye), _place(target.bed, target.point))
+    return target, find_hider(
+        context, target.bed, _place(target.bed, eye), _place(target.bed, target.point)
+    )
 
 
 def read_surface(bed: Object) -> tuple[Grid, Floats]:
@@ -74,7 +76,9 @@ def read_surface(bed: Object) -> tuple[Grid, Floats]:
     return make_grid(properties.scene_of(bed).layout), bridge.read_cells(bed.data)["height"]
 
 
-def hit_point(context: Context, bed: Object, cells: Grid, height: Floats, xy: Place) -> Floats | None:
+def hit_point(
+    context: Context, bed: Object, cells: Grid, height: Floats, xy: Place
+) -> Floats | None:
     """Return where the ray through a pixel of the region meets pins of heights (n,), m; None if it misses."""
     origin, direction = _ray(context, bed, xy)
     first, last = shown_stretch(context, _place(bed, origin), _place(bed, origin + direction))
@@ -128,7 +132,9 @@ def shown_stretch(context: Context, start: Floats, end: Floats) -> Place:
         rising = after - before
         if rising:
             crossed = -before / rising
-            first, last = (max(first, crossed), last) if rising > 0.0 else (first, min(last, crossed))
+            first, last = (
+                (max(first, crossed), last) if rising > 0.0 else (first, min(last, crossed))
+            )
         elif before < 0.0:
             return 1.0, 0.0
     return first, last
@@ -148,7 +154,8 @@ def find_hider(
     start = start + first * (end - start)
     ray = end - start
     for thing, matrix in list_surfaces(context, bed) if surfaces is None else surfaces:
-        # An object in front of others hides what is nearer too; one behind such a bed hides nothing.
+        # An object in front of others hides what is nearer too; one behind such a bed hides
+        # nothing.
         if bed.show_in_front and not thing.show_in_front:
             continue
         reach = np.inf if thing.show_in_front and not bed.show_in_front else 1.0 - NEAR
@@ -177,7 +184,11 @@ def list_surfaces(context: Context, bed: Object) -> Iterator[tuple[Object, Matri
     if not instancers:  # a bed of 10 000 pins has as many instances to go through
         return
     for instance in graph.object_instances:
-        if instance.is_instance and instance.parent.original in instancers and _hides(instance.object):
+        if (
+            instance.is_instance
+            and instance.parent.original in instancers
+            and _hides(instance.object)
+        ):
             # A mesh that nodes instance has no original; Blender crashes on an evaluated curve.
             mesh = instance.object.type == "MESH"
             yield instance.object if mesh else instance.object.original, instance.matrix_world
@@ -191,7 +202,9 @@ def _hides(thing: Object) -> bool:
         return True
     curve = thing.data
     filled = curve.dimensions == "2D" and curve.fill_mode != "NONE"
-    return bool(filled or curve.extrude or curve.bevel_depth or curve.bevel_object or thing.modifiers)
+    return bool(
+        filled or curve.extrude or curve.bevel_depth or curve.bevel_object or thing.modifiers
+    )
 
 
 def _belongs(thing: Object, bed: Object) -> bool:
@@ -204,13 +217,18 @@ def _belongs(thing: Object, bed: Object) -> bool:
 def _instances(thing: Object) -> bool:
     """Return whether an object may draw others as its instances."""
     makers = ("NODES", "PARTICLE_SYSTEM")
-    return thing.instance_type != "NONE" or any(modifier.type in makers for modifier in thing.modifiers)
+    return thing.instance_type != "NONE" or any(
+        modifier.type in makers for modifier in thing.modifiers
+    )
 
 
 def _meets(thing: Object, matrix: Matrix, start: Floats, ray: Floats, reach: float) -> bool:
     """Return whether a ray in the world meets an object within a reach, in lengths of its way."""
     placed = np.array(matrix, np.float64)
-    if not np.isfinite(placed).all() or abs(np.linalg.det(placed[:3, :3])) < np.finfo(np.float32).tiny:
+    if (
+        not np.isfinite(placed).all()
+        or abs(np.linalg.det(placed[:3, :3])) < np.finfo(np.float32).tiny
+    ):
         return False
     inverse = np.linalg.inv(placed)
     origin, along = inverse[:3, :3] @ start + inverse[:3, 3], inverse[:3, :3] @ ray
@@ -222,9 +240,11 @@ def _meets(thing: Object, matrix: Matrix, start: Floats, ray: Floats, reach: flo
     return bool(met[0])
 
 
-#: Share of the pins that may be hidden: what stands among the pins or leans over their edge is left alone.
+#: Share of the pins that may be hidden: what stands among the pins or leans over their edge is left
+#: alone.
 HIDDEN = 0.25
-#: Places looked at along each side of the pins, and the gap to what a bed stands beside, of its width.
+#: Places looked at along each side of the pins, and the gap to what a bed stands beside, of its
+#: width.
 SIDE, SPACE = 5, 0.1
 #: Where the eye of a parallel view is taken to be, Blender units: before all that it shows.
 FAR_EYE = 1e5
@@ -236,21 +256,35 @@ NOWHERE = "{} hides the bed, which stands at the 3D cursor: move or hide one of 
 def find_free_place(context: Context, bed: Object) -> tuple[Floats, str]:
     """Return where the middle of a new bed's underside goes (3,), world, and words if not the 3D cursor."""
     cursor, (low, high) = np.array(context.scene.cursor.location), _box(bed)
-    # Only what reaches into the bed's own box moves it: what stands before it leaves as the view is turned.
-    surfaces = [(thing, matrix, *_bounds(thing, matrix)) for thing, matrix in list_surfaces(context, bed)]
+    # Only what reaches into the bed's own box moves it: what stands before it leaves as the view is
+    # turned.
+    surfaces = [
+        (thing, matrix, *_bounds(thing, matrix)) for thing, matrix in list_surfaces(context, bed)
+    ]
 
     def overlapping(place: Floats) -> list[tuple[Object, Matrix, Floats, Floats]]:
-        return [row for row in surfaces if (row[2] < place + high).all() and (row[3] > place + low).all()]
+        return [
+            row
+            for row in surfaces
+            if (row[2] < place + high).all() and (row[3] > place + low).all()
+        ]
 
     def hider(place: Floats, among: list[tuple[Object, Matrix, Floats, Floats]]) -> Object | None:
         beds = [row[0] for row in overlapping(place) if is_bed(row[0])]
-        return beds[0] if beds else _find_hider(context, bed, place, (low, high), [row[:2] for row in among])
+        return (
+            beds[0]
+            if beds
+            else _find_hider(context, bed, place, (low, high), [row[:2] for row in among])
+        )
 
     there = overlapping(cursor)
     hides = hider(cursor, there)
     if hides is None:
         return cursor, ""
-    first, last = np.min([row[2] for row in there], axis=0), np.max([row[3] for row in there], axis=0)
+    first, last = (
+        np.min([row[2] for row in there], axis=0),
+        np.max([row[3] for row in there], axis=0),
+    )
     middle, gap = (first + last) / 2.0, SPACE * (high - low)
     places = [] if is_bed(hides) else [(np.array([*middle[:2], last[2]]), ON_TOP)]
     for axis in (0, 1):
@@ -293,7 +327,9 @@ def _find_hider(
         for y in np.linspace(front, back, SIDE + 2)[1:-1]:
             end = place + np.array([x, y, top])
             parallel = context.region_data.window_matrix[3][3] == 1.0
-            start = end + FAR_EYE * np.array(eye.col[2][:3]) if parallel else np.array(eye.translation)
+            start = (
+                end + FAR_EYE * np.array(eye.col[2][:3]) if parallel else np.array(eye.translation)
+            )
             hiders.append(find_hider(context, bed, start, end, surfaces))
     things = [thing for thing in hiders if thing is not None]
     return things[len(things) // 2] if len(things) > HIDDEN * len(hiders) else None

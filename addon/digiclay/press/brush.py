@@ -31,14 +31,18 @@ class FingerKind:
 
 
 FINGERS: Mapping[str, FingerKind] = {
-    "fingertip": FingerKind("Fingertip", Fingertip(), "the tip of an index finger, as the device has it"),
+    "fingertip": FingerKind(
+        "Fingertip", Fingertip(), "the tip of an index finger, as the device has it"
+    ),
     "thumb": FingerKind(
         "Thumb",
         Fingertip(14e-3, 11.5e-3, 11e-3),
         "23 mm broad and 22 mm thick, about the median of men's thumbs; its length is assumed",
     ),
     "palm": FingerKind("Palm", Fingertip(30e-3, 25e-3, 20e-3), "the heel of a hand; assumed"),
-    "stylus": FingerKind("Stylus", Fingertip(3e-3, 3e-3, 8e-3), "the rounded end of a pen; assumed"),
+    "stylus": FingerKind(
+        "Stylus", Fingertip(3e-3, 3e-3, 8e-3), "the rounded end of a pen; assumed"
+    ),
     "ball": FingerKind("Ball Tool", Fingertip(6e-3, 6e-3, 6e-3), "a ball of 12 mm; assumed"),
 }
 
@@ -165,7 +169,9 @@ def find_stamp(settings: OperatorProperties, brush: Brush) -> HeightMap | None:
     """Return what a brush stamps; a DigiclayError where it cannot be read."""
     if brush not in STAMPS:
         return None
-    return load_stamp(bpy.path.abspath(settings.stamp_file) if settings.stamp == FILE else settings.stamp)
+    return load_stamp(
+        bpy.path.abspath(settings.stamp_file) if settings.stamp == FILE else settings.stamp
+    )
 
 
 def amount_name(brush: Brush) -> str:
@@ -175,7 +181,9 @@ def amount_name(brush: Brush) -> str:
 
 def describe_brush(finger: Fingertip, brush: Brush, depth: float, strength: float = 1.0) -> str:
     """Return size, brush, and depth or height (m) times strength, as shown beside the cursor."""
-    return localize("Size {:.3g} mm   {}", 2e3 * finger.width, describe_stroke(brush, depth, strength))
+    return localize(
+        "Size {:.3g} mm   {}", 2e3 * finger.width, describe_stroke(brush, depth, strength)
+    )
 
 
 def describe_stroke(brush: Brush, depth: float, strength: float = 1.0) -> str:

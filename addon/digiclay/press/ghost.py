@@ -1,7 +1,7 @@
 """Ghost of press strokes: the skin that the queue, and a path being laid, will leave, in the 3D views.
 
-It is there at once, translucent over all else, and goes where the pins have come to it. The views' own switch
-of their overlays hides it.
+It is there at once, translucent over all else, and goes where the pins have come to it. The views'
+own switch of their overlays hides it.
 """
 
 import time
@@ -24,7 +24,8 @@ from ..strokes.nominal import Ghost, find_ghosts
 from ..strokes.stroke import Stroke
 from .brush import find_bed
 
-#: Colors of what is to be raised and lowered: blue and orange of Okabe and Ito, which all eyes tell apart.
+#: Colors of what is to be raised and lowered: blue and orange of Okabe and Ito, which all eyes tell
+#: apart.
 RAISED, LOWERED = (0.0, 0.45, 0.70), (0.90, 0.62, 0.0)
 #: Where the light comes from, in the bed's space, and how dark a slope is that gets none.
 LIGHT, SHADE = (-0.48, 0.36, 0.80), 0.4
@@ -41,8 +42,8 @@ class Drawn:
     ghosts: dict[int, tuple[Ghost, ...]] = field(default_factory=dict)
     #: Stroke along a path that is being laid, and the uid of its bed.
     plan: tuple[int, Stroke] | None = None
-    #: Heights that the triangles are of, the light on them, and the tick of the pins below, whose way to them
-    #: their opacity tells.
+    #: Heights that the triangles are of, the light on them, and the tick of the pins below, whose
+    #: way to them their opacity tells.
     heights: Floats | None = None
     light: Floats | None = None
     tick: int = 0
@@ -80,7 +81,9 @@ def find_surface(session: Running) -> Floats | None:
 def find_light(layout: Layout, surface: Floats) -> Floats:
     """Return how light each place of a surface (n,), m, is, (n,), from 0 to 1."""
     table = surface.reshape(layout.rows, layout.columns)
-    across, along = (slope.ravel() for slope in np.gradient(table, layout.row_spacing, layout.pitch))
+    across, along = (
+        slope.ravel() for slope in np.gradient(table, layout.row_spacing, layout.pitch)
+    )
     toward = LIGHT[2] - LIGHT[0] * along - LIGHT[1] * across
     lit: Floats = (toward / np.sqrt(1.0 + along * along + across * across)).clip(0.0, 1.0)
     return SHADE + (1.0 - SHADE) * lit
@@ -100,9 +103,13 @@ def find_colors(light: Floats, rise: Floats) -> NDArray[np.float32]:
 @lru_cache(maxsize=4)
 def _list_triangles(layout: Layout) -> NDArray[np.int32]:
     """Return the triangles (k, 3) between the pins of a bed, counter-clockwise from above."""
-    cells = np.arange(layout.rows * layout.columns, dtype=np.int32).reshape(layout.rows, layout.columns)
+    cells = np.arange(layout.rows * layout.columns, dtype=np.int32).reshape(
+        layout.rows, layout.columns
+    )
     first, second, third, fourth = (corner.ravel() for corner in take_corners(cells))
-    return np.concatenate([np.column_stack([first, second, third]), np.column_stack([first, third, fourth])])
+    return np.concatenate(
+        [np.column_stack([first, second, third]), np.column_stack([first, third, fourth])]
+    )
 
 
 def _make_batch(grid: Grid, surface: Floats, light: Floats, height: Floats) -> Any:
@@ -119,7 +126,9 @@ def _make_batch(grid: Grid, surface: Floats, light: Floats, height: Floats) -> A
     corners = np.column_stack([grid.positions, surface]) * bridge.SCALE
     points.attr_fill("pos", np.ascontiguousarray(corners, np.float32))
     points.attr_fill("color", find_colors(light, rise))
-    return gpu.types.GPUBatch(type="TRIS", buf=points, elem=gpu.types.GPUIndexBuf(type="TRIS", seq=chosen))
+    return gpu.types.GPUBatch(
+        type="TRIS", buf=points, elem=gpu.types.GPUIndexBuf(type="TRIS", seq=chosen)
+    )
 
 
 def _draw() -> None:

@@ -10,7 +10,8 @@ from ..strokes.stroke import Place
 
 #: Lean of a pen at full tilt, rad: tablets report up to some 60°.
 FULL_TILT = math.radians(60.0)
-#: Exponent of each curve: a soft pen reaches the set value with a light hand, a firm one with a heavy hand.
+#: Exponent of each curve: a soft pen reaches the set value with a light hand, a firm one with a
+#: heavy hand.
 EXPONENTS = {"SOFT": 0.5, "LINEAR": 1.0, "FIRM": 2.0}
 #: The curves as items of a property in Blender.
 CURVE_ITEMS = (
@@ -34,7 +35,8 @@ def find_lean(tilt: Place, seen: Floats) -> Place:
     size = math.hypot(right, up)
     if not math.isfinite(size) or size == 0.0:
         return 0.0, 0.0
-    # In a level view the upward direction has no part in the plane of the bed; what is square to aside has.
+    # In a level view the upward direction has no part in the plane of the bed; what is square to
+    # aside has.
     aside = seen[:2, 0] if math.hypot(*seen[:2, 0]) > 1e-6 else np.array([seen[1, 1], -seen[0, 1]])
     aside = aside / math.hypot(*aside)
     away = np.array([-aside[1], aside[0]])
@@ -61,7 +63,8 @@ PRESS, RELEASE = ("LEFTMOUSE", "PRESS"), ("LEFTMOUSE", "RELEASE")
 class Button:
     """State of the mouse button in a stroke, derived from events."""
 
-    #: Type and value of the key's or button's event before the press; None until a timer has named it.
+    #: Type and value of the key's or button's event before the press; None until a timer has named
+    #: it.
     before: Named | None
     #: Another key or button has been used since.
     used: bool = False

@@ -66,7 +66,9 @@ def make_label(context: Context, text: str, xy: Place, corner: Place = (0.0, 0.0
     if not (text and np.isfinite(xy).all()):
         return []
     scale = float(context.preferences.system.ui_scale)
-    left, bottom, right, top = np.add(find_free_room(context.area, context.region), 2 * corner).tolist()
+    left, bottom, right, top = np.add(
+        find_free_room(context.area, context.region), 2 * corner
+    ).tolist()
     size = LETTERS * scale
     width = measure(text, size)
     # A text that is wider than the room is drawn smaller.
@@ -101,13 +103,15 @@ def draw_on_bed(
     from ..overlay.draw import cursor
 
     system = context.preferences.system
-    lines = map_paths(lambda places: np.asarray(corner) + bridge.project(context, bed, places), paths)
+    lines = map_paths(
+        lambda places: np.asarray(corner) + bridge.project(context, bed, places), paths
+    )
     shown = [line for line in lines if np.isfinite(line).all()]
     cursor(make_lines(shown, system.pixel_size, color), make_label(context, text, xy, corner))
 
 
-#: Widths from which on a header names popovers in full, and has a button for each brush, in pixels at a
-#: resolution scale of 1.
+#: Widths from which on a header names popovers in full, and has a button for each brush, in pixels
+#: at a resolution scale of 1.
 WIDE, WIDEST = 1000, 1450
 #: Widths of what it holds, in Blender's units of 20 pixels.
 BRUSH, SIZE, AMOUNT, STRENGTH = 4.6, 6.6, 6.6, 5.4
@@ -144,7 +148,9 @@ def draw_header(context: Context, layout: UILayout, settings: OperatorProperties
     if bed is not None:
         kind = find_kind(devices.read_finger(devices.find_first(bed)))
         label = kind.label if kind else "Finger"
-        layout.menu("DIGICLAY_MT_fingers", text=label if wide else "", icon="NONE" if wide else "VIEW_PAN")
+        layout.menu(
+            "DIGICLAY_MT_fingers", text=label if wide else "", icon="NONE" if wide else "VIEW_PAN"
+        )
     layout.popover("DIGICLAY_PT_press_stroke", text="Stroke" if wide else "", icon="CURVE_BEZCURVE")
     layout.popover("DIGICLAY_PT_press_pen", text="Pen" if wide else "", icon="STYLUS_PRESSURE")
     if wide:
@@ -175,7 +181,9 @@ def touch_outline(
     return middle + find_outline(bridge.finger_of(tip), bridge.pose(tip)[3:], depth, brush, layout)
 
 
-def find_outline(finger: Fingertip, turn: Floats, depth: float, brush: Brush, layout: Layout) -> Floats:
+def find_outline(
+    finger: Fingertip, turn: Floats, depth: float, brush: Brush, layout: Layout
+) -> Floats:
     """Return the rim of what a brush would form about the origin at a depth, m, (k, 2), m."""
     radius = find_radius(finger, layout)
     if brush in STAMPS:
@@ -297,7 +305,8 @@ class PressTool(bpy.types.WorkSpaceTool):
         ("digiclay.press_shape", {"type": "LEFTMOUSE", "value": "CLICK_DRAG", "shift": True}, None),
         (OPERATOR, {"type": "LEFTMOUSE", "value": "CLICK_DRAG", "shift": True}, None),
         (OPERATOR, {"type": "LEFTMOUSE", "value": "PRESS", "ctrl": True}, None),
-        # Keys that are pressed or let go while another operator has the events are found by the next move.
+        # Keys that are pressed or let go while another operator has the events are found by the
+        # next move.
         *(
             ("digiclay.press_keys", {"type": kind, "value": "ANY", "any": True}, None)
             for kind in ("LEFT_CTRL", "RIGHT_CTRL", "LEFT_SHIFT", "RIGHT_SHIFT", "MOUSEMOVE")
@@ -330,7 +339,9 @@ def unregister() -> None:
 def take_up(context: Context) -> None:
     """Take the tool in hand in the 3D views of the context's workspace."""
     window = context.window
-    views = [area for area in (context.area, *window.screen.areas) if area and area.type == "VIEW_3D"]
+    views = [
+        area for area in (context.area, *window.screen.areas) if area and area.type == "VIEW_3D"
+    ]
     if views:
         region = next(region for region in views[0].regions if region.type == "WINDOW")
         with context.temp_override(window=window, area=views[0], region=region):

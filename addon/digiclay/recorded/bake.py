@@ -40,7 +40,8 @@ from ..device.node_tree import (
 )
 from ..roles import BAKE, PALM, ROLE, fingertips_of, owner_of
 
-#: The setting that is keyframed: which moment to show, from 0 on; between two of them heights are blended.
+#: The setting that is keyframed: which moment to show, from 0 on; between two of them heights are
+#: blended.
 MOMENT = "Moment"
 
 
@@ -55,7 +56,9 @@ def playback_nodes(bake: Object, moments: int) -> NodeTree:
     moment = number(tree, "MINIMUM", least, float(moments - 1))
     before, after = number(tree, "FLOOR", moment), number(tree, "CEIL", moment)
     part = number(tree, "SUBTRACT", moment, before)
-    count = node(tree, "GeometryNodeAttributeDomainSize", {"Geometry": cells}).outputs["Point Count"]
+    count = node(tree, "GeometryNodeAttributeDomainSize", {"Geometry": cells}).outputs[
+        "Point Count"
+    ]
     pin = node(tree, "GeometryNodeInputIndex").outputs["Index"]
     first = number(tree, "MULTIPLY_ADD", before, count, pin)
     second = number(tree, "MULTIPLY_ADD", after, count, pin)
@@ -101,7 +104,9 @@ def frame_periods(take: Take, rate: float) -> Cells:
     """Return the control period, 0 to t, that each frame of a take shows at a rate, 1/s: the nearest one."""
     period = take.scene.simulation.control_period
     count = int(np.floor(take.duration * rate + 1e-6)) + 1
-    return np.asarray(np.minimum(np.rint(np.arange(count) / (rate * period)), take.periods), np.intp)
+    return np.asarray(
+        np.minimum(np.rint(np.arange(count) / (rate * period)), take.periods), np.intp
+    )
 
 
 def simulate_frames(take: Take, rate: float) -> Iterator[float | BakedFrames]:
@@ -122,7 +127,11 @@ def simulate_frames(take: Take, rate: float) -> Iterator[float | BakedFrames]:
 
 
 def apply(
-    bed: Object, moments: BakedFrames, first: int, fingers: Sequence[Fingertip], numbers: Sequence[int]
+    bed: Object,
+    moments: BakedFrames,
+    first: int,
+    fingers: Sequence[Fingertip],
+    numbers: Sequence[int],
 ) -> None:
     """Give a bed a bake from a frame on, in place of an older one, and some fingertips keyframes."""
     free(bed)
@@ -131,7 +140,9 @@ def apply(
     source = _make_source(moments)
     modifier.node_group = playback_nodes(source, count)
     sources = view.sources_of(bed)
-    if sources is not None:  # as `view.hold_parts` has it: appended, the bed leaves it out of the scene
+    if (
+        sources is not None
+    ):  # as `view.hold_parts` has it: appended, the bed leaves it out of the scene
         sources.objects.link(source)
     bed.modifiers.move(len(bed.modifiers) - 1, 0)
     modifier = bed.modifiers[0]
@@ -188,7 +199,9 @@ def read_rate(scene: Scene) -> float:
     return float(render.fps / render.fps_base)
 
 
-def sample_path(scene: Scene, bed: Object, first: int, last: int, period: float) -> Iterator[float | Floats]:
+def sample_path(
+    scene: Scene, bed: Object, first: int, last: int, period: float
+) -> Iterator[float | Floats]:
     """Read the paths of the fingertips as animated; yield the share done, at last the poses (t + 1, f, 7)."""
     if not 0 < last - first <= MOST_FRAMES:
         rule = f"must have from 1 to {MOST_FRAMES} frames after its first"
@@ -214,7 +227,11 @@ def sample_path(scene: Scene, bed: Object, first: int, last: int, period: float)
 def _modifier(bed: Object) -> Modifier | None:
     """Return the modifier that plays a bake, whatever its name is now, or None."""
     for modifier in bed.modifiers:
-        if modifier.type == "NODES" and modifier.node_group and _source(modifier.node_group) is not None:
+        if (
+            modifier.type == "NODES"
+            and modifier.node_group
+            and _source(modifier.node_group) is not None
+        ):
             return modifier
     return None
 
@@ -223,7 +240,9 @@ def _source(tree: NodeTree) -> Object | None:
     """Return the object that holds the baked pins a tree plays, or None when it plays none."""
     infos = [item for item in tree.nodes if item.bl_idname == "GeometryNodeObjectInfo"]
     sources = (info.inputs["Object"].default_value for info in infos)
-    return next((source for source in sources if source is not None and source.get(ROLE) == BAKE), None)
+    return next(
+        (source for source in sources if source is not None and source.get(ROLE) == BAKE), None
+    )
 
 
 def _curves(bed: Object) -> Iterator[tuple[Any, Any]]:
@@ -231,7 +250,9 @@ def _curves(bed: Object) -> Iterator[tuple[Any, Any]]:
     modifier = _modifier(bed)
     start = f'modifiers["{bpy.utils.escape_identifier(modifier.name)}"]' if modifier else None
     for group in curves(bed):
-        yield from ((group, curve) for curve in group if start and curve.data_path.startswith(start))
+        yield from (
+            (group, curve) for curve in group if start and curve.data_path.startswith(start)
+        )
 
 
 def _make_source(moments: BakedFrames) -> Object:

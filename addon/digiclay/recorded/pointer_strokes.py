@@ -1,7 +1,8 @@
 """Recorded strokes of the Press tool: their file, and their replay in a live session. No Blender.
 
-A file has the bed's name and a table a stroke: what the header of the tool was set to, and the times and
-places of the pointer. What is formed follows from the places; the times say how quick the hand was.
+A file has the bed's name and a table a stroke: what the header of the tool was set to, and the
+times and places of the pointer. What is formed follows from the places; the times say how quick the
+hand was.
 """
 
 import math
@@ -61,20 +62,40 @@ class PointerStroke(Parameters):
     )
     ctrl: bool = quantity(False, "whether Ctrl is held, which inverts the brush")
     depth: float = quantity(4e-3, "depth of Lower", unit="m", at_least=SHALLOWEST, at_most=DEEPEST)
-    height: float = quantity(15e-3, "height of Raise", unit="m", at_least=SHALLOWEST, at_most=DEEPEST)
-    strength: float = quantity(1.0, "share of depth, height or way to the level", above=0.0, at_most=1.0)
+    height: float = quantity(
+        15e-3, "height of Raise", unit="m", at_least=SHALLOWEST, at_most=DEEPEST
+    )
+    strength: float = quantity(
+        1.0, "share of depth, height or way to the level", above=0.0, at_most=1.0
+    )
     path: str = quantity("free", "path between the moves", choices=("free", "line", "ring"))
-    symmetry: str = quantity("none", "mirror images", choices=tuple(name.lower() for name in SYMMETRIES))
-    radial: int = quantity(6, "number of images of a radial symmetry", at_least=FEWEST, at_most=MOST)
+    symmetry: str = quantity(
+        "none", "mirror images", choices=tuple(name.lower() for name in SYMMETRIES)
+    )
+    radial: int = quantity(
+        6, "number of images of a radial symmetry", at_least=FEWEST, at_most=MOST
+    )
     center_x: float = quantity(0.0, "center of the symmetry", unit="m", at_least=-1.0, at_most=1.0)
     center_y: float = quantity(0.0, "center of the symmetry", unit="m", at_least=-1.0, at_most=1.0)
-    axis: float = quantity(0.0, "turn of the mirrors' axes, in degrees", at_least=-360.0, at_most=360.0)
+    axis: float = quantity(
+        0.0, "turn of the mirrors' axes, in degrees", at_least=-360.0, at_most=360.0
+    )
     stamp: str = quantity("heart", "what is stamped: a sample shape's name, or a file")
-    accumulate: bool = quantity(False, "whether a path that comes back counts from what it has left there")
-    stabilizer: float = quantity(0.0, "lag behind the pointer", unit="m", at_least=0.0, at_most=50e-3)
-    length: float = quantity(0.0, "of the fingertip; 0: the bed's", unit="m", at_least=0.0, at_most=0.2)
-    width: float = quantity(0.0, "of the fingertip; 0: the bed's", unit="m", at_least=0.0, at_most=0.2)
-    thickness: float = quantity(0.0, "of the fingertip; 0: the bed's", unit="m", at_least=0.0, at_most=0.2)
+    accumulate: bool = quantity(
+        False, "whether a path that comes back counts from what it has left there"
+    )
+    stabilizer: float = quantity(
+        0.0, "lag behind the pointer", unit="m", at_least=0.0, at_most=50e-3
+    )
+    length: float = quantity(
+        0.0, "of the fingertip; 0: the bed's", unit="m", at_least=0.0, at_most=0.2
+    )
+    width: float = quantity(
+        0.0, "of the fingertip; 0: the bed's", unit="m", at_least=0.0, at_most=0.2
+    )
+    thickness: float = quantity(
+        0.0, "of the fingertip; 0: the bed's", unit="m", at_least=0.0, at_most=0.2
+    )
     moves: tuple[Move, ...] = quantity(((0.0, 0.0, 0.0),), "time, s, and place, m, of the pointer")
 
     def check(self) -> None:
@@ -133,14 +154,23 @@ def read_strokes(path: Path) -> Recorded:
     table = read_table(path)
     try:
         refuse_unknown("", table, (*TEXTS, "stroke"))
-        name, bed = (_read_text(table, key, usual) for key, usual in (("name", path.stem), ("bed", "design")))
+        name, bed = (
+            _read_text(table, key, usual) for key, usual in (("name", path.stem), ("bed", "design"))
+        )
         if bed not in BEDS:
             raise ParameterError("bed", "", f"must be one of {', '.join(BEDS)}", repr(bed))
         given = table.get("stroke", [])
-        if not isinstance(given, list) or not given or not all(isinstance(each, dict) for each in given):
-            raise ParameterError("stroke", "", "must be a list of tables, [[stroke]]", show_value(given))
+        if (
+            not isinstance(given, list)
+            or not given
+            or not all(isinstance(each, dict) for each in given)
+        ):
+            raise ParameterError(
+                "stroke", "", "must be a list of tables, [[stroke]]", show_value(given)
+            )
         strokes = tuple(
-            read_part(f"stroke #{number}", PointerStroke, {}, table) for number, table in enumerate(given, 1)
+            read_part(f"stroke #{number}", PointerStroke, {}, table)
+            for number, table in enumerate(given, 1)
         )
     except ParameterError as error:
         raise SceneError(f"{path}: {error}") from None
@@ -161,7 +191,9 @@ def play_strokes(running: Running, strokes: tuple[PointerStroke, ...]) -> Iterat
     for number, stroke in enumerate(strokes, 1):
         running = _take_finger(running, usual, stroke.size_finger(find_ellipsoid(usual)))
         if stroke.kind.needs_blister and find_tracking(running.scene, running.system) is None:
-            raise StateError(f"Stroke {number} ({stroke.kind.value.lower()}) needs a method with a blister.")
+            raise StateError(
+                f"Stroke {number} ({stroke.kind.value.lower()}) needs a method with a blister."
+            )
         for after in _play(running, stroke, number):
             running = after
             yield running
@@ -192,7 +224,9 @@ def _play(running: Running, stroke: PointerStroke, number: int) -> Iterator[Runn
         running = _tick(running)
         yield running
         if (running.state.period - first) * running.system.period > PATIENCE:
-            raise StateError(f"The fingertip has not finished stroke {number} after {PATIENCE:g} s.")
+            raise StateError(
+                f"The fingertip has not finished stroke {number} after {PATIENCE:g} s."
+            )
 
 
 def _tick(running: Running) -> Running:

@@ -38,7 +38,8 @@ class Entry(NamedTuple):
     #: The user's.
     name: str
     seconds: float
-    #: What its session took, s, and its estimated errors of height, m, and force, N, where they are known.
+    #: What its session took, s, and its estimated errors of height, m, and force, N, where they are
+    #: known.
     effort: tuple[float, ...]
 
 
@@ -47,7 +48,10 @@ def list_takes(bed: Object) -> list[Entry]:
     takes = bed.get(PROPERTY) or {}
     numbers = sorted(takes.keys(), key=int)
     rows = ((number, takes[number]) for number in numbers)
-    return [Entry(number, row["name"], row["seconds"], tuple(row.get("effort", ()))) for number, row in rows]
+    return [
+        Entry(number, row["name"], row["seconds"], tuple(row.get("effort", ())))
+        for number, row in rows
+    ]
 
 
 def find(bed: Object, number: str = "") -> Entry:
@@ -74,7 +78,11 @@ def add(bed: Object, take: Take, name: str = "", session: Running | None = None)
         bed[PROPERTY] = {}
     takes = bed[PROPERTY]
     number = str(max(map(int, takes.keys()), default=0) + 1)
-    takes[number] = {"name": name or f"Take {number}", "seconds": take.duration, "data": to_bytes(take)}
+    takes[number] = {
+        "name": name or f"Take {number}",
+        "seconds": take.duration,
+        "data": to_bytes(take),
+    }
     if session:
         takes[number]["fingers"] = bytes(session.numbers)
         takes[number]["effort"] = [take.periods * session.clock.cost, *(session.errors or ())[:2]]
@@ -99,7 +107,11 @@ def read(bed: Object, number: str = "") -> Take:
 def list_fingers(bed: Object, number: str, count: int) -> tuple[int, ...]:
     """Return the numbers of so many fingertips of a take; where it has none, those of the bed, if as many."""
     kept = bed[PROPERTY][find(bed, number).number].get("fingers")
-    every = (kept if isinstance(kept, bytes) else b"", tuple(fingertips_of(bed)), range(1, count + 1))
+    every = (
+        kept if isinstance(kept, bytes) else b"",
+        tuple(fingertips_of(bed)),
+        range(1, count + 1),
+    )
     return next(tuple(numbers) for numbers in every if len(numbers) == count)
 
 

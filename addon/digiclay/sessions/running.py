@@ -35,8 +35,9 @@ class Running(LiveSession):
     #: `session_uid` of the bed, and its name for messages.
     uid: int
     name: str
-    #: Numbers of the fingertips, in the order of `poses`: they keep theirs when others come or go. Behind
-    #: them, in `system` and `poses`, are those that a stroke has for its images, see `names`.
+    #: Numbers of the fingertips, in the order of `poses`: they keep theirs when others come or go.
+    #: Behind them, in `system` and `poses`, are those that a stroke has for its images, see
+    #: `names`.
     numbers: tuple[int, ...] = (1,)
     #: The state by `core.session.snapshot`; also in the bed's property.
     snapshot: bytes
@@ -48,12 +49,13 @@ class Running(LiveSession):
     paused: bool = False
     #: Why the session waits although it is not paused; empty: it does not.
     blocking_reason: str = ""
-    #: Ticks until the session takes up the state that undo or redo has put into the bed; 0: there is none.
+    #: Ticks until the session takes up the state that undo or redo has put into the bed; 0: there
+    #: is none.
     stale: int = 0
     #: Single control periods requested while paused.
     steps: int = 0
-    #: The last gestures, oldest first, those that were taken back since the last one, and the one that begins
-    #: if the fingertip touches.
+    #: The last gestures, oldest first, those that were taken back since the last one, and the one
+    #: that begins if the fingertip touches.
     gestures: tuple[Gesture, ...] = ()
     undone: tuple[Gesture, ...] = ()
     next_gesture: Moment | None = None
@@ -61,8 +63,8 @@ class Running(LiveSession):
     rest_time: float = 0.0
     #: Number of the take that holds the recording while the file is saved; empty otherwise.
     saved_take: str = ""
-    #: Unfinished strokes of the Press tool, oldest first: the fingertip moves along these, wherever Blender
-    #: has it.
+    #: Unfinished strokes of the Press tool, oldest first: the fingertip moves along these, wherever
+    #: Blender has it.
     strokes: tuple[Stroke, ...] = ()
     #: Where the first of them began.
     stroke_start: Moment | None = None
@@ -95,10 +97,14 @@ def name_fingers(numbers: tuple[int, ...], count: int) -> tuple[int, ...]:
     return (*numbers, *range(OWN, OWN + count - len(numbers)))
 
 
-def match_poses(poses: Floats, was: tuple[int, ...], others: Floats, numbers: tuple[int, ...]) -> Floats:
+def match_poses(
+    poses: Floats, was: tuple[int, ...], others: Floats, numbers: tuple[int, ...]
+) -> Floats:
     """Return the poses (f, 7) of fingertips, by number: those they had, or else those of others (f, 7)."""
     places = zip(numbers, others, strict=True)
-    return np.array([poses[was.index(number)] if number in was else other for number, other in places])
+    return np.array(
+        [poses[was.index(number)] if number in was else other for number, other in places]
+    )
 
 
 @dataclass

@@ -36,15 +36,16 @@ GESTURES, GESTURE_BYTES = 20, 200_000_000
 CHANGED = "Only the heights were kept: the bed's parts or its method have changed"
 #: A fingertip that moves on after resting so long makes another gesture, s.
 REST = 0.5
-#: Control periods of a queue that are simulated at a time, and between two estimates of the error: so many
-#: go by in a second that one as often as under a hand takes a quarter of the time.
+#: Control periods of a queue that are simulated at a time, and between two estimates of the error:
+#: so many go by in a second that one as often as under a hand takes a quarter of the time.
 CHUNK, PAUSE = 16, 10 * accuracy.PAUSE
 #: Time between two ticks, s, unless told.
 INTERVAL = 1.0 / 30.0
 #: Numbers of fingertips.
 Numbers = tuple[int, ...]
-#: A finger that is read this near to where it was has not moved, m and parts of a quaternion: one that is put
-#: to a pose comes back from Blender's 32 bits, on a bed 100 units from the origin, by 1e-6 m beside it.
+#: A finger that is read this near to where it was has not moved, m and parts of a quaternion: one
+#: that is put to a pose comes back from Blender's 32 bits, on a bed 100 units from the origin, by
+#: 1e-6 m beside it.
 STILL = 2e-6
 
 
@@ -60,14 +61,16 @@ def begin_session(
 ) -> tuple[Running, str]:
     """Begin a session from a snapshot, at rest without one; return it, and what of the snapshot was lost.
 
-    `numbers`: of the fingertips, behind those of the scene others like its first one; `was`: of those that
-    the snapshot has.
+    `numbers`: of the fingertips, behind those of the scene others like its first one; `was`: of
+    those that the snapshot has.
     """
     fingers = len(scene.fingers)
     numbers = numbers or tuple(range(1, fingers + 1))
     whole = scene.with_fingers(len(numbers))
     system = assemble(whole)
-    state, lost = _load_state(system, _change_fingers(scene, system, stored, was or numbers, numbers))
+    state, lost = _load_state(
+        system, _change_fingers(scene, system, stored, was or numbers, numbers)
+    )
     poses = live_session.clamp_pose(pose.reshape(-1, 7), system.cell.actuator.stroke)
     now = snapshot.dump(system, state)
     running = Running(
@@ -131,7 +134,9 @@ def advance(
     Strokes do not wait for the clock: they take a share of the `interval` between two ticks, s.
     """
     if pins is not None:
-        running = replace(running, trace=recent_trace.pick(running.trace, pins, running.system.grid.count))
+        running = replace(
+            running, trace=recent_trace.pick(running.trace, pins, running.system.grid.count)
+        )
     running = replace(running, tick=running.tick + 1)
     if running.strokes and not running.paused:
         least = live_session.LEAST if running.strokes[-1].held else live_session.RELEASED
@@ -139,14 +144,21 @@ def advance(
     if running.paused:
         count, clock = running.steps, running.clock.stopped()
     else:
-        count, clock = live_session.periods_due(running.clock, now, running.system.period, most, moment)
+        count, clock = live_session.periods_due(
+            running.clock, now, running.system.period, most, moment
+        )
     running = replace(running, clock=clock, steps=0)
     return follow_finger(running, pose, count) if count else running
 
 
 def _work_off(running: Running, now: float, spare: float) -> Running:
     """Simulate strokes for a wall time, s, until one is finished or waits for the hand."""
-    finished, first, started, spent = running.finished_strokes, running.state.period, time.perf_counter(), 0.0
+    finished, first, started, spent = (
+        running.finished_strokes,
+        running.state.period,
+        time.perf_counter(),
+        0.0,
+    )
     while running.finished_strokes == finished:
         cost = running.clock.cost
         count = int((spare - spent) / cost) if cost > 0.0 else 1
@@ -193,7 +205,9 @@ def _end_stroke(running: Running, stroke: Stroke) -> Running:
     """Note where a stroke has ended, so that redo brings it back as it stands."""
     running, start = _pack(replace(running, stroke_start=None)), running.stroke_start
     *earlier, last = running.gestures or (None,)
-    if last is None or start is None or last.snapshot is not start.snapshot:  # it has touched nothing
+    if (
+        last is None or start is None or last.snapshot is not start.snapshot
+    ):  # it has touched nothing
         return running
     return replace(
         running, gestures=(*earlier, replace(last, stroke=drawn.dump(stroke), end=running.standing))
@@ -224,7 +238,9 @@ def _give_fingers(running: Running, count: int) -> Running:
     recording = running.recording and running.recording.let_in(poses)
     monitor = accuracy.restart(running.monitor, scene)
     return _pack(
-        replace(running, system=system, state=state, poses=poses, recording=recording, monitor=monitor)
+        replace(
+            running, system=system, state=state, poses=poses, recording=recording, monitor=monitor
+        )
     )
 
 
@@ -254,7 +270,10 @@ def _mark_gesture_start(running: Running, poses: Floats, count: int) -> Running:
     moved = float(np.abs(poses - running.poses).max()) > STILL
     rest_time = 0.0 if moved else running.rest_time + count * running.system.period
     next_gesture = running.next_gesture
-    free = next_gesture is None and recent_trace.measure_total_force(running.system, running.state) == 0.0
+    free = (
+        next_gesture is None
+        and recent_trace.measure_total_force(running.system, running.state) == 0.0
+    )
     if free or (moved and running.rest_time >= REST):
         next_gesture = _mark(running)
     return replace(running, rest_time=rest_time, next_gesture=next_gesture)
@@ -262,7 +281,9 @@ def _mark_gesture_start(running: Running, poses: Floats, count: int) -> Running:
 
 def _mark(running: Running) -> live_session.Moment:
     """Return the moment before the tick that is being simulated."""
-    return live_session.Moment(running.state.period, running.snapshot, running.poses, running.tick - 1)
+    return live_session.Moment(
+        running.state.period, running.snapshot, running.poses, running.tick - 1
+    )
 
 
 def _count_gesture(running: Running, *, ordered: bool) -> Running:
@@ -270,20 +291,31 @@ def _count_gesture(running: Running, *, ordered: bool) -> Running:
     touched = ordered or recent_trace.measure_total_force(running.system, running.state) > 0.0
     if running.next_gesture is None or not touched:
         return running
-    begun, room = running.next_gesture, max(1, min(GESTURES, GESTURE_BYTES // len(running.snapshot)))
+    begun, room = (
+        running.next_gesture,
+        max(1, min(GESTURES, GESTURE_BYTES // len(running.snapshot))),
+    )
     gesture = Gesture(begun.period, begun.snapshot, begun.poses, begun.tick)
-    return replace(running, gestures=(*running.gestures, gesture)[-room:], undone=(), next_gesture=None)
+    return replace(
+        running, gestures=(*running.gestures, gesture)[-room:], undone=(), next_gesture=None
+    )
 
 
 def restore(
-    running: Running, stored: bytes | None, poses: Floats, tick: int | None = None, was: Numbers | None = None
+    running: Running,
+    stored: bytes | None,
+    poses: Floats,
+    tick: int | None = None,
+    was: Numbers | None = None,
 ) -> Running:
     """Return the session with another snapshot, None: at rest; a recording is cut at `tick`, or ends.
 
     `was`: numbers of the fingertips of the snapshot, unless they are those of the session.
     """
     poses = poses.reshape(-1, 7)
-    if len(running.poses) > len(running.numbers):  # a stroke that is taken back takes its fingertips along
+    if len(running.poses) > len(
+        running.numbers
+    ):  # a stroke that is taken back takes its fingertips along
         system = assemble(running.scene)
         monitor = running.monitor and accuracy.start(running.scene)
         session_poses = running.poses[: len(running.numbers)]
@@ -343,7 +375,9 @@ def change_scene(
         had = name_fingers(was, len(moment.poses))
         stored = _change_fingers(scene, plain, moment.snapshot, had, numbers)
         assert stored is not None
-        return replace(moment, snapshot=stored, poses=match_poses(moment.poses, had, others, numbers))
+        return replace(
+            moment, snapshot=stored, poses=match_poses(moment.poses, had, others, numbers)
+        )
 
     plain = assemble(scene) if images else other.system
     # The end of a stroke was formed with the former parameters: it cannot be restored.
@@ -352,8 +386,18 @@ def change_scene(
         carried: dict[str, Any] = {name: tuple(some if numbers == was else map(change, some))}
         running = replace(running, **carried)
     if numbers != was:
-        running = replace(running, stroke_start=running.stroke_start and change(running.stroke_start))
-    names = ["clock", "paused", "blocking_reason", "stale", "begun_strokes", "finished_strokes", "last_place"]
+        running = replace(
+            running, stroke_start=running.stroke_start and change(running.stroke_start)
+        )
+    names = [
+        "clock",
+        "paused",
+        "blocking_reason",
+        "stale",
+        "begun_strokes",
+        "finished_strokes",
+        "last_place",
+    ]
     names += [] if lost else ["gestures", "undone", "strokes", "stroke_start"]
     if lost:
         other = _give_fingers(other, 1)
@@ -375,7 +419,9 @@ def rewind(running: Running) -> Running:
     if not running.gestures:
         return running
     *earlier, last = running.gestures
-    return restore_gesture(replace(running, gestures=tuple(earlier), undone=(*running.undone, last)), last)
+    return restore_gesture(
+        replace(running, gestures=tuple(earlier), undone=(*running.undone, last)), last
+    )
 
 
 def withdraw_stroke(running: Running) -> Running:
@@ -394,8 +440,8 @@ def restore_gesture(running: Running, gesture: live_session.Moment) -> Running:
     # The gesture a reset leaves behind has periods of another count.
     if keep is not None:
         keep = keep.cut_at_period(gesture.period) if gesture.period == back.state.period else None
-    # A fingertip that touched there already has to move on before it makes another gesture: it would be
-    # counted at once, and hide those before it for ever.
+    # A fingertip that touched there already has to move on before it makes another gesture: it
+    # would be counted at once, and hide those before it for ever.
     next_gesture = gesture if back.next_gesture is not None else None
     return replace(back, next_gesture=next_gesture, rest_time=REST, recording=keep)
 
@@ -409,7 +455,9 @@ def reset(running: Running) -> Running:
     poses = running.poses.copy()
     poses[:, 2] = np.maximum(poses[:, 2], running.system.cell.actuator.rest_height + CLEARANCE)
     back = restore(replace(running, gestures=(), undone=undone), None, poses, tick=-1)
-    return replace(back, gestures=(before,), trace=replace(back.trace, rows=back.trace.rows[:0]), errors=None)
+    return replace(
+        back, gestures=(before,), trace=replace(back.trace, rows=back.trace.rows[:0]), errors=None
+    )
 
 
 def queue_stroke(running: Running, stroke: Stroke) -> tuple[Running, int]:
@@ -434,7 +482,9 @@ def last_place(running: Running) -> Place | None:
 
 def change_stroke(running: Running, number: int, change: Callable[[Stroke], Stroke]) -> Running:
     """Return the session with one of its strokes changed, if it still has it."""
-    strokes = tuple(change(stroke) if stroke.number == number else stroke for stroke in running.strokes)
+    strokes = tuple(
+        change(stroke) if stroke.number == number else stroke for stroke in running.strokes
+    )
     return replace(running, strokes=strokes)
 
 
@@ -451,14 +501,16 @@ def drop_strokes(running: Running) -> Running:
 def take_path(running: Running, count: int) -> tuple[Running, Floats, Orders | None]:
     """Return the session, and paths (k + 1, m, 7), k <= count, and orders of its first stroke.
 
-    The paths are of the first fingertips of `list_pressing`. They end where the stroke waits for the hand:
-    the clay stands still meanwhile.
+    The paths are of the first fingertips of `list_pressing`. They end where the stroke waits for
+    the hand: the clay stands still meanwhile.
     """
     stroke = running.strokes[0]
     if stroke.height is None:
         running = replace(running, next_gesture=_mark(running), stroke_start=_mark(running))
         if stroke.brush not in WHOLE:
-            tracking = None if stroke.brush in SWEEPS else find_tracking(running.scene, running.system)
+            tracking = (
+                None if stroke.brush in SWEEPS else find_tracking(running.scene, running.system)
+            )
             stroke = begin_stroke(stroke, running.state.row(0), running.pose[3:], tracking)
     running = _give_fingers(running, len(stroke.parts))
     stroke, path, orders = _advance(running, stroke, count)
@@ -468,7 +520,9 @@ def take_path(running: Running, count: int) -> tuple[Running, Floats, Orders | N
     if stroke.done:
         end = stroke.samples[-1]
         finished = running.finished_strokes + 1
-        running = replace(running, strokes=left[1:], finished_strokes=finished, last_place=(end.x, end.y))
+        running = replace(
+            running, strokes=left[1:], finished_strokes=finished, last_place=(end.x, end.y)
+        )
     return running, path, orders
 
 
@@ -482,7 +536,12 @@ def find_device(running: Running) -> Device:
 
 def _advance(running: Running, stroke: Stroke, count: int) -> tuple[Stroke, Floats, Orders | None]:
     """Advance fingertips along a stroke; return it, the paths (k + 1, 7) or (k + 1, m, 7), and the orders."""
-    state, pose, period, device = running.state, running.pose, running.system.period, find_device(running)
+    state, pose, period, device = (
+        running.state,
+        running.pose,
+        running.system.period,
+        find_device(running),
+    )
     if stroke.brush in WHOLE:
         return order_all(stroke, pose)
     arrived = stroke.phase == FINISHING and live_session.has_arrived(state)

@@ -20,8 +20,8 @@ def take_up(
 ) -> Running:
     """Return the session with what undo or redo has put into its bed, as `restore`.
 
-    `ticks`: of its gestures. `lines`: strokes to be formed from there, by `strokes.drawn`. Those that the
-    session has formed so stand at once, and the one that it is forming goes on.
+    `ticks`: of its gestures. `lines`: strokes to be formed from there, by `strokes.drawn`. Those
+    that the session has formed so stand at once, and the one that it is forming goes on.
     """
     gestures = {gesture.tick: gesture for gesture in (*running.undone, *running.gestures)}
     formed: dict[tuple[str, bytes | None], tuple[Gesture, Moment]] = {

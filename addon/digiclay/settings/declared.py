@@ -17,8 +17,9 @@ from .shown_units import to_shown, to_si, unit_of
 
 #: What Blender's whole numbers hold at most.
 INT_MAX = 2**31 - 1
-#: How far inside a bound that is not allowed itself a property ends, as a share of the default; no nearer
-#: than numbers of the unit can be, by the same share of those, since Blender's numbers are rounded.
+#: How far inside a bound that is not allowed itself a property ends, as a share of the default; no
+#: nearer than numbers of the unit can be, by the same share of those, since Blender's numbers are
+#: rounded.
 INSIDE = 1e-6
 #: How many times the default dragging the mouse reaches; typing reaches all of the range.
 REACH = 10.0
@@ -47,7 +48,9 @@ text = _named(bpy.props.StringProperty)
 
 def group(name: str, kind: type[Parameters], updates: dict[str, Update]) -> type:
     """Make the property group of a part; `updates` of its fields are called with group and context."""
-    properties = {field.name: _property(field, updates.get(field.name)) for field in dataclasses.fields(kind)}
+    properties = {
+        field.name: _property(field, updates.get(field.name)) for field in dataclasses.fields(kind)
+    }
     return make_group(name, kind.__doc__ or "", properties)
 
 
@@ -147,9 +150,13 @@ def _tooltip(quantity: Quantity, default: object, unit: str, power: int) -> str:
 
     parts = [quantity.doc[0].upper() + quantity.doc[1:]]
     parts += [f"symbol {quantity.symbol}"] if quantity.symbol else []
-    parts += [f"{word.replace('_', ' ')} {value(number)}" for word, number in quantity.list_bounds()]
+    parts += [
+        f"{word.replace('_', ' ')} {value(number)}" for word, number in quantity.list_bounds()
+    ]
     if isinstance(default, tuple):
-        parts.append(f"separated by commas, by default {format_list(default, power)} {unit}".rstrip())
+        parts.append(
+            f"separated by commas, by default {format_list(default, power)} {unit}".rstrip()
+        )
     elif isinstance(default, (int, float)):
         parts.append(f"by default {value(default)}")
     return "; ".join(parts)
@@ -197,7 +204,9 @@ def fill(
         assign(group, kind, name, values.get(name, fields[name].default))
 
 
-def read(group: PropertyGroup, kind: type[Parameters], notes: Notes, section: str) -> dict[str, Any]:
+def read(
+    group: PropertyGroup, kind: type[Parameters], notes: Notes, section: str
+) -> dict[str, Any]:
     """Return a part's parameters in SI, as a scene file's section would give them."""
     values = {}
     for name, field in _fields(kind).items():
@@ -206,7 +215,9 @@ def read(group: PropertyGroup, kind: type[Parameters], notes: Notes, section: st
         try:
             values[name] = noted[1] if noted and noted[0] == stored else _meant(stored, field)
         except InvalidOperation:
-            raise ParameterError(section, name, "must be numbers separated by commas", repr(stored)) from None
+            raise ParameterError(
+                section, name, "must be numbers separated by commas", repr(stored)
+            ) from None
     return values
 
 
@@ -223,5 +234,7 @@ def _power(field: dataclasses.Field[Any]) -> int:
 def _meant(stored: Any, field: dataclasses.Field[Any]) -> Any:
     """Return the value a property stands for."""
     if isinstance(field.default, tuple):
-        return tuple(float(Decimal(word.strip()).scaleb(-_power(field))) for word in stored.split(","))
+        return tuple(
+            float(Decimal(word.strip()).scaleb(-_power(field))) for word in stored.split(",")
+        )
     return to_si(stored, _power(field)) if isinstance(stored, float) else stored

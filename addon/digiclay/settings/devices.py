@@ -54,7 +54,8 @@ BEDS = {
         "design", "hybrid",
     ),
 }  # fmt: skip
-#: Bed that Add makes by hand unless another is chosen: a letter can be read on it (docs/gallery.md).
+#: Bed that Add makes by hand unless another is chosen: a letter can be read on it
+#: (docs/gallery.md).
 FIRST = "design"
 #: Bed that Add makes in a script that names none, as before there were several.
 UNNAMED = "paper"
@@ -68,8 +69,8 @@ LENGTHS = ("radius", "edge_radius", "flat_radius", "sigma")
 
 def make_scene(preset: str, layout: Layout, method: str, share: float = 1.0) -> Scene:
     """Return the scene of a preset, with another plan of the bed, method and size of the fingertip."""
-    # In Method I the blister rises from each cell's own height: the paper's strokes do not cross, those of a
-    # sculptor do.
+    # In Method I the blister rises from each cell's own height: the paper's strokes do not cross,
+    # those of a sculptor do.
     control = {"layout": {"arrangement": layout.arrangement}, "control": {"method": method}}
     if preset in PRESETS:
         scene = resolve({"preset": preset, **control})
@@ -113,11 +114,13 @@ def _scale_finger(scene: Scene, share: float) -> Scene:
 
 def _scale_tip(finger: Finger, share: float) -> Finger:
     """Return a fingertip with a tip of another size, of the same pulp."""
-    # As many pins as before are under it, and each has a smaller area: its share of the law of a flat plate
-    # goes with the square of the size.
+    # As many pins as before are under it, and each has a smaller area: its share of the law of a
+    # flat plate goes with the square of the size.
     tip, contact = finger.fingertip, finger.contact
     if tip is not None:
-        tip = replace(tip, length=tip.length * share, width=tip.width * share, height=tip.height * share)
+        tip = replace(
+            tip, length=tip.length * share, width=tip.width * share, height=tip.height * share
+        )
     if contact is not None:
         contact = replace(contact, share=contact.share * share**2)
     return replace(finger, fingertip=tip, contact=contact)
@@ -125,16 +128,25 @@ def _scale_tip(finger: Finger, share: float) -> Finger:
 
 def _scale_control(control: ControlParameters, share: float) -> ControlParameters:
     """Return a control for a fingertip of another size, on pins of another bore, behind the same valves."""
-    # The pins' areas go with the square of the size: so do all forces, and the pins' speeds with its inverse.
-    # The flow goes with the square of the opening, which is the gain times the force. So a gain that goes
-    # with the inverse of the size leaves the fingertip's speed at a given share of the set point what it was.
-    # Heights are those of the clay, and stay. The skirt is made for drags faster by as much as the pins.
-    factors = {"N": share**2, "N/m": share**2, "N s/m": share**2, "1/N": 1.0 / share, "m2/s": share**2}
+    # The pins' areas go with the square of the size: so do all forces, and the pins' speeds with
+    # its inverse. The flow goes with the square of the opening, which is the gain times the force.
+    # So a gain that goes with the inverse of the size leaves the fingertip's speed at a given share
+    # of the set point what it was. Heights are those of the clay, and stay. The skirt is made for
+    # drags faster by as much as the pins.
+    factors = {
+        "N": share**2,
+        "N/m": share**2,
+        "N s/m": share**2,
+        "1/N": 1.0 / share,
+        "m2/s": share**2,
+    }
     quantities = list_quantities(control)
     change = {name: factors[kind.unit] for name, kind in quantities.items() if kind.unit in factors}
     change |= {name: share for name in ("radius", "travel", "jump") if name in quantities}
     change |= {"skirt_speed": share**-2} if "skirt_speed" in quantities else {}
-    return replace(control, **{name: getattr(control, name) * factor for name, factor in change.items()})
+    return replace(
+        control, **{name: getattr(control, name) * factor for name, factor in change.items()}
+    )
 
 
 def fit_blister(blister: Blister, layout: Layout) -> Blister:
@@ -150,7 +162,8 @@ def scale_blister(blister: Blister, share: float) -> Blister:
     return replace(blister, **{name: share * getattr(blister, name) for name in LENGTHS})
 
 
-#: Least and largest size, m: narrower than that a fingertip falls between pins, wider than that no hand is.
+#: Least and largest size, m: narrower than that a fingertip falls between pins, wider than that no
+#: hand is.
 SMALLEST, LARGEST = 1e-3, 0.2
 
 
@@ -185,7 +198,9 @@ def find_first(owner: Object) -> PropertyGroup:
 def list_settings(bed: Object) -> tuple[PropertyGroup, ...]:
     """Return the settings that hold the parts of each finger: the bed's of the first, the others' own."""
     tips = fingertips_of(bed).items()
-    return tuple(bed.digiclay if number == 1 else tip.digiclay for number, tip in tips) or (bed.digiclay,)
+    return tuple(bed.digiclay if number == 1 else tip.digiclay for number, tip in tips) or (
+        bed.digiclay,
+    )
 
 
 def find_tip(owner: Object) -> Object | None:
@@ -249,8 +264,8 @@ def suit_blister(settings: PropertyGroup) -> None:
 
 def _scale_blister(settings: PropertyGroup, before: Fingertip, after: Fingertip) -> None:
     """Scale the blister with the width of the fingertip, no wider than the bed."""
-    # One that the bed has limited remembers the width of the fingertip that it suits, so that a palm and then
-    # a fingertip again leave it as it was.
+    # One that the bed has limited remembers the width of the fingertip that it suits, so that a
+    # palm and then a fingertip again leave it as it was.
     blister = Blister(**read(settings.blister, Blister, {}, "blister"))
     layout = Layout(**read(settings.layout, Layout, {}, "layout"))
     limited = settings.blister_suits > 0.0 and fit_blister(
@@ -259,6 +274,8 @@ def _scale_blister(settings: PropertyGroup, before: Fingertip, after: Fingertip)
     suited = 1e-3 * settings.blister_suits if limited else before.width
     wanted = scale_blister(blister, after.width / suited)
     fitted = fit_blister(wanted, layout)
-    settings.blister_suits = 1e3 * after.width * fitted.radius / wanted.radius if fitted != wanted else 0.0
+    settings.blister_suits = (
+        1e3 * after.width * fitted.radius / wanted.radius if fitted != wanted else 0.0
+    )
     for name in LENGTHS:
         assign(settings.blister, Blister, name, getattr(fitted, name))

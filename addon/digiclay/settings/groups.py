@@ -14,7 +14,19 @@ from ..core.scene.schema import NEEDS, OPTIONAL, SECTIONS, UNASKED, import_param
 from ..core.scene.toml_table import PRESETS
 from ..ui_text import localize
 from . import devices
-from .declared import WHOLE, Update, choice, fill, flag, group, make_group, number, text, title, whole
+from .declared import (
+    WHOLE,
+    Update,
+    choice,
+    fill,
+    flag,
+    group,
+    make_group,
+    number,
+    text,
+    title,
+    whole,
+)
 
 #: Blender keeps no reference to the texts of a list that is made on demand: this one does.
 OFFERED: list[tuple[str, str, str, int]] = []
@@ -131,14 +143,19 @@ def method_items() -> list[tuple[str, str, str]]:
         name: importlib.import_module(f"..core.{method.module}", __package__).__doc__ or ""
         for name, method in METHODS.items()
     }
-    return [(name, title(name), text.partition("\n")[0].removesuffix(".")) for name, text in words.items()]
+    return [
+        (name, title(name), text.partition("\n")[0].removesuffix("."))
+        for name, text in words.items()
+    ]
 
 
 def use_properties() -> dict[str, Any]:
     """Return a switch for every part a scene may leave out."""
     switches = {}
     for section in OPTIONAL:
-        along = [other for other, needed in NEEDS.items() if needed == section and other not in OPTIONAL]
+        along = [
+            other for other, needed in NEEDS.items() if needed == section and other not in OPTIONAL
+        ]
         words = " and ".join([title(section).lower(), *(title(other).lower() for other in along)])
         switches[f"use_{section}"] = flag(
             title(section),
@@ -150,7 +167,10 @@ def use_properties() -> dict[str, Any]:
 
 def pointers(groups: dict[str, type]) -> dict[str, Any]:
     """Return a pointer to each group."""
-    return {name: bpy.props.PointerProperty(type=kind, name=title(name)) for name, kind in groups.items()}
+    return {
+        name: bpy.props.PointerProperty(type=kind, name=title(name))
+        for name, kind in groups.items()
+    }
 
 
 def whole_axis(field: dataclasses.Field[Any]) -> Any:
@@ -181,15 +201,21 @@ SETTINGS = make_group(
             items=[(name, title(name), PRESET_WORDS.get(name, "")) for name in PRESETS],
             update=take_preset,
         ),
-        "method": choice(**METHOD, items=method_items(), default="virtual_master", update=take_method),
+        "method": choice(
+            **METHOD, items=method_items(), default="virtual_master", update=take_method
+        ),
         "own_method": bpy.props.StringProperty(options={"HIDDEN"}, update=take_blister),
         "chosen_method": choice(**METHOD, items=list_offered, get=place_of, set=choose),
-        "own_preset": text("Own Preset", "The custom preset that was applied last", options={"HIDDEN"}),
+        "own_preset": text(
+            "Own Preset", "The custom preset that was applied last", options={"HIDDEN"}
+        ),
         "size": number(
             "Size (mm)",
             "Width of the fingertip, in mm; its length and height change in proportion",
             get=lambda settings: 1e3 * devices.read_size(devices.find_first(settings.id_data)),
-            set=lambda settings, value: devices.set_size(devices.find_first(settings.id_data), 1e-3 * value),
+            set=lambda settings, value: devices.set_size(
+                devices.find_first(settings.id_data), 1e-3 * value
+            ),
             min=1e3 * devices.SMALLEST,
             max=1e3 * devices.LARGEST,
             soft_max=60.0,

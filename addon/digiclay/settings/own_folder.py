@@ -14,7 +14,8 @@ from .groups import CONTROL, name_pointer
 #: Refusal of a folder whose place depends on the file that is open.
 RELATIVE = "Own Methods must be a full path (got {!r}): choose the folder again, after the .blend was saved."
 
-#: What is loaded, and the groups of the methods' parameters; Blender's classes are of the process as well.
+#: What is loaded, and the groups of the methods' parameters; Blender's classes are of the process
+#: as well.
 _present = FolderMethods()
 _GROUPS: dict[str, type] = {}
 
@@ -48,9 +49,16 @@ def load(folder: str) -> None:
     for name in loaded.names:
         try:
             _register_group(name)
-        except (TypeError, ValueError, RuntimeError, OverflowError) as error:  # what Blender cannot hold
+        except (
+            TypeError,
+            ValueError,
+            RuntimeError,
+            OverflowError,
+        ) as error:  # what Blender cannot hold
             remove_method(name)
-            refused.append(f"{name}: Blender must be able to hold its parameters (got {one_line(error)}).")
+            refused.append(
+                f"{name}: Blender must be able to hold its parameters (got {one_line(error)})."
+            )
         else:
             names.append(name)
     _present = FolderMethods(tuple(names), tuple(refused))

@@ -49,11 +49,13 @@ def relabel(error: ParameterError, numbers: Sequence[int]) -> ParameterError:
 def _known(section: str) -> set[str]:
     """Return the names of a section's parameters."""
     methods = list_methods() if section == "control" else ("virtual_master",)
-    return {name for method in methods for name in list_quantities(import_parameters(section, method))}
+    return {
+        name for method in methods for name in list_quantities(import_parameters(section, method))
+    }
 
 
-#: How far a pin may stand from its place before the bed counts as another one, m: more than 32 bits lose on
-#: a bed of meters, less than any change of pitch worth making.
+#: How far a pin may stand from its place before the bed counts as another one, m: more than 32 bits
+#: lose on a bed of meters, less than any change of pitch worth making.
 AWAY = 1e-6
 
 
@@ -73,7 +75,9 @@ class StoredSettings(NamedTuple):
 def read_stored_settings(bed: Object) -> StoredSettings:
     """Return what `read_scene` makes the scene of, in a small part of its time."""
     tips = fingertips_of(bed).items()
-    fingers = tuple((number, read_stored(tip, "digiclay") if number > 1 else {}) for number, tip in tips)
+    fingers = tuple(
+        (number, read_stored(tip, "digiclay") if number > 1 else {}) for number, tip in tips
+    )
     return StoredSettings(bed.name, bpy.data.filepath, read_stored(bed, "digiclay"), fingers)
 
 
@@ -83,8 +87,13 @@ def scene_of(bed: Object) -> Scene:
     reason = find_layout_mismatch(bed, scene.layout)
     if reason:
         plan = scene.layout
-        rule, remedy = "must be that of the bed's pins", f"{reason}: press Rebuild in Laboratory > Device."
-        raise ParameterError("Layout", "", rule, f"{plan.rows} x {plan.columns}, {plan.arrangement}", remedy)
+        rule, remedy = (
+            "must be that of the bed's pins",
+            f"{reason}: press Rebuild in Laboratory > Device.",
+        )
+        raise ParameterError(
+            "Layout", "", rule, f"{plan.rows} x {plan.columns}, {plan.arrangement}", remedy
+        )
     return scene
 
 
@@ -106,9 +115,15 @@ def table_of(bed: Object) -> Record:
     each = devices.list_settings(bed)
     fingers: list[Record] = [{} for _ in each]
     for section in SECTIONS:
-        holders = zip(each, fingers, strict=True) if section in FINGER_PARTS else [(settings, table)]
+        holders = (
+            zip(each, fingers, strict=True) if section in FINGER_PARTS else [(settings, table)]
+        )
         for row, (holder, part) in enumerate(holders, 1):
-            owner = f"{FINGERS} #{row}.{section}" if section in FINGER_PARTS and len(each) > 1 else section
+            owner = (
+                f"{FINGERS} #{row}.{section}"
+                if section in FINGER_PARTS and len(each) > 1
+                else section
+            )
             if section in OPTIONAL and not getattr(settings, f"use_{section}"):
                 part[section] = ABSENT
             elif NEEDS.get(section) and not getattr(settings, f"use_{NEEDS[section]}"):
@@ -145,7 +160,8 @@ def write_scene(bed: Object, scene: Scene) -> None:
         if holder != settings:
             given = {section: part for section, part in parts.items() if part is not None}
             _keep_notes(
-                holder, {section: write(getattr(holder, section), part) for section, part in given.items()}
+                holder,
+                {section: write(getattr(holder, section), part) for section, part in given.items()},
             )
 
 

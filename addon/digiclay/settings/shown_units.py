@@ -38,8 +38,8 @@ def to_shown(value: float, power: int) -> float:
 
 def to_si(value: float, power: int) -> float:
     """Return the SI value of a number kept by Blender in 32 bits."""
-    # The number is taken at the seven digits it was meant with: 0.3 mm, kept as 0.300000012, is 0.0003 m.
-    # Whatever is not finite is handed on, for the part's own rules to refuse.
+    # The number is taken at the seven digits it was meant with: 0.3 mm, kept as 0.300000012, is
+    # 0.0003 m. Whatever is not finite is handed on, for the part's own rules to refuse.
     if not math.isfinite(value):
         return value
     return float(Decimal(f"{value:.{DIGITS}g}").scaleb(-power))

@@ -1,18 +1,19 @@
 """Motion of the fingertip along a press stroke.
 
-The fingertip comes from above, presses to its depth where the mouse went down, goes along the whole path as
-fast as the blister of the device can be led, and leaves upwards. It is never ahead of the hand: where the
-hand has not drawn further, it waits, and the session with it. So what it does follows from the path alone.
-Depth counts from the surface as it was when the finger began, or when its pass did: pins that give way do not
-draw the fingertip after them. No Blender in here.
+The fingertip comes from above, presses to its depth where the mouse went down, goes along the whole
+path as fast as the blister of the device can be led, and leaves upwards. It is never ahead of the
+hand: where the hand has not drawn further, it waits, and the session with it. So what it does
+follows from the path alone. Depth counts from the surface as it was when the finger began, or when
+its pass did: pins that give way do not draw the fingertip after them. No Blender in here.
 
-Each image of a path has a fingertip, as far as there are any, and all go at once, side by side as well. None
-comes down where a method would take it for another one: the one of the later image lifts, and waits above
-until the other one is away, or the hand lets go: then it goes along from the end, if it is free there. The
-valves leave the same surface either way. Where images coincide, or nearly so all along, one is gone along.
+Each image of a path has a fingertip, as far as there are any, and all go at once, side by side as
+well. None comes down where a method would take it for another one: the one of the later image
+lifts, and waits above until the other one is away, or the hand lets go: then it goes along from the
+end, if it is free there. The valves leave the same surface either way. Where images coincide, or
+nearly so all along, one is gone along.
 
-A brush that raises presses until the blister starts, and rises to its height there. Every brush then goes
-along at its height, up and down over what is formed.
+A brush that raises presses until the blister starts, and rises to its height there. Every brush
+then goes along at its height, up and down over what is formed.
 """
 
 import math
@@ -45,31 +46,34 @@ from .tracking import SUDDEN, Tracking
 #: Lowest point of the fingertip, m.
 Point = tuple[float, float, float]
 
-#: How fast it crosses the bed above all pins, comes down to them, and leaves, m/s; the last as many times as
-#: fast as pins rise, so that no blister follows it up.
+#: How fast it crosses the bed above all pins, comes down to them, and leaves, m/s; the last as many
+#: times as fast as pins rise, so that no blister follows it up.
 CROSS, DESCEND, OUTRUN = 1.0, 0.4, 5.0
-#: How fast it comes down the last way, m/s, and how far above the highest pin it passes over the bed, m.
+#: How fast it comes down the last way, m/s, and how far above the highest pin it passes over the
+#: bed, m.
 APPROACH, CLEARANCE = 0.1, 4e-3
 #: How far the fingertip may be off its height while it goes on along the path, m.
 SLACK = 0.5e-3
 #: How much wider than it is the fingertip is taken to be beside pins that are locked.
 WIDER = 1.2
-#: How fast the fingertip turns while it touches, rad/s: as fast as a hand turns a pen, so that tilt read in
-#: coarse steps does not jerk it.
+#: How fast the fingertip turns while it touches, rad/s: as fast as a hand turns a pen, so that tilt
+#: read in coarse steps does not jerk it.
 TURN = 3.0
-#: Force above which a fingertip dragged on uneven ground waits for pins to give way, N, how long at most, s,
-#: for pins at their stops never do, and how fast it gains speed, m/s². On "design" two of 15 valleys of 6 mm
-#: that begin on the flank of another one take more than 1 N, one of them 76 N; before, six did, up to 535 N.
+#: Force above which a fingertip dragged on uneven ground waits for pins to give way, N, how long at
+#: most, s, for pins at their stops never do, and how fast it gains speed, m/s². On "design" two of
+#: 15 valleys of 6 mm that begin on the flank of another one take more than 1 N, one of them 76 N;
+#: before, six did, up to 535 N.
 FIRM, PATIENCE, HURRY = 0.5, 0.1, 1.0
 
-#: Fastest drag where no blister follows, m/s and half widths per second, and fastest press there, m/s.
-#: Pressed faster, the fingertip runs into pins whose valves have not opened yet.
+#: Fastest drag where no blister follows, m/s and half widths per second, and fastest press there,
+#: m/s. Pressed faster, the fingertip runs into pins whose valves have not opened yet.
 DRAG, SPAN, PRESS = 0.1, 30.0, 0.02
 #: The fingertip comes down on a slope where it touches a pin so far above the surface below it, m.
 UNEVEN = 0.5e-3 + TIE
-#: An image comes down no nearer to another one, in largest semi-axes of the fingertip; where all its path is
-#: so near to what another one goes along, it leaves that to the valves; so near, in pitches, it is the same.
-#: Where two meet none lifts: beside the blister of another one pins then run away upwards.
+#: An image comes down no nearer to another one, in largest semi-axes of the fingertip; where all
+#: its path is so near to what another one goes along, it leaves that to the valves; so near, in
+#: pitches, it is the same. Where two meet none lifts: beside the blister of another one pins then
+#: run away upwards.
 APART, MERGED, SAME = 1.0, 0.6, 0.5
 #: Brushes of which each place of a path leaves the same, whichever way it is gone along.
 BOTH_WAYS = (Brush.LOWER, Brush.RAISE)
@@ -87,7 +91,8 @@ class Workspace:
 
     def find_touch(self, stroke: Stroke, x: float, y: float) -> float:
         """Return how high a fingertip is that descends at a place and first touches a pin, m."""
-        # On a slope it touches the pins beside it first, several millimeters above the surface below it.
+        # On a slope it touches the pins beside it first, several millimeters above the surface
+        # below it.
         assert stroke.standing is not None
         grid, finger = self.device.grid, self.device.finger
         cells = grid.disc(x, y, finger.width)
@@ -107,7 +112,9 @@ class Workspace:
         cells = self.device.grid.disc(x, y, max(wide.length, wide.width))
         cells = cells[locked[cells]]
         sample, image = stroke.samples[stroke.reached], stroke.images[stroke.image]
-        under = find_undersides(replace(self.device, finger=wide), stroke, image, sample.lean, (x, y), cells)
+        under = find_undersides(
+            replace(self.device, finger=wide), stroke, image, sample.lean, (x, y), cells
+        )
         return max(z, float((stroke.height[cells] - under).max(initial=z)))
 
     def find_lowest(self, stroke: Stroke, x: float, y: float) -> float:
@@ -115,7 +122,9 @@ class Workspace:
         assert stroke.ground is not None
         assert stroke.height is not None
         level = self.device.find_level(stroke, stroke.images[stroke.image], stroke.height)
-        top = self.device.find_top(stroke, stroke.samples[stroke.reached], (x, y), stroke.ground, level)
+        top = self.device.find_top(
+            stroke, stroke.samples[stroke.reached], (x, y), stroke.ground, level
+        )
         if stroke.brush is Brush.RAISE and stroke.standing is not None:
             # It rides over what an image before has raised higher.
             top = max(top, self.find_touch(stroke, x, y))
@@ -134,7 +143,9 @@ def begin(stroke: Stroke, height: Floats, turn: Floats, tracking: Tracking | Non
         return replace(begun, phase=LEAVING, images=stroke.images[:1])
     if stroke.brush not in LIMITS or len(stroke.images) == 1:
         return begun
-    return replace(begun, parts=tuple(replace(begun, image=image) for image in range(len(stroke.images))))
+    return replace(
+        begun, parts=tuple(replace(begun, image=image) for image in range(len(stroke.images)))
+    )
 
 
 def follow(
@@ -149,9 +160,10 @@ def follow(
 ) -> tuple[Stroke, Floats]:
     """Advance the fingertip along a stroke that has begun; return it and the path (k + 1, 7), k <= count.
 
-    The path ends where the hand has not drawn further, and where the fingertip begins something else: it
-    comes down to the pins that stand there, `now` (n,), m. On uneven ground it is dragged one period at a
-    time: what it does depends on the force, N; elsewhere it does on one above `hard`, N.
+    The path ends where the hand has not drawn further, and where the fingertip begins something
+    else: it comes down to the pins that stand there, `now` (n,), m. On uneven ground it is dragged
+    one period at a time: what it does depends on the force, N; elsewhere it does on one above
+    `hard`, N.
     """
     if stroke.phase == PRESSING and stroke.standing is None:
         stroke = _look_down(stroke, device, now, *pose[:2].tolist())
@@ -188,16 +200,24 @@ def _look_down(stroke: Stroke, device: Device, now: Floats, x: float, y: float) 
 
 
 def follow_images(
-    stroke: Stroke, device: Device, now: Floats, poses: Floats, count: int, period: float, forces: Floats
+    stroke: Stroke,
+    device: Device,
+    now: Floats,
+    poses: Floats,
+    count: int,
+    period: float,
+    forces: Floats,
 ) -> tuple[Stroke, Floats]:
     """Advance m fingertips along the images of a stroke; return it and the paths (k + 1, m, 7), k <= count.
 
-    They begin with the first m images, and go on with those m further on. Where one waits for the hand, all
-    do: what they do follows from the path alone. Otherwise as `follow`.
+    They begin with the first m images, and go on with those m further on. Where one waits for the
+    hand, all do: what they do follows from the path alone. Otherwise as `follow`.
     """
     path, hard = [poses], math.inf
     if (tracking := stroke.tracking) and tracking.hard < math.inf:
-        gap = min((math.dist(*pair) for pair in combinations(poses[:, :2].tolist(), 2)), default=math.inf)
+        gap = min(
+            (math.dist(*pair) for pair in combinations(poses[:, :2].tolist(), 2)), default=math.inf
+        )
         count = _count_while(lambda periods: gap >= 2.0 * tracking.reach(periods * period), count)
         if gap < 2.0 * tracking.radius - TIE:
             hard = tracking.hard
@@ -205,7 +225,10 @@ def follow_images(
         if count > 1:
             count = _count_settled(part, device, poses[part.image % len(poses)], count, period)
     while len(path) <= count and stroke.parts:
-        before, (stroke, places) = stroke, _follow_once(stroke, device, now, path[-1], period, forces, hard)
+        before, (stroke, places) = (
+            stroke,
+            _follow_once(stroke, device, now, path[-1], period, forces, hard),
+        )
         if stroke is before:
             break
         path.append(places)
@@ -241,11 +264,20 @@ def _stands(part: Stroke, pose: Floats) -> bool:
 
 
 def _follow_once(
-    stroke: Stroke, device: Device, now: Floats, poses: Floats, period: float, forces: Floats, hard: float
+    stroke: Stroke,
+    device: Device,
+    now: Floats,
+    poses: Floats,
+    period: float,
+    forces: Floats,
+    hard: float,
 ) -> tuple[Stroke, Floats]:
     """Advance fingertips by a period; return the stroke, as it is where one waits, and their poses (m, 7)."""
     parts, count, after = list(stroke.parts), len(poses), poses.copy()
-    busy = [next((part for part in parts[first::count] if not part.left), None) for first in range(count)]
+    busy = [
+        next((part for part in parts[first::count] if not part.left), None)
+        for first in range(count)
+    ]
     at = {part.image: poses[part.image % count] for part in busy if part}
     for image, pose in sorted(at.items()):
         samples = stroke.samples[::-1] if parts[image].backward else stroke.samples
@@ -262,17 +294,25 @@ def _follow_once(
         parts[image], after[image % count] = part, path[-1]
     if all(part.left for part in parts):  # for one more period, without the other fingertips
         last = parts[-1]
-        return replace(stroke, parts=(), phase=LEAVING, image=last.image, reached=last.reached), after
+        return replace(
+            stroke, parts=(), phase=LEAVING, image=last.image, reached=last.reached
+        ), after
     return replace(stroke, parts=tuple(parts)), after
 
 
 def _yield(
-    part: Stroke, earlier: list[Stroke], down: list[Floats], device: Device, now: Floats, pose: Floats
+    part: Stroke,
+    earlier: list[Stroke],
+    down: list[Floats],
+    device: Device,
+    now: Floats,
+    pose: Floats,
 ) -> Stroke:
     """Return the stroke along an image, lifted where an earlier one is too near, of fingertips that are down.
 
-    Above, it comes as far along its path as it coincides with what an earlier one has gone along. One that
-    still waits when the hand has let go begins at the end of its path, if it is free there.
+    Above, it comes as far along its path as it coincides with what an earlier one has gone along.
+    One that still waits when the hand has let go begins at the end of its path, if it is free
+    there.
     """
     earlier = [other for other in earlier if other.backward == part.backward]
     least = APART * max(device.finger.length, device.finger.width) - TIE
@@ -316,9 +356,11 @@ def find_safe(stroke: Stroke, device: Device, now: Floats) -> float:
     """Return a height above all pins, m, `now` at heights (n,), m, and above what the stroke raises."""
     assert stroke.height is not None
     highest = float(stroke.height.max())
-    # Before the fingertip is down for the first time nothing is raised, and not all of the path is known.
+    # Before the fingertip is down for the first time nothing is raised, and not all of the path is
+    # known.
     if len(stroke.images) > 1 and stroke.phase in (ABOVE, YIELDING):
-        # In whole steps, else it would wait until pins that others form have crept to their heights.
+        # In whole steps, else it would wait until pins that others form have crept to their
+        # heights.
         highest = CLEARANCE * math.ceil(max(highest, float(now.max())) / CLEARANCE - TIE)
     elif stroke.brush.rises and stroke.phase != ABOVE:
         raised = max(sample.depth for sample in stroke.samples)
@@ -383,7 +425,11 @@ def _step(stroke: Stroke, space: Workspace, place: Point) -> tuple[Stroke, Point
         return _press(stroke, space, place)
     if stroke.phase == RISING:
         stroke, z = _climb(stroke, z, stroke.lowest, space.period)
-        return replace(stroke, phase=DRAGGING if abs(z - stroke.lowest) < TIE else RISING), (x, y, z)
+        return replace(stroke, phase=DRAGGING if abs(z - stroke.lowest) < TIE else RISING), (
+            x,
+            y,
+            z,
+        )
     return _drag_on(stroke, space, place)
 
 

@@ -1,10 +1,10 @@
 """Nominal surface of press strokes: the heights that they are to leave, without simulation. No Blender.
 
-A pin's height follows from its distance to the path: below or above it the pin comes to the depth or height
-of the stroke, beside it to the section of the device's blister, or of the fingertip where there is none. Of
-several places of the path the one counts that takes the pin farthest; so neither a crossing counts twice, nor
-the seam of a ring, nor where mirror images meet. It is what the view shows of a stroke at once, and
-what the valves drive the pins to after the fingertip has left.
+A pin's height follows from its distance to the path: below or above it the pin comes to the depth
+or height of the stroke, beside it to the section of the device's blister, or of the fingertip where
+there is none. Of several places of the path the one counts that takes the pin farthest; so neither
+a crossing counts twice, nor the seam of a ring, nor where mirror images meet. It is what the view
+shows of a stroke at once, and what the valves drive the pins to after the fingertip has left.
 """
 
 import math
@@ -22,10 +22,15 @@ from ..core.surface.pointing import find_ground_height
 from .pose import lean_finger, turn_image
 from .stroke import STAMPS, Brush, Image, Place, Sample, Stroke
 
-#: A path that comes nearer to itself than the fingertip is wide, after so many widths, is a new pass.
+#: A path that comes nearer to itself than the fingertip is wide, after so many widths, is a new
+#: pass.
 RETURN = 2.0
 #: How far down and up a brush may take pins, m.
-LIMITS = {Brush.LOWER: (-math.inf, 0.0), Brush.RAISE: (0.0, math.inf), Brush.LEVEL: (-math.inf, math.inf)}
+LIMITS = {
+    Brush.LOWER: (-math.inf, 0.0),
+    Brush.RAISE: (0.0, math.inf),
+    Brush.LEVEL: (-math.inf, math.inf),
+}
 #: Least radius of the ring, in pitches: below one a pin has no neighbor in it.
 LEAST = 2.0
 
@@ -93,7 +98,9 @@ class Nominal:
     first: int = 0
 
 
-def find_nominal(stroke: Stroke, device: Device, before: Floats, count: int | None = None) -> Nominal:
+def find_nominal(
+    stroke: Stroke, device: Device, before: Floats, count: int | None = None
+) -> Nominal:
     """Return the nominal surface of a stroke, or of its first samples, on pins at heights (n,), m."""
     near = np.zeros(before.size, np.bool_)
     return extend(Nominal(before, before, before, near), stroke, device, count)
@@ -164,13 +171,16 @@ def _mark(nominal: Nominal, stroke: Stroke, device: Device, image: Image, index:
         low, high = LIMITS[stroke.brush]
         change = change.clip(low, high)
         nominal.near[cells] = True
-        nominal.height[cells] = np.where(np.abs(change) > np.abs(now - ground) + TIE, ground + change, now)
+        nominal.height[cells] = np.where(
+            np.abs(change) > np.abs(now - ground) + TIE, ground + change, now
+        )
 
 
 def find_frame(stroke: Stroke, device: Device) -> Place:
     """Return half the side of what a stroke stamps, m, and how far it is turned, rad.
 
-    Drawn from its middle it reaches to the place where its right side is; a click gives the ring's size.
+    Drawn from its middle it reaches to the place where its right side is; a click gives the ring's
+    size.
     """
     first, last = stroke.samples[0], stroke.samples[-1]
     x, y = last.x - first.x, last.y - first.y
@@ -193,7 +203,9 @@ def _stamp(nominal: Nominal, stroke: Stroke, device: Device) -> Nominal:
         x, y = image.trace(grid.x, grid.y)
         x, y = x - first.x, y - first.y
         turned = Grid(grid.layout, cos * x + sin * y, cos * y - sin * x)
-        rise = np.maximum(rise, stroke.stamp.tops(turned, Placement(scale[1], scale[0], -half, -half)).value)
+        rise = np.maximum(
+            rise, stroke.stamp.tops(turned, Placement(scale[1], scale[0], -half, -half)).value
+        )
     if device.locked is not None:
         rise[device.locked] = 0.0
     height = nominal.before + (1.0 if stroke.brush is Brush.STAMP else -1.0) * last.depth * rise
@@ -227,7 +239,8 @@ def find_undersides(
     return compute_underside(*forms, device.grid.compute_basis(cells))[0]
 
 
-#: Pins come so near to what was expected of the stroke before, m, that the ghosts of those after it stay.
+#: Pins come so near to what was expected of the stroke before, m, that the ghosts of those after it
+#: stay.
 SAME = 0.05e-3
 
 
@@ -242,7 +255,9 @@ class Ghost:
         """Tell whether a stroke, on pins at heights (n,), m, is this one drawn on."""
         former, count = self.stroke, self.nominal.count
         same = (
-            former.number == stroke.number and former.images == stroke.images and former.turn is stroke.turn
+            former.number == stroke.number
+            and former.images == stroke.images
+            and former.turn is stroke.turn
         )
         same = same and former.samples[count - 1 :][:1] == stroke.samples[count - 1 :][:1]
         return same and float(np.abs(self.nominal.before - before).max()) < SAME

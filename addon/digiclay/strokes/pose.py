@@ -15,7 +15,9 @@ def lean_finger(turn: Floats, lean: Place) -> Floats:
         return turn
     # The axis is level, and square to the direction in which the top goes.
     share = math.sin(0.5 * angle) / angle
-    return _multiply(np.array([math.cos(0.5 * angle), -lean[1] * share, lean[0] * share, 0.0]), turn)
+    return _multiply(
+        np.array([math.cos(0.5 * angle), -lean[1] * share, lean[0] * share, 0.0]), turn
+    )
 
 
 def turn_image(turn: Floats, image: Image) -> Floats:
@@ -41,7 +43,9 @@ def turn_toward(turn: Floats, aim: Floats, angle: float) -> Floats:
     if far <= angle:
         return aim
     part, half = angle / far, 0.5 * far
-    between: Floats = (math.sin((1.0 - part) * half) * turn + math.sin(part * half) * aim) / math.sin(half)
+    between: Floats = (
+        math.sin((1.0 - part) * half) * turn + math.sin(part * half) * aim
+    ) / math.sin(half)
     return between / np.linalg.norm(between)
 
 

@@ -1,7 +1,7 @@
 """Press stroke: the path that the hand draws, and how far the fingertip has come along it. No Blender.
 
-What a stroke forms follows from its path alone, not from the times at which the hand was where: the session
-waits for the hand, and the clay with it.
+What a stroke forms follows from its path alone, not from the times at which the hand was where: the
+session waits for the hand, and the clay with it.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ from .tracking import Tracking
 Place = tuple[float, float]
 Coordinate = TypeVar("Coordinate", float, Floats)
 
-#: What the fingertip does: it waits for its turn, goes above the path's first place, presses there, rises
-#: with the blister (if its brush has one), goes along the path, leaves it, waits above until the valves have
-#: driven the pins to what the stroke is to leave; and the end. An image yields to one before it that is too
-#: near: its fingertip lifts, and waits above.
+#: What the fingertip does: it waits for its turn, goes above the path's first place, presses there,
+#: rises with the blister (if its brush has one), goes along the path, leaves it, waits above until
+#: the valves have driven the pins to what the stroke is to leave; and the end. An image yields to
+#: one before it that is too near: its fingertip lifts, and waits above.
 WAITING, ABOVE, PRESSING, RISING, DRAGGING, LEAVING, FINISHING, DONE, YIELDING = range(9)
 #: Deepest press, and least one, m; also the greatest and the least height of a raise.
 DEEPEST, SHALLOWEST = 30e-3, 0.1e-3
@@ -167,21 +167,23 @@ class Stroke:
     held: bool = True
     #: The stroke along each image alone, while fingertips go along several at once.
     parts: tuple[Stroke, ...] = ()
-    #: Whether this image is gone along from the end of the path: near its beginning there was another one.
+    #: Whether this image is gone along from the end of the path: near its beginning there was
+    #: another one.
     backward: bool = False
     #: What the fingertip does.
     phase: int = WAITING
     #: Index of the image that the fingertip is at, and of the sample it is at, or past.
     image: int = 0
     reached: int = 0
-    #: (n,), heights of the pins when the fingertip began, and those that its depth counts from where it is,
-    #: m; None before.
+    #: (n,), heights of the pins when the fingertip began, and those that its depth counts from
+    #: where it is, m; None before.
     height: Floats | None = None
     ground: Floats | None = None
-    #: (n,), heights of the pins when the fingertip came down to the image that it is at, m; None before.
+    #: (n,), heights of the pins when the fingertip came down to the image that it is at, m; None
+    #: before.
     standing: Floats | None = None
-    #: How high it is when it first touches one of those, m; whether that is beside its lowest point; and how
-    #: low it is to be where it is, m.
+    #: How high it is when it first touches one of those, m; whether that is beside its lowest
+    #: point; and how low it is to be where it is, m.
     touch: float = 0.0
     slopes: bool = False
     lowest: float = 0.0
@@ -193,11 +195,14 @@ class Stroke:
     climb: float = 0.0
     #: How fast the fingertip drags, m/s.
     pace: float = 0.0
-    #: (4,), orientation of the fingertip when it began, which it has again when it is done; None before.
+    #: (4,), orientation of the fingertip when it began, which it has again when it is done; None
+    #: before.
     turn: Floats | None = None
-    #: (n,), heights to which the valves drive pins after the fingertip has left, m, NaN: not driven.
+    #: (n,), heights to which the valves drive pins after the fingertip has left, m, NaN: not
+    #: driven.
     finish: Floats | None = None
-    #: Control periods since the fingertip waits for its pins, and whether they stood at the last look.
+    #: Control periods since the fingertip waits for its pins, and whether they stood at the last
+    #: look.
     waited: int = 0
     arrived: bool = False
 
@@ -213,8 +218,15 @@ class Stroke:
         left = {part.image: (part.reached, part.backward) for part in self.parts if not part.left}
         later = dict.fromkeys(range(self.image + 1, len(self.images)), (0, False))
         return tuple(
-            np.array([self.images[image].place(*place) for place in path[:: -1 if backward else 1][reached:]])
-            for image, (reached, backward) in (left or {self.image: (self.reached, False), **later}).items()
+            np.array(
+                [
+                    self.images[image].place(*place)
+                    for place in path[:: -1 if backward else 1][reached:]
+                ]
+            )
+            for image, (reached, backward) in (
+                left or {self.image: (self.reached, False), **later}
+            ).items()
         )
 
     @property
@@ -262,7 +274,9 @@ def draw(
     """Return the stroke drawn on to a place; a released one stays as it is."""
     if not stroke.held:
         return stroke
-    return replace(stroke, samples=(*stroke.samples, Sample(x, y, _limit_depth(depth), share, lean)))
+    return replace(
+        stroke, samples=(*stroke.samples, Sample(x, y, _limit_depth(depth), share, lean))
+    )
 
 
 def let_go(stroke: Stroke) -> Stroke:
@@ -318,7 +332,9 @@ def lay_ring(center: Place, rim: Place) -> Floats:
     if radius < SMALLEST_RING:
         return np.array([center])
     count = max(12, math.ceil(2.0 * math.pi * radius / SIDE))
-    angle = math.atan2(rim[1] - center[1], rim[0] - center[0]) + np.linspace(0.0, 2.0 * math.pi, count + 1)
+    angle = math.atan2(rim[1] - center[1], rim[0] - center[0]) + np.linspace(
+        0.0, 2.0 * math.pi, count + 1
+    )
     around: Floats = np.column_stack([np.cos(angle), np.sin(angle)])
     return radius * around + center
 

@@ -1,7 +1,8 @@
 """Strokes that the valves form, not a finger; and how they finish what a finger has formed. No Blender.
 
-The fingertip goes along the path above the pins, never ahead of the hand and no faster than a drag, and shows
-where the device is at work. At the end it waits until all pins have come to their heights.
+The fingertip goes along the path above the pins, never ahead of the hand and no faster than a drag,
+and shows where the device is at work. At the end it waits until all pins have come to their
+heights.
 """
 
 import math
@@ -16,8 +17,8 @@ from .motion import DESCEND, DRAG, cross, drag, find_safe
 from .nominal import Device, find_nominal, find_radius
 from .stroke import ABOVE, DONE, DRAGGING, FINISHING, LEAVING, PRESSING, Brush, Stroke
 
-#: How long pins are waited for that do not come to their heights, s: noise may hide that they have; and how
-#: many control periods pass between two looks.
+#: How long pins are waited for that do not come to their heights, s: noise may hide that they have;
+#: and how many control periods pass between two looks.
 PATIENCE, LOOK = 1.0, 4
 #: Brushes whose strokes the valves form, and what they tell them.
 SWEEPS = {
@@ -35,7 +36,14 @@ LEAST_CHANGE = 1e-7
 
 
 def sweep(
-    stroke: Stroke, device: Device, verb: Verb, pose: Floats, count: int, period: float, *, arrived: bool
+    stroke: Stroke,
+    device: Device,
+    verb: Verb,
+    pose: Floats,
+    count: int,
+    period: float,
+    *,
+    arrived: bool,
 ) -> tuple[Stroke, Floats, Orders]:
     """Advance the fingertip over a stroke of the valves; return path (k + 1, 7), k <= count, and orders."""
     radius = find_radius(device.finger, device.grid.layout)
@@ -45,7 +53,8 @@ def sweep(
         return _wait(stroke, pose, count, period, rest, arrived=arrived)
     assert stroke.height is not None
     safe, path, rows = find_safe(stroke, device, stroke.height), [pose], []
-    # So long a pin below the path is in the disc before its middle, and after it; at both ends as well.
+    # So long a pin below the path is in the disc before its middle, and after it; at both ends as
+    # well.
     dwell = math.ceil(radius / (DRAG * period))
     while len(path) <= count and stroke.phase != FINISHING:
         x, y, z = path[-1][:3].tolist()
@@ -82,7 +91,14 @@ def _dwell(stroke: Stroke, periods: int) -> Stroke:
 
 
 def finish(
-    stroke: Stroke, device: Device, now: Floats, pose: Floats, count: int, period: float, *, arrived: bool
+    stroke: Stroke,
+    device: Device,
+    now: Floats,
+    pose: Floats,
+    count: int,
+    period: float,
+    *,
+    arrived: bool,
 ) -> tuple[Stroke, Floats, Orders]:
     """Drive pins, now at heights (n,), m, to a stroke's nominal surface; returns as `sweep`."""
     assert stroke.height is not None
@@ -90,8 +106,8 @@ def finish(
     if surface is None:
         nominal = find_nominal(stroke, device, stroke.height)
         surface = np.where(nominal.near, nominal.height, np.nan)
-    # What the method has moved beside the path, or still does, comes back to where it was. It is seen at the
-    # looks only, however many control periods are simulated at a time.
+    # What the method has moved beside the path, or still does, comes back to where it was. It is
+    # seen at the looks only, however many control periods are simulated at a time.
     astray = np.isnan(surface) & (np.abs(stroke.height - now) > LEAST_CHANGE)
     if stroke.waited % LOOK == 0 and (stroke.finish is None or astray.any()):
         stroke = replace(stroke, finish=np.where(astray, stroke.height, surface))
@@ -111,11 +127,15 @@ def _wait(
     if stroke.waited * period >= PATIENCE or (looks and arrived and stroke.arrived):
         last = stroke.image + 1 == len(stroke.images)
         # The valves sweep one image after the other.
-        later = replace(stroke, phase=ABOVE, image=stroke.image + 1, reached=0, first=0, ground=stroke.height)
+        later = replace(
+            stroke, phase=ABOVE, image=stroke.image + 1, reached=0, first=0, ground=stroke.height
+        )
         stroke = replace(stroke, phase=DONE) if last else later
         return stroke, np.array([pose, pose]), Orders(np.zeros((1, ORDER)))
     most = min(count, LOOK - stroke.waited % LOOK)
-    stroke = replace(stroke, waited=stroke.waited + most, arrived=arrived if looks else stroke.arrived)
+    stroke = replace(
+        stroke, waited=stroke.waited + most, arrived=arrived if looks else stroke.arrived
+    )
     return stroke, np.tile(pose, (most + 1, 1)), replace(order, rows=np.tile(order.rows, (most, 1)))
 
 
@@ -127,7 +147,9 @@ def estimate_time(strokes: Sequence[Stroke]) -> float:
         if tracking is not None:
             deepest = max(sample.depth for sample in stroke.samples)
             speed = tracking.limit_drag(deepest, pressed=stroke.brush is Brush.LOWER)
-        lengths = [float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum()) for path in stroke.ahead]
+        lengths = [
+            float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum()) for path in stroke.ahead
+        ]
         times = [BESIDE + length / speed for length in lengths]
         time += sum(times) if stroke.brush in SWEEPS else max(times)
     return time

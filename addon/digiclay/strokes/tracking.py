@@ -1,8 +1,8 @@
 """Tracking of a fingertip by a device's blister: what a press stroke that raises has to keep to. No Blender.
 
-Methods I, II and III hold the force under the fingertip: once it has been pressed in, pins that feel it rise
-with it. So clay is raised by a light press and a rise that the pins can follow, and it is leveled by a
-finger that goes along at one height.
+Methods I, II and III hold the force under the fingertip: once it has been pressed in, pins that
+feel it rise with it. So clay is raised by a light press and a rise that the pins can follow, and it
+is leveled by a finger that goes along at one height.
 """
 
 import math
@@ -23,15 +23,17 @@ from ..core.model.touch import Touch
 from ..core.scene.schema import Scene
 from ..device.instant import find_ellipsoid
 
-#: How long a pin is under a fingertip that drags, s: some 4 mm at 14 mm/s. The pulp relaxes meanwhile.
+#: How long a pin is under a fingertip that drags, s: some 4 mm at 14 mm/s. The pulp relaxes
+#: meanwhile.
 CONTACT_TIME = 0.3
 #: How far beyond the depth that starts a blister the first press goes, m.
 MARGIN = 0.5e-3
-#: Fastest press, as a share of the speed of pins without load, and greatest acceleration of a fingertip up
-#: and down, m/s²: at 5 m/s² pins of the bed "design" lose it where a press ends.
+#: Fastest press, as a share of the speed of pins without load, and greatest acceleration of a
+#: fingertip up and down, m/s²: at 5 m/s² pins of the bed "design" lose it where a press ends.
 PRESS, SUDDEN = 0.5, 2.0
-#: Force, in set points, above which a fingertip near another one waits, on even ground or pressing: alone 2.2
-#: at most. Without that, one whose pins the other has taken runs into clay. Method II holds each pin's force.
+#: Force, in set points, above which a fingertip near another one waits, on even ground or pressing:
+#: alone 2.2 at most. Without that, one whose pins the other has taken runs into clay. Method II
+#: holds each pin's force.
 HARD = 2.5
 #: Changes of height less than this share of the blister's radius are none.
 NEAREST = 1e-9
@@ -49,8 +51,8 @@ class Tracking:
     press: float
     #: Speed at which pins rise without load, m/s.
     speed: float
-    #: Speed at which a fingertip can rise with the blister under it, m/s, and how fast it may gain speed
-    #: upwards, or lose it at the end of a press, m/s².
+    #: Speed at which a fingertip can rise with the blister under it, m/s, and how fast it may gain
+    #: speed upwards, or lose it at the end of a press, m/s².
     lift: float
     gain: float
     #: Fastest press, m/s.
@@ -78,7 +80,9 @@ class Tracking:
     def limit_drag(self, change: float, *, pressed: bool) -> float:
         """Return the fastest drag, m/s, where pins ahead are to come to heights `change` away, m."""
         fastest = self.push if pressed else self.drag
-        return fastest if self.ready else min(fastest, self.speed / max(self.slope * change, NEAREST))
+        return (
+            fastest if self.ready else min(fastest, self.speed / max(self.slope * change, NEAREST))
+        )
 
 
 def find_blister(scene: Scene) -> Blister | None:
@@ -90,19 +94,26 @@ def find_blister(scene: Scene) -> Blister | None:
 def find_tracking(scene: Scene, system: System) -> Tracking | None:
     """Return how the blister of a scene follows a fingertip; None where its method has no blister."""
     control, touch, blister = scene.control, system.cell.touch, find_blister(scene)
-    if not isinstance(control, VirtualMaster | CellStates | Hybrid) or touch is None or blister is None:
+    if (
+        not isinstance(control, VirtualMaster | CellStates | Hybrid)
+        or touch is None
+        or blister is None
+    ):
         return None
     asked = control.force_setpoint
-    # Method II holds a force on every pin, so that they take on its form; the others hold their sum.
+    # Method II holds a force on every pin, so that they take on its form; the others hold their
+    # sum.
     if isinstance(control, CellStates):
         sink, trigger = _find_sink(touch, np.zeros(1), 1.0, asked), control.spring_trigger
     else:
         gap, share = _sample_underside(find_ellipsoid(scene), system.grid.layout)
         sink, trigger = _find_sink(touch, gap, share, asked), asked
-    # Before a blister starts the pins give way like springs; Method III follows from the first touch on.
+    # Before a blister starts the pins give way like springs; Method III follows from the first
+    # touch on.
     spring = 0.0 if isinstance(control, Hybrid) else trigger / control.spring_stiffness
     press = sink + spring + MARGIN
-    # A valve that feels no force opens by gain times set point; the flow goes with the square of that.
+    # A valve that feels no force opens by gain times set point; the flow goes with the square of
+    # that.
     opening = 1.0 if isinstance(control, Hybrid) else min(1.0, control.force_gain * asked)
     speed, pace = float(system.fastest), control.pace
     lift, slope = pace.lift * speed * opening**2, _find_slope(blister)
@@ -112,7 +123,20 @@ def find_tracking(scene: Scene, system: System) -> Tracking | None:
     hard = math.inf if isinstance(control, CellStates) else HARD * asked
     search = 0.0 if isinstance(control, CellStates) else control.loss_time
     return Tracking(
-        sink, press, speed, lift, gain, down, drag, push, slope, radius, highest, search, hard, pace.ready
+        sink,
+        press,
+        speed,
+        lift,
+        gain,
+        down,
+        drag,
+        push,
+        slope,
+        radius,
+        highest,
+        search,
+        hard,
+        pace.ready,
     )
 
 

@@ -59,7 +59,13 @@ def _translate_detail(part: str, words: dict[str, str]) -> str | None:
 
 def collect_strings() -> set[str]:
     """Return labels and tooltips of all that is registered: of classes, their properties and enum items."""
-    owners = (*operators.CLASSES, *panels.CLASSES, *groups.CLASSES, preferences.Preferences, display.Display)
+    owners = (
+        *operators.CLASSES,
+        *panels.CLASSES,
+        *groups.CLASSES,
+        preferences.Preferences,
+        display.Display,
+    )
     texts = {title(name) for name in PRESETS} | {PressTool.bl_label}
     for owner in owners:
         texts.add(getattr(owner, "bl_label", ""))
@@ -71,7 +77,9 @@ def collect_strings() -> set[str]:
 
 def _property_strings(owner: type[bpy_struct]) -> Iterator[str]:
     """Yield labels and tooltips of the properties that a class or a mixin of it declares, and shows."""
-    if issubclass(owner, bpy.types.Menu | bpy.types.Panel):  # their annotations are of Blender's own
+    if issubclass(
+        owner, bpy.types.Menu | bpy.types.Panel
+    ):  # their annotations are of Blender's own
         return
     kinds = [kind for kind in owner.__mro__ if kind.__module__.startswith(EXTENSION)]
     declared = {name for kind in kinds for name in inspect.get_annotations(kind)}
@@ -97,7 +105,9 @@ def make_entries(texts: Iterable[str], language: str) -> dict[tuple[str, str], s
     shown = _catalog(language)["brushes"].items()
     brushes = {(BRUSH, text): words for text, words in shown if text in translated}
     labels = {text: words for text, words in translated.items() if words}
-    return brushes | {(context, text): words for text, words in labels.items() for context in CONTEXTS}
+    return brushes | {
+        (context, text): words for text, words in labels.items() for context in CONTEXTS
+    }
 
 
 def register() -> None:

@@ -32,7 +32,9 @@ def prepare(problem: Any, method: str, setting: float) -> Any:
         try:
             for period, state in enumerate(states, 1):
                 if period in problem.judged:
-                    rows.append((state.row(0)[problem.pins], state.row(system.rows.force)[problem.pins]))
+                    rows.append(
+                        (state.row(0)[problem.pins], state.row(system.rows.force)[problem.pins])
+                    )
         except DivergenceError:
             return np.full((len(problem.judged), 2, problem.pins.size), np.inf)
         return rows

@@ -43,7 +43,9 @@ def prepare(problem: Any, method: str, setting: float) -> Any:
                         mxstep=50000,
                     )[-1]
                 else:
-                    y = solve_ivp(rates, (start, end), y, name, (end,), rtol=setting, atol=absolute).y[:, -1]
+                    y = solve_ivp(
+                        rates, (start, end), y, name, (end,), rtol=setting, atol=absolute
+                    ).y[:, -1]
                 law.stop(y.reshape(-1, shape[0]).T)
             if period + 1 in problem.judged:
                 state = y.reshape(-1, shape[0]).T

@@ -76,7 +76,9 @@ def test_bed_and_fingertip_follow_the_poses(bed, clock, server):
 
 def named(*fingers):
     """Return a frame of a server with several fingertips: identities, and heights at 10 mm times each."""
-    values = [value for one, z in fingers for value in (one, 0.1, 0.01 * one, 0.0, z, 1.0, 0.0, 0.0, 0.0)]
+    values = [
+        value for one, z in fingers for value in (one, 0.1, 0.01 * one, 0.0, z, 1.0, 0.0, 0.0, 0.0)
+    ]
     tags = b",h" + len(fingers) * b"hdddddddd"
     head = b"/digiclay/fingers\0\0\0" + tags + bytes(4 - len(tags) % 4)
     return [
@@ -98,7 +100,10 @@ def test_fingertips_follow_by_identity_and_lift_when_it_is_gone(bed, clock, serv
     frames = [
         (named((2, 0.045)), [(20.0, 45.0), None]),
         (named((2, 0.044), (1, 0.05)), [(20.0, 44.0), (10.0, 50.0)]),
-        (named((1, 0.038), (2, 0.043), (7, 0.03)), [(20.0, 43.0), (10.0, 38.0)]),  # 7 finds none free
+        (
+            named((1, 0.038), (2, 0.043), (7, 0.03)),
+            [(20.0, 43.0), (10.0, 38.0)],
+        ),  # 7 finds none free
         (named((1, 0.039)), [(20.0, 1000.0), (10.0, 39.0)]),
         (named((7, 0.041), (1, 0.039)), [(70.0, 41.0), (10.0, 39.0)]),
         (named((7, float("nan")), (1, 0.04)), [(70.0, 1000.0), (10.0, 40.0)]),
@@ -128,7 +133,9 @@ def test_a_server_of_one_finger_leaves_the_others_to_the_hand(bed, clock, server
     assert second.rotation_mode == "XYZ"  # nothing has moved it
 
 
-def test_a_server_of_one_finger_after_one_of_several_moves_the_first_and_the_others_lift(bed, clock, server):
+def test_a_server_of_one_finger_after_one_of_several_moves_the_first_and_the_others_lift(
+    bed, clock, server
+):
     address = followed_by_two(bed, server, clock)
     arrived(server, address, *named((1, 0.045), (2, 0.044)))
     clock.tick(200)
@@ -145,7 +152,11 @@ def test_garbage_and_poses_that_are_none_do_nothing(bed, clock, server):
     clock.tick()
     nan, huge = float("nan"), 1e300
     wrong = [b"", b"x" * 2000, state(*PRESS)[:-1], state(*PRESS) + b"\0", b"/digiclay/state\0"]
-    wrong += [state(nan, *PRESS[1:]), state(huge, *PRESS[1:]), state(*PRESS[:3], 0.0, 0.0, 0.0, 0.0)]
+    wrong += [
+        state(nan, *PRESS[1:]),
+        state(huge, *PRESS[1:]),
+        state(*PRESS[:3], 0.0, 0.0, 0.0, 0.0),
+    ]
     wrong += [state(*PRESS[:3], *[huge] * 4), state(*PRESS[:3], *[float("inf")] * 4)]
     arrived(server, address, *wrong)
     assert clock.tick(3) == []

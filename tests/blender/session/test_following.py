@@ -15,7 +15,9 @@ from tests.assemble import assert_near
 from tests.blender.session.live import FLOAT32, TICK, exact, move, press, shown, started
 
 
-def test_the_bed_forms_while_the_fingertip_moves_and_keeps_and_shows_what_the_session_is(bed, clock):
+def test_the_bed_forms_while_the_fingertip_moves_and_keeps_and_shows_what_the_session_is(
+    bed, clock
+):
     started(bed)
     lowest = []
     for z in np.linspace(46, 37, 8):
@@ -66,8 +68,8 @@ def test_the_bed_follows_a_fingertip_moved_by_other_means(bed, clock, how):
     assert exact(bed).min() < 39e-3
 
 
-#: A playback: time between two ticks, s, ticks from a frame that is shown to the next, frames till then, the
-#: first frame, and settings of the scene's time.
+#: A playback: time between two ticks, s, ticks from a frame that is shown to the next, frames till
+#: then, the first frame, and settings of the scene's time.
 PLAYBACKS = {
     "in time": (TICK, 1.25, 1, 1, {}),
     "at a tenth of the speed": (10.0 / 24.0, 1.0, 1, 1, {}),
@@ -76,7 +78,13 @@ PLAYBACKS = {
     "of 29.97 frames a second": (TICK, 1.0, 1, 1, {"fps": 30, "fps_base": 1.001}),
     "by steps of three frames": (TICK, 3.75, 3, 1, {"frame_step": 3}),
     "from frame 101 on": (TICK, 1.25, 1, 101, {"frame_start": 101}),
-    "from before frame 0 on": (TICK, 1.25, 1, -30, {"use_preview_range": True, "frame_preview_start": -30}),
+    "from before frame 0 on": (
+        TICK,
+        1.25,
+        1,
+        -30,
+        {"use_preview_range": True, "frame_preview_start": -30},
+    ),
     "stretched to twice its time": (TICK, 1.25, 1, 1, {"frame_map_new": 200}),
     "pressed into half its time": (TICK, 1.25, 1, 1, {"frame_map_new": 50}),
 }
@@ -117,7 +125,8 @@ def test_a_session_in_a_playback_has_the_path_that_a_bake_has(bed, clock, how):
     bpy.ops.screen.animation_cancel(restore_frame=False)
     path = running.find(bed).recording.path
     assert len(path) == len(expected)
-    # A frame lasts no whole number of periods: the way of one, at 0.75 mm a frame, may be gone early.
+    # A frame lasts no whole number of periods: the way of one, at 0.75 mm a frame, may be gone
+    # early.
     assert_near(path[:, 0, 2], expected, 0.75e-3 / stretched * rate * period)
     clock.tick(3)
     assert len(running.find(bed).recording.path) == len(path) + 20  # 0.1 s by the wall's clock
@@ -127,7 +136,11 @@ def test_two_beds_go_on_at_once_and_one_turned_moved_and_scaled_forms_like_the_o
     started(bed)
     bpy.ops.mesh.digital_clay_add(rows=13, columns=13)
     other = bpy.context.object
-    other.location, other.rotation_euler, other.scale = (3.0, -2.0, 1.0), (0.4, 0.0, 0.7), (2.0, 2.0, 2.0)
+    other.location, other.rotation_euler, other.scale = (
+        (3.0, -2.0, 1.0),
+        (0.4, 0.0, 0.7),
+        (2.0, 2.0, 2.0),
+    )
     started(other)
     press(other, clock)
     assert (exact(bed) == 40e-3).all()  # each has a fingertip of its own

@@ -117,7 +117,9 @@ def test_a_fault_in_the_modal_part_ends_the_sessions_in_order(bed, monkeypatch):
     said = []
     started(bed)
     monkeypatch.setattr(tick, "tick", lambda context, now: {}["now"])
-    assert Drive().modal(bpy.context, SimpleNamespace(type="TIMER", value="NOTHING")) == {"CANCELLED"}
+    assert Drive().modal(bpy.context, SimpleNamespace(type="TIMER", value="NOTHING")) == {
+        "CANCELLED"
+    }
     assert running.list_sessions() == ()
     assert said == ["Error in the extension: KeyError: 'now'"]
     assert running.last_message() == f"The session of Digital Clay ended: {said[0]}"
@@ -176,6 +178,7 @@ def test_words_in_the_status_bar_leave_what_else_is_drawn_there():
     before = bar.draw
     show_status(bpy.context, "Radius 5 mm")
     clear_status()
-    # Blender's own function would draw from then on as at the first call: without the keys of a session.
+    # Blender's own function would draw from then on as at the first call: without the keys of a
+    # session.
     assert bar.draw is before
     assert not hasattr(bar, "_draw_orig")

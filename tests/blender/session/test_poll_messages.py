@@ -11,7 +11,8 @@ from tests.blender.session.live import press, started
 NAMES = sorted(kind.bl_idname for kind in operators.CLASSES if issubclass(kind, bpy.types.Operator))
 #: What Blender says of an operator that says nothing.
 NOTHING = "failed, context is incorrect"
-#: What is said of a bed at rest in the background, and of one with a session that has formed something.
+#: What is said of a bed at rest in the background, and of one with a session that has formed
+#: something.
 AT_REST = {
     "digiclay.bake_free": "The bed has no bake",
     "digiclay.clear_pins": "No pins are picked",

@@ -85,7 +85,9 @@ def slow(monkeypatch):
 def test_a_file_has_every_stroke_that_was_drawn(bed, clock, tmp_path, slow, when, how):
     begin(bed)
     stamp = {"brush": Brush.STAMP, "stamp": load_stamp("heart")}
-    for y, kind in zip(ROWS, ({}, {"images": make_images("X"), "accumulate": True}, stamp), strict=True):
+    for y, kind in zip(
+        ROWS, ({}, {"images": make_images("X"), "accumulate": True}, stamp), strict=True
+    ):
         draw(y, **kind)
     slow(clock, WHEN[when])
     path = str(tmp_path / "queue.blend")

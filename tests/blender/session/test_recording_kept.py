@@ -104,9 +104,12 @@ def test_a_recording_that_was_just_saved_is_not_left_once_more(recording, tmp_pa
 
 
 @pytest.mark.parametrize(
-    "how, kept", [("the recording goes on", []), ("session_stop", ["Take 1"]), ("take_keep", ["Take 1"])]
+    "how, kept",
+    [("the recording goes on", []), ("session_stop", ["Take 1"]), ("take_keep", ["Take 1"])],
 )
-def test_while_blender_may_save_by_itself_the_bed_has_the_take_and_never_twice(recording, clock, how, kept):
+def test_while_blender_may_save_by_itself_the_bed_has_the_take_and_never_twice(
+    recording, clock, how, kept
+):
     for _ in range(2):
         handlers.write_recovery()
         assert seconds(recording) == [SECONDS]

@@ -136,8 +136,13 @@ def test_the_session_goes_on_with_the_fingertips_that_are_left(pair, clock, gone
     looked()
     assert [note for note in clock.tick(1) if note.level != "INFO"] == []
     session = running.find(pair)
-    assert (session.numbers, beds.read_numbers(pair), session.blocking_reason) == ((left,), (left,), "")
-    # Its pulp relaxes on, by some percent in a tick: one that begins anew would press 2.6 times as hard.
+    assert (session.numbers, beds.read_numbers(pair), session.blocking_reason) == (
+        (left,),
+        (left,),
+        "",
+    )
+    # Its pulp relaxes on, by some percent in a tick: one that begins anew would press 2.6 times as
+    # hard.
     assert session.state.finger_forces().tolist() == [pytest.approx(force, rel=0.05)]
     clock.tick(20)
     deep = depth(pair, left)
@@ -164,7 +169,9 @@ def hang(part, where, bone=""):
 
 
 HUNG = [
-    f"a {part} on {place}" for part in ("fingertip", "thumb", "palm") for place in ("an empty", "nothing")
+    f"a {part} on {place}"
+    for part in ("fingertip", "thumb", "palm")
+    for place in ("an empty", "nothing")
 ]
 
 
@@ -172,7 +179,9 @@ HUNG = [
 def test_what_hangs_on_something_else_follows_that_and_is_still_the_bed_s(pair, clock, what):
     bpy.ops.digiclay.add_hand()
     palm, own = bpy.context.object, fingertips_of(pair)
-    (bpy.ops.object.armature_add if "bone" in what else bpy.ops.object.empty_add)(location=(0.1, 0.2, 0.3))
+    (bpy.ops.object.armature_add if "bone" in what else bpy.ops.object.empty_add)(
+        location=(0.1, 0.2, 0.3)
+    )
     where = bpy.context.object
     where.rotation_euler, where.scale = (0.3, -0.2, 1.0), (1.5, 1.5, 1.5)
     looked()
@@ -196,7 +205,9 @@ def test_what_hangs_on_something_else_follows_that_and_is_still_the_bed_s(pair, 
         select(thing)
         bpy.ops.object.duplicate()
         looked()
-    copy = next(thing for thing in bpy.context.scene.objects if roles.is_bed(thing) and thing != pair)
+    copy = next(
+        thing for thing in bpy.context.scene.objects if roles.is_bed(thing) and thing != pair
+    )
     assert len(fingertips_of(pair)) == 8
     for bed in (pair, copy):
         assert_near(bridge.poses(bed)[:7, :3], wanted[:, :3], 2e-6)
@@ -205,7 +216,9 @@ def test_what_hangs_on_something_else_follows_that_and_is_still_the_bed_s(pair, 
 
 
 @pytest.mark.parametrize("scale", [(1.5, 1.5, 1.5), (-1.0, 1.0, 1.0), (0.8, -0.8, 0.8)])
-def test_a_palm_that_is_scaled_spreads_or_mirrors_its_fingertips_which_keep_their_sizes(pair, clock, scale):
+def test_a_palm_that_is_scaled_spreads_or_mirrors_its_fingertips_which_keep_their_sizes(
+    pair, clock, scale
+):
     bpy.ops.digiclay.add_hand()
     started(pair)
     bpy.context.object.scale, before = scale, bridge.poses(pair)[2:, :2]
@@ -230,7 +243,9 @@ def test_fingertips_keep_their_numbers_where_one_between_is_deleted_or_comes_aft
     press(pair, clock, 3)
     tick.stop(pair.session_uid)
     select(pair)
-    bpy.ops.digiclay.take_export(filepath=str(tmp_path / "take.toml"))  # a scene file counts from 1 on
+    bpy.ops.digiclay.take_export(
+        filepath=str(tmp_path / "take.toml")
+    )  # a scene file counts from 1 on
     assert load(tmp_path / "take.toml").description.endswith(": 1 = 1, 2 = 3")
     third = fingertips_of(pair)[3]
     assert third.name.endswith("Fingertip 3")
@@ -300,7 +315,9 @@ def keyframe(pair):
             fingertips_of(pair)[number].keyframe_insert("location", frame=frame)
 
 
-def test_animated_fingertips_are_baked_and_takes_of_several_replayed_and_exported(pair, clock, tmp_path):
+def test_animated_fingertips_are_baked_and_takes_of_several_replayed_and_exported(
+    pair, clock, tmp_path
+):
     started(pair)
     running.put(sculpting.set_recording(running.find(pair), True))
     press(pair, clock, 1, 2)
@@ -311,7 +328,9 @@ def test_animated_fingertips_are_baked_and_takes_of_several_replayed_and_exporte
     np.testing.assert_array_equal(exact(pair), formed)
     bpy.ops.digiclay.take_export(filepath=str(tmp_path / "pair.toml"))
     assert len(load(tmp_path / "pair.toml").fingers) == 2
-    fingertips_of(pair)[2].constraints.new("COPY_LOCATION").target = pair  # that leads it elsewhere now
+    fingertips_of(pair)[2].constraints.new(
+        "COPY_LOCATION"
+    ).target = pair  # that leads it elsewhere now
     assert bpy.ops.digiclay.bake(source="TAKE") == {"FINISHED"}
     take = takes.read(pair)
     bpy.context.scene.frame_set(20)
@@ -324,7 +343,9 @@ def test_animated_fingertips_are_baked_and_takes_of_several_replayed_and_exporte
     assert bpy.ops.digiclay.bake(source="FINGERTIP", first=1, last=20) == {"FINISHED"}
     bpy.context.scene.frame_set(20)
     graph = bpy.context.evaluated_depsgraph_get()
-    tops = np.array([item.matrix_world.translation.z for item in graph.object_instances if item.is_instance])
+    tops = np.array(
+        [item.matrix_world.translation.z for item in graph.object_instances if item.is_instance]
+    )
     assert tops.size > 0
 
 

@@ -53,10 +53,18 @@ def edit_through_a_linked_duplicate(bed):
         (lambda bed: look_at("Other"), "no window shows its scene", lambda bed: look_at("Scene")),
         (lambda bed: edit(), "back to Object Mode", lambda bed: edit("OBJECT")),
         (edit_through_a_linked_duplicate, "back to Object Mode", lambda bed: edit("OBJECT")),
-        (lambda bed: scale(bed, 2.0), "must be the same along x, y and z", lambda bed: scale(bed, 1.0)),
+        (
+            lambda bed: scale(bed, 2.0),
+            "must be the same along x, y and z",
+            lambda bed: scale(bed, 1.0),
+        ),
         (lambda bed: lay_out(bed, 14), "169 pins, not 182", lambda bed: lay_out(bed, 13)),
         (lambda bed: bed.data.vertices.add(1), "170 pins now instead of 169", None),
-        (lambda bed: bed.data.attributes.remove(bed.data.attributes["mode"]), "no longer that of", None),
+        (
+            lambda bed: bed.data.attributes.remove(bed.data.attributes["mode"]),
+            "no longer that of",
+            None,
+        ),
         (lambda bed: fingertip_of(bed).scale.zero(), "scaled to nothing", None),
     ],
 )
@@ -91,7 +99,9 @@ def test_a_deleted_bed_or_scene_ends_the_session_with_a_message(bed, clock, what
         gone = bpy.context.window.scene
         bpy.context.window.scene = bpy.data.scenes.new("Other")
         bpy.data.scenes.remove(gone)
-    assert [(note.level, "was deleted" in note.message) for note in clock.tick()] == [("WARNING", True)]
+    assert [(note.level, "was deleted" in note.message) for note in clock.tick()] == [
+        ("WARNING", True)
+    ]
     assert running.list_sessions() == ()
 
 

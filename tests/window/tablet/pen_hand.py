@@ -1,7 +1,7 @@
 """Moves the pen of `screen.py` as a hand does: ``pen_hand.py "to 300 200 0.5 0.8 0" down "sleep 0.1" up``.
 
-A place is in pixels of the screen, with the pressure, 0 to 1, and the tilt to the right and to the user, each
--1 to 1.
+A place is in pixels of the screen, with the pressure, 0 to 1, and the tilt to the right and to the
+user, each -1 to 1.
 """
 
 import ctypes
@@ -9,7 +9,8 @@ import os
 import sys
 import time
 
-#: Width and height of the screen less one, and the largest value of the axes x, y, pressure and tilt.
+#: Width and height of the screen less one, and the largest value of the axes x, y, pressure and
+#: tilt.
 SIZE, FULL, TILT = (799, 599), 65535, 63
 NAME = b"stylus"
 

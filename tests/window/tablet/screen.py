@@ -24,7 +24,10 @@ def find_missing():
     missing = [name for name in ("gcc", "pkg-config") if shutil.which(name) is None]
     if find_server() is None or not (Path(MODULES) / "drivers" / "dummy_drv.so").is_file():
         missing.append("Xorg with its driver dummy")
-    if "pkg-config" not in missing and subprocess.run(["pkg-config", "--exists", HEADERS]).returncode:
+    if (
+        "pkg-config" not in missing
+        and subprocess.run(["pkg-config", "--exists", HEADERS]).returncode
+    ):
         missing.append("the headers of xorg-server")
     return ", ".join(missing)
 
@@ -39,7 +42,14 @@ def pen_screen(folder):
     flags = subprocess.run(
         ["pkg-config", "--cflags", HEADERS], check=True, capture_output=True, text=True
     ).stdout.split()
-    command = ["gcc", "-shared", "-fPIC", "-o", str(inputs / "testpen_drv.so"), str(HERE / "testpen_drv.c")]
+    command = [
+        "gcc",
+        "-shared",
+        "-fPIC",
+        "-o",
+        str(inputs / "testpen_drv.so"),
+        str(HERE / "testpen_drv.c"),
+    ]
     subprocess.run([*command, *flags], check=True, timeout=60)
     told, tell = os.pipe()
     server = find_server()

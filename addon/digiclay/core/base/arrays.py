@@ -24,9 +24,9 @@ Indices = NDArray[np.int64]
 #: Corners of triangles (f, 3), numbers of vertices.
 Faces = NDArray[np.int32]
 
-#: Largest difference of equal lengths, m, forces, N, times, s, and ranks. Values that are equal by the
-#: lattice, symmetry or the clock differ by rounding, at most 1e-12, which depends on the processor and must
-#: not decide. Of equal values the first is taken.
+#: Largest difference of equal lengths, m, forces, N, times, s, and ranks. Values that are equal by
+#: the lattice, symmetry or the clock differ by rounding, at most 1e-12, which depends on the
+#: processor and must not decide. Of equal values the first is taken.
 TIE = 1e-9
 PARTS = 2.0**30
 #: Smallest normal number: keeps 0 / 0 from being NaN.

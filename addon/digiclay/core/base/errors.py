@@ -13,7 +13,9 @@ def one_line(text: object, most: int = LONGEST) -> str:
     A longer one is cut to its beginning, which has the error, and its end, which has the remedy.
     """
     line = " ".join(str(text).split())
-    line = "".join(letter if letter.isprintable() else "\N{REPLACEMENT CHARACTER}" for letter in line)
+    line = "".join(
+        letter if letter.isprintable() else "\N{REPLACEMENT CHARACTER}" for letter in line
+    )
     beginning = most * 3 // 5
     return line if len(line) <= most else f"{line[:beginning]} ... {line[beginning + 5 - most :]}"
 
@@ -71,5 +73,13 @@ class DivergenceError(DigiclayError, ArithmeticError):
     """Integration with values that are not finite: time, s, first cell, its quantity and value."""
 
     def __init__(self, time: float, cell: int, quantity: str, value: float, remedy: str) -> None:
-        self.time, self.cell, self.quantity, self.value, self.remedy = time, cell, quantity, value, remedy
-        super().__init__(f"At {time:.6g} s the {quantity} of cell {cell} became {value:g}. {remedy}")
+        self.time, self.cell, self.quantity, self.value, self.remedy = (
+            time,
+            cell,
+            quantity,
+            value,
+            remedy,
+        )
+        super().__init__(
+            f"At {time:.6g} s the {quantity} of cell {cell} became {value:g}. {remedy}"
+        )

@@ -30,15 +30,20 @@ UNITS: dict[str, tuple[float, str]] = {
     "kg/m3": (1.0, "kg/m3"), "m2/s": (1.0, "m2/s"), "mm2/s": (1e-6, "m2/s"), "cSt": (1e-6, "m2/s"),
 }  # fmt: skip
 
-#: Smallest, unless 0, and largest number of a unit: far beyond all devices, and close enough to 1 that
-#: products of several neither overflow nor vanish.
+#: Smallest, unless 0, and largest number of a unit: far beyond all devices, and close enough to 1
+#: that products of several neither overflow nor vanish.
 EXTENTS: dict[str, tuple[float, float]] = {
     "m": (1e-12, 1e3), "s": (1e-9, 1e6), "Pa": (1e-6, 1e10), "N": (1e-12, 1e6), "N/m": (1e-6, 1e9),
     "1/m": (1e-6, 1e9), "1/N": (1e-6, 1e9), "m/s": (1e-12, 1e6), "m/s2": (1e-9, 1e9), "kg/m3": (1e-3, 1e6),
     "m2/s": (1e-12, 1e3), "N s/m": (1e-9, 1e9), "": (1e-9, 1e9),
 }  # fmt: skip
 #: Bounds of a parameter: the comparison that a valid value satisfies.
-BOUNDS = {"above": operator.gt, "at_least": operator.ge, "below": operator.lt, "at_most": operator.le}
+BOUNDS = {
+    "above": operator.gt,
+    "at_least": operator.ge,
+    "below": operator.lt,
+    "at_most": operator.le,
+}
 #: A number, and the text after it.
 WRITTEN = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|[+-]?(?:nan|inf)(?= |$))\s*(.*)")
 
@@ -46,11 +51,11 @@ WRITTEN = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|[+-]?(?:nan|in
 class Quantity(NamedTuple):
     """Declaration of one parameter.
 
-    Bounds are in the parameter's own unit; ``above`` and ``below`` are exclusive,
-    ``at_least`` and ``at_most`` inclusive. `source` is P (paper), D (derived), C (chosen) or
-    the key of a reference in docs/nomenclature.md; several are separated by commas. A `later` one is
-    unknown to older versions, and is only written if it is not the default, so that these read the rest.
-    `whole` is the meaning of twice the value, which is shown in place of a semi-axis.
+    Bounds are in the parameter's own unit; ``above`` and ``below`` are exclusive, ``at_least`` and
+    ``at_most`` inclusive. `source` is P (paper), D (derived), C (chosen) or the key of a reference
+    in docs/nomenclature.md; several are separated by commas. A `later` one is unknown to older
+    versions, and is only written if it is not the default, so that these read the rest. `whole` is
+    the meaning of twice the value, which is shown in place of a semi-axis.
     """
 
     doc: str
@@ -117,7 +122,8 @@ def list_quantities(parameters: type[Parameters] | Parameters) -> dict[str, Quan
 class Parameters:
     """Base of every part's parameters: frozen and valid, or refused with ParameterError.
 
-    It has the methods that dataclasses would make for each class, in a twentieth of a short command's time.
+    It has the methods that dataclasses would make for each class, in a twentieth of a short
+    command's time.
     """
 
     def _list_values(self) -> tuple[Any, ...]:
@@ -136,7 +142,9 @@ class Parameters:
     def __init_subclass__(cls, **given: Any) -> None:
         super().__init_subclass__(**given)
         for name, field in vars(cls).items():
-            declared = field.metadata.get("quantity") if isinstance(field, dataclasses.Field) else None
+            declared = (
+                field.metadata.get("quantity") if isinstance(field, dataclasses.Field) else None
+            )
             if declared and declared.unit not in EXTENTS:
                 units = ", ".join(filter(None, EXTENTS))
                 rule = f"must have one of the units {units}, or none for a number"
@@ -160,7 +168,9 @@ class Parameters:
             raise
         except BaseException as error:  # of a method of one's own
             cause = f"{type(error).__name__}: {error}"
-            raise ParameterError(type(self).__name__, "", "must pass its own check", cause) from error
+            raise ParameterError(
+                type(self).__name__, "", "must pass its own check", cause
+            ) from error
 
     def check(self) -> None:
         """Check the rules that join several fields; parts override this."""
@@ -174,7 +184,9 @@ def refuse_overrides(kind: type, base: type, names: tuple[str, ...], reason: str
     """Refuse a class that overrides attributes of its base which other code bypasses."""
     for name in names:
         if getattr(kind, name) is not getattr(base, name):
-            raise ParameterError(kind.__name__, name, f"must be that of {base.__name__}: {reason}", "another")
+            raise ParameterError(
+                kind.__name__, name, f"must be that of {base.__name__}: {reason}", "another"
+            )
 
 
 def _typed(owner: Parameters, name: str, value: Any, default: Any) -> Any:
@@ -206,13 +218,16 @@ def _finite(value: float) -> bool:
 
 def normalize(text: str) -> str:
     """Return a quantity with plain signs in place of similar ones: the Greek mu, ``²``, no-break spaces."""
-    return unicodedata.normalize("NFKC", text).replace("\N{GREEK SMALL LETTER MU}", "\N{MICRO SIGN}")
+    return unicodedata.normalize("NFKC", text).replace(
+        "\N{GREEK SMALL LETTER MU}", "\N{MICRO SIGN}"
+    )
 
 
 def parse(text: str, unit: str) -> float:
     """Return a quantity with one of the `UNITS`, such as ``"3 mm"``, in an SI unit.
 
-    Raises ValueError when the number or the unit cannot be read, or the unit is of another quantity.
+    Raises ValueError when the number or the unit cannot be read, or the unit is of another
+    quantity.
     """
     match = WRITTEN.fullmatch(normalize(text).strip())
     if not match:

@@ -1,8 +1,9 @@
 """Monotone cubic splines, many at once, without overshoot.
 
-The slope at a knot is the weighted harmonic mean of the slopes on both sides, and 0 where these differ in
-sign: F. N. Fritsch and J. Butland, A method for constructing local monotone piecewise cubic interpolants,
-SIAM J. Sci. Stat. Comput. 5 (1984) 300. At the ends it is the limited slope of a parabola.
+The slope at a knot is the weighted harmonic mean of the slopes on both sides, and 0 where these
+differ in sign: F. N. Fritsch and J. Butland, A method for constructing local monotone piecewise
+cubic interpolants, SIAM J. Sci. Stat. Comput. 5 (1984) 300. At the ends it is the limited slope of
+a parabola.
 """
 
 import numpy as np

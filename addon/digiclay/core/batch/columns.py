@@ -1,7 +1,7 @@
 """Runs of a batch side by side: each is a column of one set of arrays.
 
-Equal parts are shared; a number that differs between runs becomes an array with one entry per run. A control
-period therefore takes as many numpy calls as that of a single run.
+Equal parts are shared; a number that differs between runs becomes an array with one entry per run.
+A control period therefore takes as many numpy calls as that of a single run.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ from ..model.touch import FingerPeriod
 class PaddedSelection(Selection):
     """Selection of the active cells of all runs, renewed for all as soon as one run needs it.
 
-    All runs have as many cells as the largest set. Those that fill up a smaller one are idle: to integrate
-    them changes nothing.
+    All runs have as many cells as the largest set. Those that fill up a smaller one are idle: to
+    integrate them changes nothing.
     """
 
     margin_pitches = 0.5
@@ -66,7 +66,9 @@ class OwnSelection(Selection):
         active, period, count = state.active, state.period, len(self.runs)
         # Before the first period there are no sets: empty ones are due.
         sets = list(active.runs or [replace(active, cells=np.empty(0, np.intp))] * count)
-        windows = np.broadcast_to(finger.window, (6, count)).T.tolist() if finger else [None] * count
+        windows = (
+            np.broadcast_to(finger.window, (6, count)).T.tolist() if finger else [None] * count
+        )
         discs = control or [None] * count
         due = [
             run
@@ -80,7 +82,9 @@ class OwnSelection(Selection):
             size = sets[run].cells.size
             top = float(active.block[0, :size, run].max(initial=peak[run]))
             peak[run], still = top, moving[:size, run]
-            sets[run] = self.runs[run].choose(sets[run], period, windows[run], discs[run], still, top)
+            sets[run] = self.runs[run].choose(
+                sets[run], period, windows[run], discs[run], still, top
+            )
         near, until = max(part.near for part in sets), min(part.until for part in sets)
         cells = _pad(sets, self.grid.count)
         chosen = replace(active, cells=cells, near=near, until=until, runs=tuple(sets))
@@ -97,13 +101,13 @@ def _pad(sets: Sequence[ActiveSet], count: int) -> Cells:
     return np.stack(columns, axis=-1)
 
 
-#: Cells moved at a time: they fit into the cache of a core, and their matrix products run on one core, since
-#: to wake a second one takes longer than the product.
+#: Cells moved at a time: they fit into the cache of a core, and their matrix products run on one
+#: core, since to wake a second one takes longer than the product.
 PIECE = 2048
 
 
-#: Cells out of the fingertips' reach are moved in multiples of this number, so that workspaces of few sizes
-#: serve for any number.
+#: Cells out of the fingertips' reach are moved in multiples of this number, so that workspaces of
+#: few sizes serve for any number.
 GROUP = 8
 
 
@@ -134,7 +138,8 @@ class BatchMovement:
         forces, undersides = self._beds(force)[0], self._beds(under)
         for part, move in self._touched:
             forces[part] = move(undersides[:, part])
-        # Beyond the fingertips a pin with a shut valve and no queued command rests: squares sum to 0.
+        # Beyond the fingertips a pin with a shut valve and no queued command rests: squares sum to
+        # 0.
         awake = self._near + np.flatnonzero(np.einsum("rwb,rwb->w", self._valves, self._valves))
         for part in _pieces(awake.size, force.shape[2]):
             self._move_others(awake[part], under[:, :0])
@@ -181,7 +186,9 @@ def begin(batch: Batch) -> State:
 def make_batch(systems: Sequence[System]) -> Batch:
     """Return the batch of systems of one structure."""
     first, cell = systems[0], merge_parts([system.cell for system in systems])
-    period, fastest = np.array([(system.period, system.fastest) for system in systems], np.float64).T
+    period, fastest = np.array(
+        [(system.period, system.fastest) for system in systems], np.float64
+    ).T
     common = first.grid, first.rows, cell, period, fastest
     selections = tuple(system.selection for system in systems)
     return Batch(

@@ -23,7 +23,10 @@ from .columns import Batch, begin, make_batch
 
 
 def extend_path(
-    path: FingerPath | None, systems: Sequence[System], trajectories: Sequence[Trajectory], period: int
+    path: FingerPath | None,
+    systems: Sequence[System],
+    trajectories: Sequence[Trajectory],
+    period: int,
 ) -> FingerPath | None:
     """Return the fingertip path of a batch in a period and later ones; None without contact."""
     if systems[0].cell.touch is None or (path and period < path.first + len(path.forms)):
@@ -122,7 +125,9 @@ def begin_play(scenes: Mapping[int, Scene], systems: Mapping[int, System]) -> Pl
 def locate_fingers(play: Play) -> Play:
     """Return the batch with the fingertip paths in the coming control period."""
     trajectories = [play.trajectories[run] for run in play.runs]
-    return replace(play, path=extend_path(play.path, play.batch.systems, trajectories, play.state.period))
+    return replace(
+        play, path=extend_path(play.path, play.batch.systems, trajectories, play.state.period)
+    )
 
 
 def keep_runs(play: Play, runs: tuple[int, ...]) -> Play:
@@ -149,7 +154,9 @@ class Instant:
         return Ended(state.period, self.share, count_losses(state.memory[index]))
 
 
-def play_all(play: Play, ends: Mapping[int, int], stopped: Callable[[], bool] | None) -> Iterator[Instant]:
+def play_all(
+    play: Play, ends: Mapping[int, int], stopped: Callable[[], bool] | None
+) -> Iterator[Instant]:
     """Yield the batch after each control period; runs that have ended leave it before the next one."""
     share = 0.0
     while play.runs:
@@ -165,4 +172,6 @@ def play_all(play: Play, ends: Mapping[int, int], stopped: Callable[[], bool] | 
         if over.all():
             return
         if over.any():
-            play = keep_runs(play, tuple(run for run, gone in zip(play.runs, over, strict=True) if not gone))
+            play = keep_runs(
+                play, tuple(run for run, gone in zip(play.runs, over, strict=True) if not gone)
+            )

@@ -20,15 +20,23 @@ from ..scene.schema import Scene
 from ..session.accuracy import Errors, compare, explain_absence, make_reference
 from ..session.memory_limit import check_memory
 from ..session.run_scene import Result, evaluate, measure_losses, report
-from .play import Instant, Play, begin_play, keep_runs, locate_fingers, make_divergence_error, play_all
+from .play import (
+    Instant,
+    Play,
+    begin_play,
+    keep_runs,
+    locate_fingers,
+    make_divergence_error,
+    play_all,
+)
 from .structure import describe_structure
 
 
 class Histories:
     """Histories of runs, stored as stretches of active cells, and written out one run at a time.
 
-    Histories of all cells of all runs would not fit into memory. `scenes`: by the numbers of the runs;
-    `play`: the batch before its first period; without a recorder there are no histories.
+    Histories of all cells of all runs would not fit into memory. `scenes`: by the numbers of the
+    runs; `play`: the batch before its first period; without a recorder there are no histories.
     """
 
     def __init__(self, scenes: Mapping[int, Scene], recorder: Recorder | None, play: Play) -> None:
@@ -121,7 +129,9 @@ class Sums:
         moments, tip, cells = self._ways[same]
         metrics = {
             **compute_metrics_from_sums(sums, moments, tip, grid.positions, scene.set_point, cells),
-            **measure_losses(scene, play.batch.systems[index].fastest, moments, [(total, tip[:, 2])]),
+            **measure_losses(
+                scene, play.batch.systems[index].fastest, moments, [(total, tip[:, 2])]
+            ),
         }
         return report(scene, now.ended(index), metrics)
 
@@ -226,10 +236,10 @@ def run_together(
 ) -> Iterator[tuple[int, Outcome]]:
     """Run scenes from rest to their ends, all together.
 
-    Each scene has one finger, and all have one structure, see `structure.describe_structure`. `stopped` is
-    called after each control period; if it returns True, unfinished runs are dropped. Yields the number of a
-    scene at its end, and the result or error of `run_scene.run`. The history is valid until the next result,
-    and the run time is a share, see `play.Instant`.
+    Each scene has one finger, and all have one structure, see `structure.describe_structure`.
+    `stopped` is called after each control period; if it returns True, unfinished runs are dropped.
+    Yields the number of a scene at its end, and the result or error of `run_scene.run`. The history
+    is valid until the next result, and the run time is a share, see `play.Instant`.
     """
     return _run(scenes, Histories, stopped)
 
@@ -239,7 +249,7 @@ def measure_together(
 ) -> Iterator[tuple[int, Outcome]]:
     """Run scenes as `run_together`, and measure them without storing their histories.
 
-    The metrics are the same as with a history. `errors`: whether errors are estimated; the references, see
-    `accuracy.make_reference`, must then have one structure as well.
+    The metrics are the same as with a history. `errors`: whether errors are estimated; the
+    references, see `accuracy.make_reference`, must then have one structure as well.
     """
     return _run(scenes, Sums, stopped, errors=errors)

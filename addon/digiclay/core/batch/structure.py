@@ -23,15 +23,25 @@ CLOSED_FORM = ("bernoulli", "richardson")
 
 
 #: Parts that decide how cells move.
-PHYSICS = ("actuator", "supply", "fluid", "valve", "conduit", "valve_lag", "delay", "contact", "relaxation")
+PHYSICS = (
+    "actuator",
+    "supply",
+    "fluid",
+    "valve",
+    "conduit",
+    "valve_lag",
+    "delay",
+    "contact",
+    "relaxation",
+)
 
 
 def describe_structure(scene: Scene, system: System | None = None) -> Any:
     """Return a key that scenes of one batch have in common.
 
-    For the closed-form and the Richardson stepper it has the kinds of the parts, not their numbers. Other
-    steppers have no axis of runs: all cells must be alike. Raises ParameterError if parts of the scene are
-    not compatible.
+    For the closed-form and the Richardson stepper it has the kinds of the parts, not their numbers.
+    Other steppers have no axis of runs: all cells must be alike. Raises ParameterError if parts of
+    the scene are not compatible.
     """
     if len(scene.fingers) != 1:
         return "one by one", len(scene.fingers)
@@ -55,5 +65,7 @@ def describe_structure(scene: Scene, system: System | None = None) -> Any:
     system = system or assemble(scene)
     plan: Any = system.plan
     plans = (plan,) if isinstance(plan, BernoulliPlan) else (plan.coarse, plan.fine)
-    nodes = tuple((plan.laminar, *((part.start, part.stop) for part in plan.nodes)) for plan in plans)
+    nodes = tuple(
+        (plan.laminar, *((part.start, part.stop) for part in plan.nodes)) for plan in plans
+    )
     return (*common, classify(physics), system.rows, nodes, system.instants.size)

@@ -16,10 +16,18 @@ from ..model.actuator import Actuator
 from ..model.control_interface import Commands, Measurement, Memory
 from ..model.layout import Disc
 from .device_info import DeviceInfo, check_floor
-from .drive import CellwiseControl, Drive, TouchParameters, check_damping, make_drive, raise_felt_force
+from .drive import (
+    CellwiseControl,
+    Drive,
+    TouchParameters,
+    check_damping,
+    make_drive,
+    raise_felt_force,
+)
 from .exchange import Exchange, make_exchange
 
-#: Share of the felt force above which a touched cell remains touched: its spring may press no harder.
+#: Share of the felt force above which a touched cell remains touched: its spring may press no
+#: harder.
 STILL = 0.2
 #: Displacement at the border of the displaced region, in dead bands.
 BORDER = 0.1
@@ -29,8 +37,12 @@ BORDER = 0.1
 class Elastic(TouchParameters):
     """Spring and damper under every pin."""
 
-    stiffness: float = quantity(20.0, "stiffness of a cell's spring", unit="N/m", symbol="k", above=0.0)
-    damping: float = quantity(5.0, "force per speed of a pressed pin", unit="N s/m", symbol="c", above=0.0)
+    stiffness: float = quantity(
+        20.0, "stiffness of a cell's spring", unit="N/m", symbol="k", above=0.0
+    )
+    damping: float = quantity(
+        5.0, "force per speed of a pressed pin", unit="N s/m", symbol="c", above=0.0
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,9 +70,15 @@ class ElasticControl(CellwiseControl):
 class Plastic(TouchParameters):
     """Bingham body under every pin: rigid up to a yield force, viscous above."""
 
-    yield_force: float = quantity(0.03, "force above which a cell yields", unit="N", symbol="F_y", above=0.0)
+    yield_force: float = quantity(
+        0.03, "force above which a cell yields", unit="N", symbol="F_y", above=0.0
+    )
     damping: float = quantity(
-        5.0, "force above the yield force per speed of a sinking pin", unit="N s/m", symbol="c", above=0.0
+        5.0,
+        "force above the yield force per speed of a sinking pin",
+        unit="N s/m",
+        symbol="c",
+        above=0.0,
     )
 
     def check(self) -> None:
@@ -74,8 +92,8 @@ class Plastic(TouchParameters):
 class PlasticControl(CellwiseControl):
     """Controller of the plastic behavior: a pin above its yield force yields and keeps its lowest height.
 
-    Above yield: ``c dH/dt = -(F - F_y)``, and the height becomes the cell's target. Below it the pin does
-    not move; released, it goes to the lowest height to which it was pressed.
+    Above yield: ``c dH/dt = -(F - F_y)``, and the height becomes the cell's target. Below it the
+    pin does not move; released, it goes to the lowest height to which it was pressed.
     """
 
     parameters: Plastic
@@ -103,12 +121,18 @@ class Viscous(TouchParameters):
     Materiable calls this viscosity: a spring and a damper per cell, and exchange between neighbors.
     """
 
-    damping: float = quantity(10.0, "force per speed of a sinking pin", unit="N s/m", symbol="c", above=0.0)
+    damping: float = quantity(
+        10.0, "force per speed of a sinking pin", unit="N s/m", symbol="c", above=0.0
+    )
     recovery_time: float = quantity(
         1.0, "time constant of the surface's recovery", unit="s", symbol="τ_r", above=0.0
     )
     diffusivity: float = quantity(
-        10e-6, "diffusivity of the displacement between neighbors", unit="m2/s", symbol="D", at_least=0.0
+        10e-6,
+        "diffusivity of the displacement between neighbors",
+        unit="m2/s",
+        symbol="D",
+        at_least=0.0,
     )
 
 
@@ -124,9 +148,15 @@ class Spot(NamedTuple):
         """Return the box extended to positions with the basis (6, m)."""
         if not basis.shape[1]:
             return self
-        (left, bottom), (right, top) = basis[1:3].min(axis=1).tolist(), basis[1:3].max(axis=1).tolist()
+        (left, bottom), (right, top) = (
+            basis[1:3].min(axis=1).tolist(),
+            basis[1:3].max(axis=1).tolist(),
+        )
         return Spot(
-            min(self.left, left), max(self.right, right), min(self.bottom, bottom), max(self.top, top)
+            min(self.left, left),
+            max(self.right, right),
+            min(self.bottom, bottom),
+            max(self.top, top),
         )
 
     def disc(self, margin: float) -> Disc | None:
@@ -141,8 +171,8 @@ class Spot(NamedTuple):
 class ViscousControl:
     """Controller of the viscous behavior: a pressed pin sinks slowly, displaces its neighbors, and recovers.
 
-    ``du/dt = -F / c - u / τ_r + D ∇²u`` with u = H_com - H_0; each period, neighbors exchange,
-    then every cell relaxes under its force, exactly. The exchange keeps Σ u, so that the volume of a
+    ``du/dt = -F / c - u / τ_r + D ∇²u`` with u = H_com - H_0; each period, neighbors exchange, then
+    every cell relaxes under its force, exactly. The exchange keeps Σ u, so that the volume of a
     dent decays with τ_r whatever D is.
     """
 
@@ -162,7 +192,9 @@ class ViscousControl:
 
     def locate(self, memory: Spot, touched: Measurement) -> tuple[Spot, Disc | None]:
         """Request all displaced cells and a margin around them; see `Controller`."""
-        spot = memory.around(touched.quadratic_basis[:, touched.force >= self.parameters.felt_force])
+        spot = memory.around(
+            touched.quadratic_basis[:, touched.force >= self.parameters.felt_force]
+        )
         return spot, spot.disc(self.margin)
 
     def command(self, memory: Spot, seen: Measurement) -> tuple[Spot, Commands]:
@@ -205,7 +237,9 @@ def build(parameters: Any, device: DeviceInfo) -> ElasticControl | PlasticContro
     stiffness = parameters.stiffness if isinstance(parameters, Elastic) else 0.0
     check_damping(parameters.damping, device.cell, device.period, stiffness)
     if isinstance(parameters, Plastic):
-        check_floor(parameters.yield_force, "yield_force", parameters.yield_force, device.force_floor)
+        check_floor(
+            parameters.yield_force, "yield_force", parameters.yield_force, device.force_floor
+        )
     actuator, drive = device.cell.actuator, make_drive(parameters, device.cell, device.period)
     parameters = raise_felt_force(device.force_floor, parameters)
     if isinstance(parameters, Elastic):

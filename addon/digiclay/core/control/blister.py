@@ -27,9 +27,15 @@ class Blister(Parameters):
     edge_radius: float = quantity(
         18.5e-3, "outer radius of the ring of edge cells", unit="m", symbol="r_edge", above=0.0
     )
-    flat_radius: float = quantity(6e-3, "radius of the flat top", unit="m", symbol="r_flat", at_least=0.0)
-    profile: str = quantity("cone", "radial profile of the blister", source="P", choices=("cone", "gaussian"))
-    sigma: float = quantity(7e-3, "standard deviation of the Gaussian", unit="m", symbol="σ", above=0.0)
+    flat_radius: float = quantity(
+        6e-3, "radius of the flat top", unit="m", symbol="r_flat", at_least=0.0
+    )
+    profile: str = quantity(
+        "cone", "radial profile of the blister", source="P", choices=("cone", "gaussian")
+    )
+    sigma: float = quantity(
+        7e-3, "standard deviation of the Gaussian", unit="m", symbol="σ", above=0.0
+    )
 
     def check(self) -> None:
         """The flat top lies inside the blister, the edge outside."""
@@ -64,9 +70,11 @@ class Blister(Parameters):
         return Constants((self.flat_radius,))
 
 
-#: Share of the flat top's radius within which no cell freezes while the blister sinks into uneven ground.
+#: Share of the flat top's radius within which no cell freezes while the blister sinks into uneven
+#: ground.
 HELD = 0.4
-#: A frozen cell is freed when its cosine is less negative than this share of the limit at which cells freeze.
+#: A frozen cell is freed when its cosine is less negative than this share of the limit at which
+#: cells freeze.
 FREED = 0.3
 CODES = Constants((EDGE, BLISTER, FROZEN), np.int8)
 
@@ -109,8 +117,8 @@ class BlisterRule:
     def find_frozen(self, cells: BlisterCells, seen: Measurement, uneven: Any = False) -> Flags:
         """Return the frozen cells: those left behind now or before, except pressed ones.
 
-        `uneven` (m[, b]): cells that sink into uneven ground. They freeze nearer to the fingertip, and are
-        freed when they are ahead of it again.
+        `uneven` (m[, b]): cells that sink into uneven ground. They freeze nearer to the fingertip,
+        and are freed when they are ahead of it again.
         """
         *_, flat_radius, behind, release, _ = self._limits[cells.distance.shape]
         limit = behind * cells.distance

@@ -1,8 +1,8 @@
 """Method II: a state machine in every cell, driven by its own force (Fig. 5 of the paper).
 
 There is no coordinator: a cell under enough force follows it, and its neighbors become a blister
-around it. Those that feel the fingertip follow the force in turn, so that the contact set spreads and
-moves with the fingertip.
+around it. Those that feel the fingertip follow the force in turn, so that the contact set spreads
+and moves with the fingertip.
 """
 
 import math
@@ -90,7 +90,8 @@ def follow_arrows(mode: Modes, arrows: Arrows, conditions: dict[str, Flags]) -> 
 class Patch(NamedTuple):
     """Memory of the controller: centroid of the forces when last felt, m, direction of travel, losses.
 
-    `edge`: height of the surface around the blister, m; `felt`: whether some cell is under the fingertip.
+    `edge`: height of the surface around the blister, m; `felt`: whether some cell is under the
+    fingertip.
     """
 
     x: float = 0.0
@@ -124,7 +125,11 @@ class CellStates(Tracking):
         0.04, "force of a cell held under the fingertip", unit="N", symbol="F_ref", above=0.0
     )
     spring_trigger: float = quantity(
-        0.06, "force at which a cell at rest begins to follow", unit="N", symbol="F_trig^VS", above=0.0
+        0.06,
+        "force at which a cell at rest begins to follow",
+        unit="N",
+        symbol="F_trig^VS",
+        above=0.0,
     )
     blister_trigger: float = quantity(
         0.015,
@@ -134,13 +139,19 @@ class CellStates(Tracking):
         above=0.0,
     )
     critical_trigger: float = quantity(
-        0.005, "force below which a following cell is critical", unit="N", symbol="F_trig^crit", above=0.0
+        0.005,
+        "force below which a following cell is critical",
+        unit="N",
+        symbol="F_trig^crit",
+        above=0.0,
     )
     critical_time: float = quantity(
         50e-3, "time until a critical cell ends following", unit="s", symbol="t_crit", at_least=0.0
     )
     spring_stiffness: float = quantity(20.0, "virtual spring", unit="N/m", symbol="k_VS", above=0.0)
-    force_gain: float = quantity(15.0, "proportional gain of force", unit="1/N", symbol="K_FF", at_least=0.0)
+    force_gain: float = quantity(
+        15.0, "proportional gain of force", unit="1/N", symbol="K_FF", at_least=0.0
+    )
     rise: float = quantity(
         1e-3,
         "rise of the blister for the detection of contact",
@@ -166,10 +177,14 @@ class CellStates(Tracking):
         """A blister cell starts to follow before one at rest does, and is critical below that."""
         if not self.blister_trigger < self.spring_trigger:
             rule = f"must be below spring_trigger, {self.spring_trigger:g} N"
-            raise ParameterError("CellStates", "blister_trigger", rule, f"{self.blister_trigger:g} N")
+            raise ParameterError(
+                "CellStates", "blister_trigger", rule, f"{self.blister_trigger:g} N"
+            )
         if not self.critical_trigger < self.blister_trigger:
             rule = f"must be below blister_trigger, {self.blister_trigger:g} N"
-            raise ParameterError("CellStates", "critical_trigger", rule, f"{self.critical_trigger:g} N")
+            raise ParameterError(
+                "CellStates", "critical_trigger", rule, f"{self.critical_trigger:g} N"
+            )
 
 
 @dataclass(frozen=True, eq=False)
@@ -188,7 +203,8 @@ class CellStatesControl:
     floor: float = 0.0
     """Noise floor of a cell's reading, N."""
 
-    #: Row of a cell: periods since it became critical; of several fingers, also whether it obeys another one.
+    #: Row of a cell: periods since it became critical; of several fingers, also whether it obeys
+    #: another one.
     rows = 1
     #: See `following.FollowingControl`.
     division, pin_rows = "CellDivision", ()
@@ -206,8 +222,8 @@ class CellStatesControl:
         self, memory: Patch, touched: Measurement, part: slice = WHOLE.parts[0]
     ) -> tuple[Patch, Disc | None]:
         """Locate a fingertip by a part of the cells, and the largest extent of its blister."""
-        # Cells that follow count with any reading: under a rising fingertip the few readings above the noise
-        # would move the centroid to and fro.
+        # Cells that follow count with any reading: under a rising fingertip the few readings above
+        # the noise would move the centroid to and fro.
         force = touched.force[part]
         pressed = force > (~_under_finger(touched.mode[part]) * self.floor if self.floor else TIE)
         if not any_true(pressed):
@@ -320,7 +336,9 @@ class CellStatesControl:
         formed = mark_formed(target, self.actuator.rest_height, self.parameters.dead_band)
         return np.where(spring, np.where(force > TIE, SPRING, formed), mode)
 
-    def _commands(self, seen: Measurement, mode: Modes, target: Floats, under: Flags, most: Any) -> Floats:
+    def _commands(
+        self, seen: Measurement, mode: Modes, target: Floats, under: Flags, most: Any
+    ) -> Floats:
         """Return valve commands: force control under the fingertip, springs and profile elsewhere."""
         gains = self.parameters
         springs = (mode <= EDGE) | (mode == SPRING)
@@ -341,5 +359,11 @@ def build(parameters: CellStates, device: DeviceInfo) -> CellStatesControl:
     asked, floor = parameters.force_setpoint, device.force_floor
     check_floor(asked, "force_setpoint", asked, floor)
     return CellStatesControl(
-        parameters, device.blister, device.cell.actuator, device.rim, device.lift, device.period, floor
+        parameters,
+        device.blister,
+        device.cell.actuator,
+        device.rim,
+        device.lift,
+        device.period,
+        floor,
     )

@@ -1,9 +1,10 @@
 """Data of the device that a controller may use, and the noise floor of its sensors.
 
-The noise floor is five standard deviations of a cell's force sensor (`sensors.Sensing.force_floor`): a larger
-reading is not noise. It is 0 without noise. Touch is detected cell by cell: a sum of n readings would need
-five times √n, more than the force of a fingertip at the rim of its contact. The controlled force is the sum
-of all readings, which has no bias.
+The noise floor is five standard deviations of a cell's force sensor
+(`sensors.Sensing.force_floor`): a larger reading is not noise. It is 0 without noise. Touch is
+detected cell by cell: a sum of n readings would need five times √n, more than the force of a
+fingertip at the rim of its contact. The controlled force is the sum of all readings, which has no
+bias.
 """
 
 import math
@@ -43,7 +44,11 @@ class DeviceInfo:
     def rim(self) -> Rim:
         """Outer cells of the bed for a fingertip that leads the blister."""
         assert self.blister is not None
-        plan, (left, bottom), reach = self.grid.layout, self.grid.corner, 0.5 * self.blister.flat_radius
+        plan, (left, bottom), reach = (
+            self.grid.layout,
+            self.grid.corner,
+            0.5 * self.blister.flat_radius,
+        )
         x, y = TIE - left - 0.5 * (plan.pitch + plan.shift), TIE - bottom - 0.5 * plan.row_spacing
         return Rim(x if x > reach else math.inf, y if y > reach else math.inf, reach)
 
@@ -61,7 +66,12 @@ def suppress_noise(force: Floats, floor: Any) -> Floats:
 def check_floor(carried: float, field: str, asked: float, floor: float) -> None:
     """Refuse a noise floor above the force on a cell, N: contact would not be detected."""
     if floor >= carried:
-        rule = f"must keep five standard deviations below {carried:.3g} N, what a cell carries at most"
+        rule = (
+            f"must keep five standard deviations below {carried:.3g} N, what a cell carries at most"
+        )
         raise ParameterError(
-            "sensors", "force_noise", f"{rule} with control.{field} = {asked:.3g} N", f"{floor:.3g} N"
+            "sensors",
+            "force_noise",
+            f"{rule} with control.{field} = {asked:.3g} N",
+            f"{floor:.3g} N",
         )

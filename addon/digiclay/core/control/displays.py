@@ -44,7 +44,8 @@ SHAPES: dict[str, Callable[[Floats, Floats], Floats]] = {
     "ripple": lambda x, y: np.cos(3.0 * math.pi * np.hypot(x, y)),
     # A ring wall, 1 high at radius 0.6, around a hollow of depth 0.6.
     "crater": lambda x, y: (
-        np.exp(-(((np.hypot(x, y) - 0.6) / 0.18) ** 2)) - 0.6 * np.exp(-((np.hypot(x, y) / 0.3) ** 2))
+        np.exp(-(((np.hypot(x, y) - 0.6) / 0.18) ** 2))
+        - 0.6 * np.exp(-((np.hypot(x, y) / 0.3) ** 2))
     ),
     "pyramid": lambda x, y: 1.0 - np.maximum(np.abs(x), np.abs(y)),
     "ramp": lambda x, y: x,
@@ -62,7 +63,9 @@ def check_shape(owner: str, field: str, shape: str) -> None:
 def evaluate_shape(shape: str, grid: Grid) -> Floats:
     """Return the values of a named shape for all cells of a bed, (n,), whose extent is the shape's square."""
     # A bed of a single row or column has no extent.
-    middle_x, middle_y = (values / (float(np.abs(values).max()) or 1.0) for values in (grid.x, grid.y))
+    middle_x, middle_y = (
+        values / (float(np.abs(values).max()) or 1.0) for values in (grid.x, grid.y)
+    )
     return SHAPES[shape](middle_x, middle_y)
 
 
@@ -99,13 +102,21 @@ class ForceDisplay(TouchParameters):
     field: str = quantity("wave", "shape of the field: its name, or a file .npy of forces, N")
     force: float = quantity(0.05, "mean force of a cell", unit="N", symbol="F_m", above=0.0)
     contrast: float = quantity(
-        0.5, "variation of a named field, as a share of the mean", symbol="κ", at_least=0.0, at_most=1.0
+        0.5,
+        "variation of a named field, as a share of the mean",
+        symbol="κ",
+        at_least=0.0,
+        at_most=1.0,
     )
     damping: float = quantity(
         5.0, "force deviation per speed of its correction", unit="N s/m", symbol="c", above=0.0
     )
     rise: float = quantity(
-        5e-3, "largest height above rest of a following pin", unit="m", symbol="h_rise", at_least=0.0
+        5e-3,
+        "largest height above rest of a following pin",
+        unit="m",
+        symbol="h_rise",
+        at_least=0.0,
     )
     release_time: float = quantity(
         50e-3, "time without force until a cell is released", unit="s", symbol="t_r", at_least=0.0
@@ -120,8 +131,9 @@ class ForceDisplay(TouchParameters):
 class ForceDisplayControl(CellwiseControl):
     """Controller of the force display for a bed.
 
-    A cell that feels the fingertip: ``c dH/dt = F_com - F``, up to `rise` above rest; a released one returns
-    to rest. Row of a cell: periods without force. `field`: F_com of all cells, (n[, b]), N.
+    A cell that feels the fingertip: ``c dH/dt = F_com - F``, up to `rise` above rest; a released
+    one returns to rest. Row of a cell: periods without force. `field`: F_com of all cells, (n[,
+    b]), N.
     """
 
     parameters: ForceDisplay
@@ -155,15 +167,23 @@ def make_force_display(parameters: ForceDisplay, device: DeviceInfo) -> ForceDis
     check_floor(parameters.force, "force", parameters.force, device.force_floor)
     parameters = raise_felt_force(device.force_floor, parameters)
     if parameters.field.endswith(FILE):
-        field = read_values("field", parameters.field, device.grid, parameters.felt_force, device.lift, "N")
+        field = read_values(
+            "field", parameters.field, device.grid, parameters.felt_force, device.lift, "N"
+        )
     else:
-        field = parameters.force * (1.0 + parameters.contrast * evaluate_shape(parameters.field, device.grid))
+        field = parameters.force * (
+            1.0 + parameters.contrast * evaluate_shape(parameters.field, device.grid)
+        )
         if field.max() >= device.lift:
             rule = f"must keep the field below what a pin can press, {device.lift:.3g} N"
             raise ParameterError("control", "force", rule, f"{field.max():.3g} N at its largest")
         if field.min() < parameters.felt_force:
-            rule = f"must keep the field at or above control.felt_force, {parameters.felt_force:g} N"
-            raise ParameterError("control", "contrast", rule, f"{field.min():.3g} N at its smallest")
+            rule = (
+                f"must keep the field at or above control.felt_force, {parameters.felt_force:g} N"
+            )
+            raise ParameterError(
+                "control", "contrast", rule, f"{field.min():.3g} N at its smallest"
+            )
     drive = make_drive(parameters, device.cell, device.period)
     return ForceDisplayControl(parameters, device.cell.actuator, drive, device.period, field)
 
@@ -213,7 +233,8 @@ class ShapeDisplay(DriveParameters):
         """Return the moves of a refresh of a bed with so many rows.
 
         *one_time*: row by row, each in one move. *gradual*: row by row to the first intermediate
-        surface, row by row to the next... *approximate_gradual*: all rows at once, from surface to surface.
+        surface, row by row to the next... *approximate_gradual*: all rows at once, from surface to
+        surface.
         """
         if self.refresh == "one_time":
             return tuple(Move(row, row, 1.0) for row in range(rows))
@@ -227,8 +248,8 @@ class ShapeDisplay(DriveParameters):
 class ShapeDisplayControl:
     """Controller of the shape display for a bed.
 
-    A move ends when its cells are within the dead band of their heights, or after the patience. All cells are
-    active during the moves; afterwards only those that have not arrived.
+    A move ends when its cells are within the dead band of their heights, or after the patience. All
+    cells are active during the moves; afterwards only those that have not arrived.
     """
 
     parameters: ShapeDisplay
@@ -288,12 +309,19 @@ def make_shape_display(parameters: ShapeDisplay, device: DeviceInfo) -> ShapeDis
     elif parameters.shape.endswith(FILE):
         heights = read_values("shape", parameters.shape, grid, 0.0, actuator.stroke, "m")
     else:
-        heights = actuator.rest_height + parameters.amplitude * evaluate_shape(parameters.shape, grid)
+        heights = actuator.rest_height + parameters.amplitude * evaluate_shape(
+            parameters.shape, grid
+        )
         low, high = float(heights.min()), float(heights.max())
         if low < 0.0 or high > actuator.stroke:
             rule = f"must keep the shape between 0 and the stroke, {actuator.stroke:g} m"
-            raise ParameterError("control", "amplitude", rule, f"heights from {low:.6g} m to {high:.6g} m")
-    drive, moves = make_drive(parameters, device.cell, device.period), parameters.moves(grid.layout.rows)
+            raise ParameterError(
+                "control", "amplitude", rule, f"heights from {low:.6g} m to {high:.6g} m"
+            )
+    drive, moves = (
+        make_drive(parameters, device.cell, device.period),
+        parameters.moves(grid.layout.rows),
+    )
     patience = math.ceil(parameters.patience / device.period)
     whole = 0.0, 0.0, float(np.hypot(grid.x, grid.y).max())
     return ShapeDisplayControl(parameters, grid, actuator, drive, heights, moves, patience, whole)
@@ -372,13 +400,18 @@ class Handover:
         return seen._replace(height=seen.height - raised, target=seen.target - raised)
 
 
-def make_handover(shape: Shape, device: DeviceInfo, method: Controller | None, *, recovers: bool) -> Handover:
+def make_handover(
+    shape: Shape, device: DeviceInfo, method: Controller | None, *, recovers: bool
+) -> Handover:
     """Return a shape's display followed by a method; `recovers`: whether its cells return to rest."""
     assert device.heights is not None
     # As fast as a display alone, within the limit of the control period.
     settling = max(DriveParameters().settling_time, 2.0 * device.period)
     parameters = ShapeDisplay(
-        refresh=shape.refresh, surfaces=shape.surfaces, patience=shape.patience, settling_time=settling
+        refresh=shape.refresh,
+        surfaces=shape.surfaces,
+        patience=shape.patience,
+        settling_time=settling,
     )
     raised = device.heights - device.cell.actuator.rest_height if recovers else None
     return Handover(make_shape_display(parameters, device), method, raised)

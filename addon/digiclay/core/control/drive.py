@@ -1,8 +1,8 @@
 """Pin motion by speed, height or force: common part of the behaviors.
 
-The flow of a valve is proportional to the square of its opening, so that a height control proportional in
-the opening converges like 1/t. Here the opening is computed from the requested speed by the flow law of a
-pin without load, and heights converge exponentially.
+The flow of a valve is proportional to the square of its opening, so that a height control
+proportional in the opening converges like 1/t. Here the opening is computed from the requested
+speed by the flow law of a pin without load, and heights converge exponentially.
 """
 
 from dataclasses import dataclass, replace
@@ -28,7 +28,11 @@ class DriveParameters(ControlParameters):
     """Parameters of the height control of every behavior."""
 
     settling_time: float = quantity(
-        20e-3, "time constant of a free pin's approach to its height", unit="s", symbol="τ_s", above=0.0
+        20e-3,
+        "time constant of a free pin's approach to its height",
+        unit="s",
+        symbol="τ_s",
+        above=0.0,
     )
     dead_band: float = declare_again(Tracking, "dead_band")
 
@@ -51,7 +55,9 @@ Touch = TypeVar("Touch", bound=TouchParameters)
 
 def raise_felt_force(floor: float, parameters: Touch) -> Touch:
     """Return parameters whose `felt_force` is at least the noise floor, N; the same ones for a floor of 0."""
-    return replace(parameters, felt_force=max(parameters.felt_force, floor)) if floor else parameters
+    return (
+        replace(parameters, felt_force=max(parameters.felt_force, floor)) if floor else parameters
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,15 +142,18 @@ def make_drive(parameters: DriveParameters, cell: Cell, period: float) -> Drive:
 def check_damping(damping: float, cell: Cell, period: float, stiffness: float = 0.0) -> None:
     """Refuse a damping at which finger and pin would oscillate.
 
-    A pin that yields by ``c dH/dt = -F`` under a pulp of stiffness k loses ``k T_c / c`` of the force in a
-    control period. With the dead time and the lag of the default valve it oscillates from about 2 on, so 1
-    is permitted. The pulp is stiffest at the largest force a pin can lift,
-    ``k = f_d b exp(m (x - x0)) = f_d b + m F``; a spring under the pin, `stiffness` in N/m, adds to it.
+    A pin that yields by ``c dH/dt = -F`` under a pulp of stiffness k loses ``k T_c / c`` of the
+    force in a control period. With the dead time and the lag of the default valve it oscillates
+    from about 2 on, so 1 is permitted. The pulp is stiffest at the largest force a pin can lift,
+    ``k = f_d b exp(m (x - x0)) = f_d b + m F``; a spring under the pin, `stiffness` in N/m, adds to
+    it.
     """
     if cell.touch is None:
         return
     contact = cell.touch.contact
-    stiffest = contact.share * contact.stiffness + contact.exponent * cell.supply.high * cell.actuator.area
+    stiffest = (
+        contact.share * contact.stiffness + contact.exponent * cell.supply.high * cell.actuator.area
+    )
     least = (stiffest + stiffness) * period
     if damping < least:
         rule = f"must be at least {least:.3g} N s/m at this control period, or the pin would swing"

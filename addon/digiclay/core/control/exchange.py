@@ -13,8 +13,8 @@ from ..model.layout import Grid
 class Exchange:
     """Exchange between neighbors in one control period.
 
-    Neighbors in a row exchange a share `along` of their difference, those in two rows `across`. If odd rows
-    are `shifted`, a cell has six neighbors, not four.
+    Neighbors in a row exchange a share `along` of their difference, those in two rows `across`. If
+    odd rows are `shifted`, a cell has six neighbors, not four.
     """
 
     columns: int
@@ -59,8 +59,8 @@ class Exchange:
 def make_exchange(grid: Grid, diffusivity: float, period: float) -> Exchange:
     """Return the exchange of a diffusivity, m²/s, isotropic, in a period, s.
 
-    The rates give the diffusivity along x and y; their sum is limited so that neighbors do not overshoot in a
-    period of any length.
+    The rates give the diffusivity along x and y; their sum is limited so that neighbors do not
+    overshoot in a period of any length.
     """
     plan = grid.layout
     if not plan.shifted:

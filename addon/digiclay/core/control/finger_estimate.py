@@ -1,10 +1,10 @@
 """Extended Kalman filter of the fingertip: position, velocity, size and elongation, from the undersides.
 
-The state is the lowest point x, y, z, m; its velocity, m/s; the logarithm of the fingertip's size relative to
-the nominal one; and the elongations along x and along the diagonal. The last three are curvatures of the
-underside at the lowest point. They absorb errors of the model: a pulp stiffer than the nominal one makes the
-fingertip look flatter, that is larger; a longer or tilted fingertip looks elongated.
-The basis of cells has the rows 1, x, y, x², x y, y², (6, m).
+The state is the lowest point x, y, z, m; its velocity, m/s; the logarithm of the fingertip's size
+relative to the nominal one; and the elongations along x and along the diagonal. The last three are
+curvatures of the underside at the lowest point. They absorb errors of the model: a pulp stiffer
+than the nominal one makes the fingertip look flatter, that is larger; a longer or tilted fingertip
+looks elongated. The basis of cells has the rows 1, x, y, x², x y, y², (6, m).
 """
 
 from __future__ import annotations
@@ -47,7 +47,8 @@ class Slopes(NamedTuple):
 class _Profile(NamedTuple):
     """Numbers of ``h(q) = slope q - lowest + (sqrt(max(bend (1 - q), least)) - root)²``, m.
 
-    They are those of `fingertip.compute_forms`; `mean`: M of the nominal fingertip, 1/m²; `root`: of `least`.
+    They are those of `fingertip.compute_forms`; `mean`: M of the nominal fingertip, 1/m²; `root`:
+    of `least`.
     """
 
     mean: float
@@ -61,7 +62,9 @@ class _Profile(NamedTuple):
         """Return the numbers of k h(q), and M, at the logarithm of a size."""
         k = math.exp(size)
         mean, slope, bend, lowest, least, root = self
-        return _Profile(mean / (k * k), k * slope, k * bend, k * lowest, k * least, math.sqrt(k) * root)
+        return _Profile(
+            mean / (k * k), k * slope, k * bend, k * lowest, k * least, math.sqrt(k) * root
+        )
 
 
 def _find_radius(profile: _Profile, tip: Tip) -> Form:
@@ -104,8 +107,8 @@ def _list_slopes(profile: _Profile, tip: Tip, radius: Form) -> tuple[Form, ...]:
 SEEN = np.array([6, 0, 1, 7, 8, 2])
 STATES = 9
 EYE = np.eye(6)
-#: Digits of the state: rounding errors must not grow where an estimate is unstable across a line of symmetry,
-#: as when a single pin at the edge of a bed is touched.
+#: Digits of the state: rounding errors must not grow where an estimate is unstable across a line of
+#: symmetry, as when a single pin at the edge of a bed is touched.
 DIGITS = 11
 #: The size is at most this, as a logarithm: a factor of 2.7.
 LARGEST = 1.0
@@ -173,7 +176,12 @@ class FingerFilter:
         return step, noise
 
     def correct(
-        self, guesses: list[Estimate], at: Slopes, seen: Floats, variance: Floats, sections: Whole = WHOLE
+        self,
+        guesses: list[Estimate],
+        at: Slopes,
+        seen: Floats,
+        variance: Floats,
+        sections: Whole = WHOLE,
     ) -> tuple[list[Estimate], Floats]:
         """Return the estimates after undersides (m,), m, with variances (m,), m², and the errors left, m."""
         error = seen - at.under
@@ -207,7 +215,9 @@ class FingerFilter:
             tip = Tip(x, y, z, *shape)
             profile = self._profile.resize(tip.size)
             radius = _find_radius(profile, tip)
-            forms.append((*_list_surfaces(profile, tip, radius), *_list_slopes(profile, tip, radius)))
+            forms.append(
+                (*_list_surfaces(profile, tip, radius), *_list_slopes(profile, tip, radius))
+            )
             _, slope, bend, _, least, root = profile
             numbers.append((least, root, bend * root, slope - bend, z))
         least, root, product, rest, z = sections.spread(numbers)
@@ -265,7 +275,9 @@ def invert_six(matrix: Floats) -> Floats:
             rows[step], rows[pivot] = rows[pivot], rows[step]
             swaps.append((step, pivot))
         first, a, b, c, d, e = rows[step]
-        scale = 1.0 / (first or math.nan)  # singular is only a crafted snapshot: no fit comes of NaN
+        scale = 1.0 / (
+            first or math.nan
+        )  # singular is only a crafted snapshot: no fit comes of NaN
         head = a, b, c, d, e, _ = a * scale, b * scale, c * scale, d * scale, e * scale, scale
         # The first column is eliminated; that of the inverse comes in as the last one.
         rows = [

@@ -50,8 +50,8 @@ def list_rows(filters: int) -> OwnRows:
     return OwnRows(slice(k + 1), k, k + 1, k + 2, k + 3, k + 4, k + 5, slice(k + OWN_ROWS, None))
 
 
-#: Noise beyond which the assumed acceleration falls with the noise, N: otherwise the filter would follow a
-#: noise of 10 mN to velocities of 40 mm/s.
+#: Noise beyond which the assumed acceleration falls with the noise, N: otherwise the filter would
+#: follow a noise of 10 mN to velocities of 40 mm/s.
 STEADY = 5e-4
 
 
@@ -60,11 +60,13 @@ def measure_trust(noise: float) -> float:
     return min(STEADY / noise, 1.0)
 
 
-#: If the force is within this share of the set point, less with noise, and the fingertip no faster than this,
-#: m/s, then fit and top are computed only every `EVERY` periods; in between the top moves with the fingertip.
-#: Otherwise the force on a few stiff pins would oscillate from period to period, as it does at 2 %.
+#: If the force is within this share of the set point, less with noise, and the fingertip no faster
+#: than this, m/s, then fit and top are computed only every `EVERY` periods; in between the top
+#: moves with the fingertip. Otherwise the force on a few stiff pins would oscillate from period to
+#: period, as it does at 2 %.
 NEAR, SLOW, EVERY = 0.15, 20e-3, 2
-#: Largest distance of a touched cell from the predicted fingertip, in semi-axes; beyond it is a new touch.
+#: Largest distance of a touched cell from the predicted fingertip, in semi-axes; beyond it is a new
+#: touch.
 JUMP = 1.5
 #: Underside of cells without a prediction, m.
 AWAY = 1.0
@@ -96,7 +98,9 @@ class FingerObserver:
         """Distance from the set point within which a force is near it, N."""
         return NEAR * measure_trust(self.noise) * self.asked
 
-    def observe(self, memories: list[Follower], touched: Measurement, sections: Whole) -> list[Follower]:
+    def observe(
+        self, memories: list[Follower], touched: Measurement, sections: Whole
+    ) -> list[Follower]:
         """Observe the pulp of the cells that fingertips may touch, and follow or find the fingertips."""
         at, rows, force = self.at, touched.own, touched.force
         period = sections.spread([memory.period for memory in memories])
@@ -121,7 +125,11 @@ class FingerObserver:
         return self._follow(memories, touched, (felt, here), sections)
 
     def _follow(
-        self, memories: list[Follower], touched: Measurement, cells: tuple[Cells, Cells], sections: Whole
+        self,
+        memories: list[Follower],
+        touched: Measurement,
+        cells: tuple[Cells, Cells],
+        sections: Whole,
     ) -> list[Follower]:
         """Fit the fingertips that are felt, except those that hold; search again for those that have jumped.
 
@@ -132,7 +140,9 @@ class FingerObserver:
         totals, after, fits = sections.add(force), list(memories), [False] * len(memories)
         for i, memory in enumerate(memories):
             # Forces under the predicted fingertip are felt if their sum exceeds its noise.
-            if counts[i] == counts[i + 1] and not self._is_felt(force.take(here[bounds[i] : bounds[i + 1]])):
+            if counts[i] == counts[i + 1] and not self._is_felt(
+                force.take(here[bounds[i] : bounds[i + 1]])
+            ):
                 touched.own[self.at.residual, sections.parts[i]] = 0.0
                 after[i] = self.loss.wait(memory)
             elif memory.period % EVERY and self.holds(memory, totals[i]):

@@ -1,7 +1,7 @@
 """Layouts of the cells of several fingers: in sequence, finger by finger, or in columns.
 
-The same formulas serve one finger and several: `Whole` combines numbers of fingers, lists of f, with arrays
-of cells, (m,) or (r, m).
+The same formulas serve one finger and several: `Whole` combines numbers of fingers, lists of f,
+with arrays of cells, (m,) or (r, m).
 """
 
 from __future__ import annotations
@@ -113,7 +113,11 @@ class Sections(Whole):
         if not all(wanted):
             cells = cells[np.repeat(wanted, self.sizes)[cells]]
         sizes = [after - before for before, after in pairwise(self.find_bounds(cells))]
-        return cells, [i for i, size in enumerate(sizes) if size], Sections([size for size in sizes if size])
+        return (
+            cells,
+            [i for i, size in enumerate(sizes) if size],
+            Sections([size for size in sizes if size]),
+        )
 
 
 class Shared(Whole):
@@ -146,7 +150,8 @@ class Columns:
         self.inside, self._basis = inside, basis
         #: Finger and cell of each entry.
         self.finger, self.cell = inside.nonzero()
-        #: Cells in several columns, and their p entries; cells of these, and their positions, (2, p), m.
+        #: Cells in several columns, and their p entries; cells of these, and their positions, (2,
+        #: p), m.
         self.copies = find_copies(inside)
         self.cells = self.copies.cells[self.copies.which]
         self.positions = basis[1:3, self.cells]

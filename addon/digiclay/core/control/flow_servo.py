@@ -1,8 +1,8 @@
 """Height servo by the inverse of the flow law: openings that bring loaded pins to their heights in time.
 
-The commanded speed is ``w = (e - Σ w_j t_j) / (T_a - δ)`` for the error e, the time T_a until the height is
-aimed at, the delay δ of the valve, and earlier commands with speeds w_j that still act for t_j. The error of
-a free pin then decays with poles at 0 and about 0.3.
+The commanded speed is ``w = (e - Σ w_j t_j) / (T_a - δ)`` for the error e, the time T_a until the
+height is aimed at, the delay δ of the valve, and earlier commands with speeds w_j that still act
+for t_j. The error of a free pin then decays with poles at 0 and about 0.3.
 """
 
 import math
@@ -95,7 +95,8 @@ class FlowServo:
         per_span, band, slowest, none, per_loaded = self._numbers[error.shape]
         speed = error * per_span
         np.maximum(speed, fall, out=speed)
-        # At full opening a loaded pin would exceed the force of its reservoir, and be lowered again.
+        # At full opening a loaded pin would exceed the force of its reservoir, and be lowered
+        # again.
         np.minimum(speed, np.minimum(rise, rise * rise * per_loaded), out=speed)
         still = np.abs(error) <= band
         still |= np.abs(speed) < slowest

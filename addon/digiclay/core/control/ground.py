@@ -1,16 +1,17 @@
 """Ground of a blister: the surface from which it rises or sinks.
 
-The paper uses one height for all cells, the mean at the edge of the blister. This cuts existing features: a
-ridge across another one gets a gap on both sides. With `OwnGround` each cell starts from its commanded height
-when the blister reached it, and a cell at the rim of the blister does not move.
+The paper uses one height for all cells, the mean at the edge of the blister. This cuts existing
+features: a ridge across another one gets a gap on both sides. With `OwnGround` each cell starts
+from its commanded height when the blister reached it, and a cell at the rim of the blister does not
+move.
 
-A level blister on a slope moves all cells to one height: behind a climbing fingertip it would raise pressed
-cells again, and ahead of it lower the slope. Therefore a sinking blister, whose top is below the ground of
-the cells under the fingertip, raises no cell, and lowers no cell by more than those. Cells raised before
-stay: a fingertip that climbs out of a valley while filling it sinks into the far side. On uneven ground
-cells freeze nearer behind the fingertip, and lowered cells are freed when they are ahead of it again, since
-on a slope the fingertip is felt beside its lowest point. On even ground that would leave a groove with
-ragged flanks.
+A level blister on a slope moves all cells to one height: behind a climbing fingertip it would raise
+pressed cells again, and ahead of it lower the slope. Therefore a sinking blister, whose top is
+below the ground of the cells under the fingertip, raises no cell, and lowers no cell by more than
+those. Cells raised before stay: a fingertip that climbs out of a valley while filling it sinks into
+the far side. On uneven ground cells freeze nearer behind the fingertip, and lowered cells are freed
+when they are ahead of it again, since on a slope the fingertip is felt beside its lowest point. On
+even ground that would leave a groove with ragged flanks.
 """
 
 from __future__ import annotations
@@ -26,11 +27,13 @@ from ..model.interfaces import Alike
 from .blister import Blister, BlisterCells, BlisterRule
 from .servo import sum_weighted
 
-#: Least weight of a cell in the ground under the fingertip, N: an untouched blister has a ground, too.
+#: Least weight of a cell in the ground under the fingertip, N: an untouched blister has a ground,
+#: too.
 UNTOUCHED = 1e-9
 #: How many standard deviations about its mean the ground under the fingertip reaches.
 SPREAD = 1.0
-#: The ground under the fingertip is uneven when it reaches that far about its mean, as a share of the depth.
+#: The ground under the fingertip is uneven when it reaches that far about its mean, as a share of
+#: the depth.
 UNEVEN = 0.1
 
 
@@ -47,12 +50,20 @@ class EdgeGround(Alike):
         return edge
 
     def find_profile(
-        self, blister: Blister, distance: Floats, inside: Flags, ground: Any, top: Any, seen: Measurement
+        self,
+        blister: Blister,
+        distance: Floats,
+        inside: Flags,
+        ground: Any,
+        top: Any,
+        seen: Measurement,
     ) -> tuple[Floats, Any]:
         """Return the height of the blister at each cell, m, and which cells sink into uneven ground: none."""
         return blister.interpolate(distance, ground, top), False
 
-    def find_holding(self, target: Floats, profile: Floats, ground: Any, top: Any, uneven: Any) -> Flags:
+    def find_holding(
+        self, target: Floats, profile: Floats, ground: Any, top: Any, uneven: Any
+    ) -> Flags:
         """Tell which frozen cells keep their command, m: those farther off the ground than the profile, m."""
         holding: Flags = target > profile
         holding ^= top < ground - TIE
@@ -73,12 +84,19 @@ class OwnGround(Alike):
         return ground
 
     def find_profile(
-        self, blister: Blister, distance: Floats, inside: Flags, ground: Any, top: Any, seen: Measurement
+        self,
+        blister: Blister,
+        distance: Floats,
+        inside: Flags,
+        ground: Any,
+        top: Any,
+        seen: Measurement,
     ) -> tuple[Floats, Any]:
         """Return the height of the blister at each cell, m, and which cells sink into uneven ground.
 
-        `distance` (m[, b]) from the middle of the blister, and `top` (b,), m. The ground under the fingertip
-        is its mean and standard deviation, weighted with the forces. A cell above its ground does not sink.
+        `distance` (m[, b]) from the middle of the blister, and `top` (b,), m. The ground under the
+        fingertip is its mean and standard deviation, weighted with the forces. A cell above its
+        ground does not sink.
         """
         level = blister.interpolate(distance, ground, top)
         weight = np.maximum(seen.force, UNTOUCHED)
@@ -101,11 +119,14 @@ class OwnGround(Alike):
         uneven = sinks & (reach > UNEVEN * (mean - top))
         return np.where(sinks, profile, level), uneven & ~raised
 
-    def find_holding(self, target: Floats, profile: Floats, ground: Any, top: Any, uneven: Any) -> Flags:
+    def find_holding(
+        self, target: Floats, profile: Floats, ground: Any, top: Any, uneven: Any
+    ) -> Flags:
         """Tell which frozen cells keep their command; see `EdgeGround.find_holding`."""
         holding: Flags = target > profile
-        # What is raised stays when the blister sinks below the ground beside it; and what is lowered by one
-        # that sinks into uneven ground is not raised where the ground falls below its top.
+        # What is raised stays when the blister sinks below the ground beside it; and what is
+        # lowered by one that sinks into uneven ground is not raised where the ground falls below
+        # its top.
         holding ^= uneven | ((top < ground - TIE) & (target <= ground + TIE))
         return holding
 
@@ -123,10 +144,13 @@ def raise_blister(
     mode: Modes,
 ) -> Floats:
     """Return commanded heights (m[, b]), m, with a blister of `heights`; modes are set in place."""
-    # Of surface and top, m; mode of touched cells; whether frozen cells stay that the blister outgrows.
+    # Of surface and top, m; mode of touched cells; whether frozen cells stay that the blister
+    # outgrows.
     edge, top, touched_mode, stays = heights
     level = ground.find(seen, edge)
-    profile, uneven = ground.find_profile(rule.blister, cells.distance, cells.inside, level, top, seen)
+    profile, uneven = ground.find_profile(
+        rule.blister, cells.distance, cells.inside, level, top, seen
+    )
     frozen = rule.find_frozen(cells, seen, uneven)
     if any_true(frozen):
         # Frozen cells are never called back.

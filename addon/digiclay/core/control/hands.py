@@ -1,7 +1,8 @@
 """Control of several fingers on one bed: one controller of the method per finger.
 
-In a control period each controller first locates its finger by the pressed pins that belong to it, and then
-commands the pins in its disc. `pin_division` has the rules for pins that several fingers press or command.
+In a control period each controller first locates its finger by the pressed pins that belong to it,
+and then commands the pins in its disc. `pin_division` has the rules for pins that several fingers
+press or command.
 """
 
 from __future__ import annotations
@@ -74,7 +75,8 @@ class HandControl:
     ) -> list[Located]:
         """Return the follower of each finger, and its disc.
 
-        `pins` (q,): pressed ones; `owner` (q,): their fingers; `under` (f, q): undersides over them, m.
+        `pins` (q,): pressed ones; `owner` (q,): their fingers; `under` (f, q): undersides over
+        them, m.
         """
         raise NotImplementedError
 
@@ -119,7 +121,9 @@ class HandTogether(HandControl):
         columns = touched._replace(
             quadratic_basis=touched.quadratic_basis[:, pins, None],
             height=touched.height[pins, None],
-            force=np.where(owner[:, None] == self.division.fingers.T, touched.force[pins, None], 0.0),
+            force=np.where(
+                owner[:, None] == self.division.fingers.T, touched.force[pins, None], 0.0
+            ),
         )
         located: Any = self.together.locate(list(memory.fingers), columns)
         return list(zip(*located, strict=True))
@@ -171,7 +175,8 @@ class HandInGroups(HandControl):
         """Controllers for several fingers per call; None for other or guarded ones."""
         pairs = zip(self.division.controllers, self.controllers, strict=True)
         return [
-            inner if inner is outer and isinstance(inner, GroupedControl) else None for inner, outer in pairs
+            inner if inner is outer and isinstance(inner, GroupedControl) else None
+            for inner, outer in pairs
         ]
 
     def locate_each(
@@ -182,7 +187,9 @@ class HandInGroups(HandControl):
         shape = len(memory.fingers), touched.force.size
         visible, parts = np.zeros(shape, np.bool_), np.ones(shape)
         if touched.discs is not None:
-            followed = np.array([follower.position is not None for follower in memory.fingers])[:, None]
+            followed = np.array([follower.position is not None for follower in memory.fingers])[
+                :, None
+            ]
             visible = self.arrange("touched", touched).inside & followed
             visible[:, pins] &= self.division.share_whole(owner) > 0.0
         parts[:, pins] = shares
@@ -210,7 +217,9 @@ class HandInGroups(HandControl):
         parts[copies.number] = shares[copies.row, copies.which]
         force = seen.force[cells] * np.maximum(parts, 0.0)
         after = list(memory.fingers)
-        commands = Commands(np.empty(cells.size), np.empty(cells.size, np.int8), np.empty(cells.size))
+        commands = Commands(
+            np.empty(cells.size), np.empty(cells.size, np.int8), np.empty(cells.size)
+        )
         for group in self._divide(memory.fingers, seen, force, columns.finger, cells):
             group.seen.quadratic_basis[:, parts[group.entries] == HIDDEN] = OUTSIDE
             members = [memory.fingers[i] for i in group.fingers]
@@ -221,12 +230,20 @@ class HandInGroups(HandControl):
             else:
                 (number,) = group.fingers
                 after[number], orders = self.controllers[number].command(members[0], group.seen)
-            commands.target[group.entries], commands.mode[group.entries] = orders.target, orders.mode
+            commands.target[group.entries], commands.mode[group.entries] = (
+                orders.target,
+                orders.mode,
+            )
             commands.command[group.entries] = orders.command
         return after, commands, owner
 
     def _divide(
-        self, followers: tuple[Follower, ...], seen: Measurement, force: Floats, finger: Cells, cells: Cells
+        self,
+        followers: tuple[Follower, ...],
+        seen: Measurement,
+        force: Floats,
+        finger: Cells,
+        cells: Cells,
     ) -> Iterator[Group]:
         """Yield groups of fingers; the rows of a group are written back before the next group.
 

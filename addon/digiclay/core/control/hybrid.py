@@ -7,8 +7,8 @@ It is the framework that the paper calls for in its conclusion. A control period
 3. Solve: the height of the blister's top at which the predicted forces add up to the set point.
 4. Serve: the valve commands that bring each pin to its height in time.
 
-The blister is around the predicted position of the fingertip, and ahead of it as far as the speed of the pins
-requires.
+The blister is around the predicted position of the fingertip, and ahead of it as far as the speed
+of the pins requires.
 """
 
 from __future__ import annotations
@@ -31,7 +31,15 @@ from ..model.touch import Touch
 from .blister import Blister, BlisterRule
 from .device_info import DeviceInfo, check_floor
 from .finger_estimate import Aim, FingerFilter, Spread
-from .finger_observer import AWAY, EVERY, OWN_ROWS, FingerObserver, OwnRows, list_rows, measure_trust
+from .finger_observer import (
+    AWAY,
+    EVERY,
+    OWN_ROWS,
+    FingerObserver,
+    OwnRows,
+    list_rows,
+    measure_trust,
+)
 from .finger_sections import SHARED, WHOLE, Whole
 from .flow_servo import FlowServo, make_flow_servo
 from .led_blister import SLOWEST, Follower, LeadProfile, LedBlister, Region
@@ -60,13 +68,24 @@ class Hybrid(ControlParameters):
     )
     felt_force: float = quantity(1e-3, "force of a touched cell", unit="N", symbol="F_0", above=0.0)
     trim_time: float = quantity(
-        0.5, "time constant of the slow correction of the force", unit="s", symbol="t_trim", above=0.0
+        0.5,
+        "time constant of the slow correction of the force",
+        unit="s",
+        symbol="t_trim",
+        above=0.0,
     )
     acceleration: float = quantity(
-        1.0, "standard deviation of the fingertip's acceleration", unit="m/s2", symbol="σ_a", above=0.0
+        1.0,
+        "standard deviation of the fingertip's acceleration",
+        unit="m/s2",
+        symbol="σ_a",
+        above=0.0,
     )
     turn: float = quantity(
-        0.5, "standard deviation of the fingertip's turn within a second (rad)", symbol="σ_turn", at_least=0.0
+        0.5,
+        "standard deviation of the fingertip's turn within a second (rad)",
+        symbol="σ_turn",
+        at_least=0.0,
     )
     size_drift: float = quantity(
         0.05,
@@ -98,7 +117,8 @@ class Hybrid(ControlParameters):
     behind: float = declare_again(VirtualMaster, "behind", -0.05)
     release_force: float = declare_again(VirtualMaster, "release_force")
     loss_time: float = declare_again(VirtualMaster, "loss_time")
-    # A pin on its way stands still within the band: at 10 µm a slow lift swings from period to period.
+    # A pin on its way stands still within the band: at 10 µm a slow lift swings from period to
+    # period.
     dead_band: float = declare_again(VirtualMaster, "dead_band", 1e-6)
 
     @property
@@ -118,12 +138,12 @@ class Hybrid(ControlParameters):
 RADII, SKIRT = 14.0, 0.6
 #: Share of the set point within which the trim is corrected, and largest trim.
 LEARNED = 0.5
-#: Largest error of predicted forces, as a share of the set point, rms over a number of control periods:
-#: beyond it the model is wrong, and Method I follows the fingertip until it is lost. A lift at 22 mm/s has
-#: 0.28.
+#: Largest error of predicted forces, as a share of the set point, rms over a number of control
+#: periods: beyond it the model is wrong, and Method I follows the fingertip until it is lost. A
+#: lift at 22 mm/s has 0.28.
 DOUBTED, PERIODS = 0.4, 20.0
-#: Share of the set point above which a single pin gives way: under a followed fingertip no pin carries more
-#: than 0.4.
+#: Share of the set point above which a single pin gives way: under a followed fingertip no pin
+#: carries more than 0.4.
 OVER = 0.45
 
 
@@ -255,7 +275,9 @@ class HybridControl:
     def _substitute(self, memory: Follower, touched: Measurement) -> tuple[Follower, Any]:
         """Let Method I follow the fingertip until it is lost."""
         before, begins = memory.master, self.substitute.is_new(memory.master)
-        master, disc = self.substitute.locate(Master(losses=before.losses) if begins else before, touched)
+        master, disc = self.substitute.locate(
+            Master(losses=before.losses) if begins else before, touched
+        )
         if begins and master.phase is not IDLE:
             master = master._replace(phase=before.phase)
         if memory.led_radius:
@@ -271,7 +293,9 @@ class HybridControl:
             x, y, z, *_ = memory.estimate.mean.tolist()
             master = memory.master
             aims.append((x, y, z) if master.phase is IDLE else (master.x, master.y, master.height))
-        return self.finger.find_underside(aims, [memory.estimate for memory in memories], basis, SHARED)
+        return self.finger.find_underside(
+            aims, [memory.estimate for memory in memories], basis, SHARED
+        )
 
     def predict_force(self, depth: Floats, rows: Floats) -> Floats:
         """Return the forces of fingertips on pins, (f, m), N, at depths (f, m), m, by rows (f, r, m)."""
@@ -287,7 +311,9 @@ class HybridControl:
             lead[:] = speeds[:] = 0.0
             master, commands = self.substitute.command(memories[0].master, unled)
             return [memories[0]._replace(master=master, led_radius=0.0)], commands
-        coasting = Coasting(self.servo.find_limits(seen.force), self.servo.coast(seen.height, speeds))
+        coasting = Coasting(
+            self.servo.find_limits(seen.force), self.servo.coast(seen.height, speeds)
+        )
         left = seen.target - lead
         rest, band, lowest, highest = self._limits[left.shape]
         mode, target = mark_formed(left, rest, band), left
@@ -332,7 +358,9 @@ class HybridControl:
         if None in tops:
             self._solve_tops(memories, seen, region, coasting, sections, tops)
         counts = [values.size for values in sections.cut(seen.force)]
-        fingers = zip(memories, tops, forces, counts, region.edges, region.aims, region.speeds, strict=True)
+        fingers = zip(
+            memories, tops, forces, counts, region.edges, region.aims, region.speeds, strict=True
+        )
         return [self._move_blister(*finger) for finger in fingers]
 
     def _move_blister(
@@ -347,16 +375,22 @@ class HybridControl:
     ) -> Follower:
         """Return the memory with the solved top, m, and the predicted total force, N.
 
-        `force` of so many cells, N; surface, m; lowest point of the fingertip, m, and its speed, m/s.
+        `force` of so many cells, N; surface, m; lowest point of the fingertip, m, and its speed,
+        m/s.
         """
         asked, due, doubt = self.parameters.force_setpoint, self._unknown, memory.doubt
         top, felt, trim, master = memory.felt, memory.felt, memory.trim, memory.master
         if not memory.alone:
             top, coming = solved or (felt, 0.0)
             goes, beyond = self._leaves(memory)
-            carried = trim != 0.0  # a fingertip that has just landed does not leave, whatever its estimate
+            carried = (
+                trim != 0.0
+            )  # a fingertip that has just landed does not leave, whatever its estimate
             if carried and (goes or beyond) and top > (along := self._move_top(memory)):
-                top, coming = along, -1.0  # fewer cells carry the fingertip, and none must rise for it
+                top, coming = (
+                    along,
+                    -1.0,
+                )  # fewer cells carry the fingertip, and none must rise for it
             top = min(max(top, 0.0), self.device.cell.actuator.stroke)
             # The trim belongs to a force that pins reach.
             coming -= trim * (coming == asked + trim)
@@ -424,9 +458,14 @@ class HybridControl:
         raised = [region.raised[i] for i in fingers]
         solved = [memories[i] for i in fingers]
         forces = [self.parameters.force_setpoint + memory.trim for memory in solved]
-        guesses, estimates = list(map(self._move_top, solved)), [memory.estimate for memory in solved]
+        guesses, estimates = (
+            list(map(self._move_top, solved)),
+            [memory.estimate for memory in solved],
+        )
         at, rows = self._at, seen.own.take(near, 1)
-        under = self.finger.find_underside(aims, estimates, seen.quadratic_basis.take(near, 1), picked)
+        under = self.finger.find_underside(
+            aims, estimates, seen.quadratic_basis.take(near, 1), picked
+        )
         under += rows[at.residual]
         for i in fingers:
             seen.own[at.later, sections.parts[i]] = AWAY
@@ -438,7 +477,9 @@ class HybridControl:
         np.maximum(ends, lowest, out=ends)
         np.minimum(ends, highest, out=ends)
         part = self.blister.evaluate_profile(region.cells.distance.take(near))
-        reach = Reach(picked.spread(edges), picked.spread(raised), part, region.drop.take(near), ends)
+        reach = Reach(
+            picked.spread(edges), picked.spread(raised), part, region.drop.take(near), ends
+        )
         lost = self.pulp.predict_loss(rows[at.pulp])
         results = find_tops(forces, guesses, reach, under, lost, self.pulp, picked)
         for i, top in zip(fingers, results, strict=True):

@@ -147,7 +147,9 @@ class LedBlister:
             speeds.append(math.hypot(vx, vy))
             poses.append((*aims[-1][:2], *memory.heading[2:]))
         cells = self.rule.divide(sections.spread(poses), basis)
-        edges = sections.average(left, self.rule.find_edge(cells), [memory.edge for memory in memories])
+        edges = sections.average(
+            left, self.rule.find_edge(cells), [memory.edge for memory in memories]
+        )
         raised = [memory.top > edge + TIE for memory, edge in zip(memories, edges, strict=True)]
         find = self.profile.find_slopes
         slopes = [find(speed, raised=up) for speed, up in zip(speeds, raised, strict=True)]
@@ -167,5 +169,10 @@ class LedBlister:
         `heights`: surface and top, m, numbers or (m,).
         """
         return raise_blister(
-            self.rule, GROUND, cells, seen._replace(target=left), (*heights, FORCE_FOLLOW, False), mode
+            self.rule,
+            GROUND,
+            cells,
+            seen._replace(target=left),
+            (*heights, FORCE_FOLLOW, False),
+            mode,
         )

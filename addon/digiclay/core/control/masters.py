@@ -1,7 +1,8 @@
 """Masters of a batch: those of few runs are led one by one, those of many in arrays.
 
-Array formulas lead the masters in the usual situation. A master that is touched or lost, turns, or comes near
-the rim is led in plain numbers like that of a single run. All results are the same, bit for bit.
+Array formulas lead the masters in the usual situation. A master that is touched or lost, turns, or
+comes near the rim is led in plain numbers like that of a single run. All results are the same, bit
+for bit.
 """
 
 from __future__ import annotations
@@ -136,7 +137,8 @@ class VirtualMasterColumns(VirtualMasterControl):
         goes = ~none & ~idle & (near >= felt) & (square < (SHORT * gains.travel) ** 2)
         others = ~goes & ~(none & idle)
         alone = [
-            self.runs[i].follow(masters[i], *(values[i] for values in sums)) for i in others.nonzero()[0]
+            self.runs[i].follow(masters[i], *(values[i] for values in sums))
+            for i in others.nonzero()[0]
         ]
         np.copyto(numbers[X], x, where=goes)
         np.copyto(numbers[Y], y, where=goes)
@@ -157,7 +159,10 @@ class VirtualMasterColumns(VirtualMasterControl):
         inner = (np.abs(x) + reach <= at_x) & (np.abs(y) + reach <= at_y)
         goes = (phase > AWAY) & (numbers[ALONE] == 0.0) & (height > -np.inf) & inner
         others = ~goes & (phase > AWAY)
-        alone = [self.runs[i].lead(masters[i], force[i], surface[i], noises[i]) for i in others.nonzero()[0]]
+        alone = [
+            self.runs[i].lead(masters[i], force[i], surface[i], noises[i])
+            for i in others.nonzero()[0]
+        ]
         felt = force + noise
         error = gains.force_setpoint - felt
         springs = (phase == SPRUNG) & (error > 0.0)

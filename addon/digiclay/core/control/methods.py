@@ -86,7 +86,9 @@ class Method:
 METHODS: dict[str, Method] = {
     "virtual_master": Method("control.virtual_master", "VirtualMaster", {}),
     "cell_states": Method(
-        "control.cell_states", "CellStates", {"radius": 12e-3, "edge_radius": 15.5e-3, "flat_radius": 3e-3}
+        "control.cell_states",
+        "CellStates",
+        {"radius": 12e-3, "edge_radius": 15.5e-3, "flat_radius": 3e-3},
     ),
     "elastic": Method("control.behaviors", "Elastic", recovers=True),
     "plastic": Method("control.behaviors", "Plastic"),
@@ -109,7 +111,9 @@ HINT = (
 def add_method(name: str, method: Method) -> None:
     """Add or replace a method in this process; ParameterError if a built-in one has its name."""
     if name in METHODS:
-        raise ParameterError("control", "method", "must not have the name of a built-in method", repr(name))
+        raise ParameterError(
+            "control", "method", "must not have the name of a built-in method", repr(name)
+        )
     _ADDED[name] = method
 
 

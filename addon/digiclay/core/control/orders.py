@@ -1,25 +1,28 @@
 """Orders to the valves beside the control method: what brushes do to pins without a finger.
 
-An order is a row of five numbers a control period: x, y and radius of a disc, m, a strength, and a `Verb`.
+An order is a row of five numbers a control period: x, y and radius of a disc, m, a strength, and a
+`Verb`.
 
 SMOOTH
-    The commanded heights diffuse, ``dh/dt = ∇(w D ∇h)`` with ``D = strength r² / T``. The weight w falls from
-    1 in the middle of the disc to 0 at its rim; between two neighbors the smaller one holds. Clay is moved,
-    but not lost. No cell leaves the range of its neighbors, so that nothing oscillates, and cells outside the
-    disc do not change.
+    The commanded heights diffuse, ``dh/dt = ∇(w D ∇h)`` with ``D = strength r² / T``. The weight w
+    falls from 1 in the middle of the disc to 0 at its rim; between two neighbors the smaller one
+    holds. Clay is moved, but not lost. No cell leaves the range of its neighbors, so that nothing
+    oscillates, and cells outside the disc do not change.
 AVERAGE
-    Predecessor of SMOOTH, for older takes: ``dh = w D ∇²h T_c``, with the larger of the total rise and the
-    total fall scaled down to the other.
+    Predecessor of SMOOTH, for older takes: ``dh = w D ∇²h T_c``, with the larger of the total rise
+    and the total fall scaled down to the other.
 ERASE
-    The commanded heights return to rest with these weights, ``dh/dt = w strength (h_rest - h) / T``.
+    The commanded heights return to rest with these weights, ``dh/dt = w strength (h_rest - h) /
+    T``.
 LOCK, UNLOCK, INVERT
-    Pins in the disc get, lose or toggle the mode LOCKED: their valves are shut, whatever is commanded.
+    Pins in the disc get, lose or toggle the mode LOCKED: their valves are shut, whatever is
+    commanded.
 PLACE
     Pins go to the heights of a surface, whose number is in column x; NaN: the pin is not driven.
 
-A weighted order of strength 0 changes no height, but pins that have not arrived are driven further. A radius
-of 0 is no order, except for PLACE: the method commands all pins. Driven pins have the mode BLISTER until they
-arrive.
+A weighted order of strength 0 changes no height, but pins that have not arrived are driven further.
+A radius of 0 is no order, except for PLACE: the method commands all pins. Driven pins have the mode
+BLISTER until they arrive.
 """
 
 import math
@@ -44,8 +47,9 @@ from .travel import measure_square
 
 #: Numbers of an order.
 ORDER = 5
-#: Time in which strength 1 spreads heights over the radius, SMOOTH and AVERAGE, and erases all but 1/e, s.
-#: One pass of SMOOTH at 100 mm/s leaves 15 to 45 % of the variation on the beds of `settings.devices`.
+#: Time in which strength 1 spreads heights over the radius, SMOOTH and AVERAGE, and erases all but
+#: 1/e, s. One pass of SMOOTH at 100 mm/s leaves 15 to 45 % of the variation on the beds of
+#: `settings.devices`.
 SPREADING, AVERAGING, ERASING = 0.25, 1.0, 5e-3
 #: Largest distance of neighbors, in pitches or distances of rows: 1.12 if rows are shifted.
 MARGIN = 1.5
@@ -90,7 +94,12 @@ class Orders:
 
 
 def repeat_order(
-    periods: int, verb: Verb, x: float = 0.0, y: float = 0.0, radius: float = 0.0, strength: float = 0.0
+    periods: int,
+    verb: Verb,
+    x: float = 0.0,
+    y: float = 0.0,
+    radius: float = 0.0,
+    strength: float = 0.0,
 ) -> Floats:
     """Return the rows (t, 5) of an order that lasts for `periods` control periods."""
     return np.tile((x, y, radius, strength, float(verb)), (periods, 1))
@@ -125,10 +134,11 @@ class Around:
         return self.method.begin()
 
 
-#: Returns, of measured cells, new commanded heights, (m,), m, which pins are driven there, and which a brush
-#: changes.
+#: Returns, of measured cells, new commanded heights, (m,), m, which pins are driven there, and
+#: which a brush changes.
 Aim = Callable[[Measurement], tuple[Floats, Flags, Flags]]
-#: Returns the commanded heights after a period, (m,), m, of measured cells by weights, (m,), not all 0.
+#: Returns the commanded heights after a period, (m,), m, of measured cells by weights, (m,), not
+#: all 0.
 Change = Callable[[Measurement, Floats], Floats]
 
 
@@ -161,7 +171,9 @@ class DrivingControl(Around):
         ordered = driven | (moved & (orders.mode <= HOLD))
         error, band = target - seen.height, self.drive.dead_band
         # An error within the dead band of what is placed may be one of what forms pins.
-        mode = mark_formed(target, self.actuator.rest_height, max(band, DriveParameters().dead_band))
+        mode = mark_formed(
+            target, self.actuator.rest_height, max(band, DriveParameters().dead_band)
+        )
         np.putmask(mode, busy | (np.abs(error) > band), BLISTER)
         command = self.drive.command(self.drive.approach(error), seen.force)
         np.copyto(target, orders.target, where=~ordered)
@@ -272,13 +284,14 @@ def order_periods(
 ) -> Iterator[Controller]:
     """Yield the controller of each control period, s.
 
-    `latency`: time from a command to the measurement of its effect, s; `floor`: largest error of a height
-    reading, m; `locked`: whether pins are locked at the start.
+    `latency`: time from a command to the measurement of its effect, s; `floor`: largest error of a
+    height reading, m; `locked`: whether pins are locked at the start.
     """
     quick, plan = 2.0 * period, grid.layout
     # As fast as a display, within the limit of the control period.
     drive = make_drive(DriveParameters(max(DriveParameters().settling_time, quick)), cell, period)
-    # A loop of gain 1/T oscillates if T is below e times its dead time; sampling adds half a control period.
+    # A loop of gain 1/T oscillates if T is below e times its dead time; sampling adds half a
+    # control period.
     settling = max(quick, math.e * (latency + 0.5 * period))
     exact = make_drive(DriveParameters(settling, max(BAND, floor)), cell, period)
     margin, free = MARGIN * max(plan.pitch, plan.row_spacing), isinstance(method, Uncontrolled)
@@ -300,7 +313,9 @@ def order_periods(
         elif verb in LOCKING:
             yield LockingControl(method, actuator, verb, disc)
         elif verb is Verb.ERASE:
-            change = partial(erase, strength * period / ERASING, actuator.rest_height, exact.dead_band)
+            change = partial(
+                erase, strength * period / ERASING, actuator.rest_height, exact.dead_band
+            )
             yield DrivingControl(held, free, exact, actuator, disc, brush(disc, strength, change))
         else:
             even, time = (smooth, SPREADING) if verb is Verb.SMOOTH else (average, AVERAGING)

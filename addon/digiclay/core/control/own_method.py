@@ -1,8 +1,9 @@
 """Control methods of users: base class, measurements and orders, and the guard around their code.
 
-An own method is a frozen dataclass: its fields are the parameters, its methods are pure functions. `begin`
-returns the memory before a session, `locate` the cells to be commanded, and `command` converts forces and
-heights to commanded heights or valve openings. A method with a controller of its own overrides `build`.
+An own method is a frozen dataclass: its fields are the parameters, its methods are pure functions.
+`begin` returns the memory before a session, `locate` the cells to be commanded, and `command`
+converts forces and heights to commanded heights or valve openings. A method with a controller of
+its own overrides `build`.
 """
 
 from __future__ import annotations
@@ -68,15 +69,16 @@ class Orders(NamedTuple):
 class OwnMethod(DriveParameters):
     """Base of the control methods of one's own; a subclass is a frozen dataclass with fields of `quantity`.
 
-    Its first line of documentation is what Blender shows of it. What is no field, below, a subclass may
-    set to another value.
+    Its first line of documentation is what Blender shows of it. What is no field, below, a subclass
+    may set to another value.
     """
 
     #: Numbers the method remembers of each cell, whether or not it is among the cells of a period.
     rows: ClassVar[int] = 0
     #: Defaults for the section [blister] where they differ; None: the method has no such section.
     blister: ClassVar[Mapping[str, float] | None] = None
-    #: Whether cells go back to the height they had at rest: then a displayed shape is what they go back to.
+    #: Whether cells go back to the height they had at rest: then a displayed shape is what they go
+    #: back to.
     recovers: ClassVar[bool] = False
 
     reach: float = quantity(
@@ -90,21 +92,29 @@ class OwnMethod(DriveParameters):
     def begin(self, device: DeviceInfo) -> Memory:
         """Return the memory before a session: None, numbers, arrays, and (named) tuples of them."""
 
-    def locate(self, memory: Memory, touched: Cells, device: DeviceInfo) -> tuple[Memory, Disc | None]:
+    def locate(
+        self, memory: Memory, touched: Cells, device: DeviceInfo
+    ) -> tuple[Memory, Disc | None]:
         """Return memory and the disc x, y, radius of the cells to command, m; None: those that move.
 
-        `memory`: from `begin`, or `command` a period before; `touched`: those the fingertip may touch.
+        `memory`: from `begin`, or `command` a period before; `touched`: those the fingertip may
+        touch.
         """
         force = suppress_noise(touched.force, device.force_floor)
         total = float(force.sum())
         if not self.reach or not total > 0.0:
             return memory, None
-        return memory, (float(force.dot(touched.x)) / total, float(force.dot(touched.y)) / total, self.reach)
+        return memory, (
+            float(force.dot(touched.x)) / total,
+            float(force.dot(touched.y)) / total,
+            self.reach,
+        )
 
     def command(self, memory: Memory, cells: Cells, device: DeviceInfo) -> tuple[Any, Orders]:
         """Return memory and orders for the cells of the disc and all that still move.
 
-        `memory`: from `locate`; `device`: control period, cylinders, fluid and noise; see `DeviceInfo`.
+        `memory`: from `locate`; `device`: control period, cylinders, fluid and noise; see
+        `DeviceInfo`.
         """
         raise NotImplementedError("command must be defined")
 
@@ -139,7 +149,9 @@ class OwnControl:
         given = self.parameters.command(memory, show_cells(seen), self.device)
         memory, orders = take_results(given, 2, "memory and orders")
         if not isinstance(orders, Orders):
-            raise TypeError(f"must return Orders as its second result (got {type(orders).__name__})")
+            raise TypeError(
+                f"must return Orders as its second result (got {type(orders).__name__})"
+            )
         size, actuator = seen.height.shape, self.device.cell.actuator
         mode = None if orders.mode is None else check_modes(orders.mode, size)
         height, opening, rows = (
@@ -168,7 +180,9 @@ def show_cells(seen: Measurement) -> Cells:
     """Return a measurement for an own method, with read-only rows."""
     basis, rows = seen.quadratic_basis, seen.own[:]
     rows.flags.writeable = False
-    return Cells(basis[1], basis[2], seen.height, seen.force, seen.target, seen.mode, rows, seen.cells)
+    return Cells(
+        basis[1], basis[2], seen.height, seen.force, seen.target, seen.mode, rows, seen.cells
+    )
 
 
 def take_results(given: Any, count: int, wanted: str) -> Any:
@@ -183,7 +197,9 @@ def check_array(values: Any, name: str, shape: tuple[int, ...], kinds: str = "fi
     """Return values as an array of a shape and kinds of numbers, or raise the rule."""
     array = np.asarray(values)
     if array.shape != shape:
-        raise ValueError(f"must return {name} of the shape {shape} of the cells (got {array.shape})")
+        raise ValueError(
+            f"must return {name} of the shape {shape} of the cells (got {array.shape})"
+        )
     if array.dtype.kind not in kinds:
         wanted = "real numbers" if "f" in kinds else "whole numbers"
         raise TypeError(f"must return {name} as {wanted} (got {array.dtype})")
@@ -201,12 +217,14 @@ def check_modes(values: Any, size: tuple[int, ...]) -> Modes:
     """Return modes as stored, or raise the rule if they are no codes of `Mode`."""
     modes = check_array(values, "mode", size, "iu")
     if modes.size and not (modes.min() >= 0 and modes.max() <= HIGHEST):
-        raise ValueError(f"must return mode as codes of Mode, from 0 to {HIGHEST} (got {modes.max()})")
+        raise ValueError(
+            f"must return mode as codes of Mode, from 0 to {HIGHEST} (got {modes.max()})"
+        )
     return modes.astype(np.int8, copy=False)
 
 
-#: Largest mean processor time of the calls of a control period, in control periods, and number of calls in
-#: the mean. A built-in method takes a tenth of a period.
+#: Largest mean processor time of the calls of a control period, in control periods, and number of
+#: calls in the mean. A built-in method takes a tenth of a period.
 MOST_PERIODS, CALLS = 20.0, 20
 #: Most state rows of a method.
 MOST_ROWS = 1000
@@ -297,8 +315,12 @@ class Guarded:
             yield
         except (MethodError, MemoryError, KeyboardInterrupt):
             raise
-        except BaseException as error:  # also SystemExit, which would end the program without a word
-            raise MethodError(f"{self.origin}: {function} {describe_failure(error, self.file)}.") from error
+        except (
+            BaseException
+        ) as error:  # also SystemExit, which would end the program without a word
+            raise MethodError(
+                f"{self.origin}: {function} {describe_failure(error, self.file)}."
+            ) from error
 
 
 def guard(build: Any, origin: str, file: str, period: float) -> Guarded:
@@ -307,7 +329,9 @@ def guard(build: Any, origin: str, file: str, period: float) -> Guarded:
         inner = build()
         for function in ("begin", "locate", "command"):
             if function not in dir(inner):
-                raise TypeError(f"must return a controller with {function} (got {type(inner).__name__})")
+                raise TypeError(
+                    f"must return a controller with {function} (got {type(inner).__name__})"
+                )
         rows = inner.rows
         if not isinstance(rows, int) or isinstance(rows, bool) or not 0 <= rows <= MOST_ROWS:
             raise TypeError(f"must have rows, a whole number from 0 to {MOST_ROWS} (got {rows!r})")
@@ -372,7 +396,8 @@ def _check_alike(before: Any, after: Any) -> None:
         raise ValueError("must return a memory without NaN")
 
 
-#: Kinds of numbers by rank, and permitted ranks before and after: a float may become a whole number.
+#: Kinds of numbers by rank, and permitted ranks before and after: a float may become a whole
+#: number.
 NUMBERS = ((bool, np.bool_), (int, np.integer), (float, np.floating))
 ALIKE = ((0, 0), (1, 1), (2, 2), (2, 1))
 

@@ -1,16 +1,17 @@
 """Division of pins among fingers: owner of each pin, visible forces, and the command that it obeys.
 
-Each finger has a controller, which sees and commands the pins around its finger as if it were alone. Sensors
-measure the force on a pin, but not which finger presses it. Pin ownership is therefore recomputed every
-control period, in two steps:
+Each finger has a controller, which sees and commands the pins around its finger as if it were
+alone. Sensors measure the force on a pin, but not which finger presses it. Pin ownership is
+therefore recomputed every control period, in two steps:
 
 - `assign`, before the controllers locate their fingertips: a pressed pin belongs to the finger whose
-  underside is lowest over it. This finger sees the whole force, the others see none. A pressed pin far from
-  all fingers begins a new finger.
+  underside is lowest over it. This finger sees the whole force, the others see none. A pressed pin
+  far from all fingers begins a new finger.
 - `choose`, after the controllers have commanded their pins: a pin in several discs obeys its owner.
 
-For Method I the undersides are those of balls on top of the blisters, since its master is at the fingertip.
-`CellDivision` has the differences for Method II, `PredictedDivision` those for Method III.
+For Method I the undersides are those of balls on top of the blisters, since its master is at the
+fingertip. `CellDivision` has the differences for Method II, `PredictedDivision` those for Method
+III.
 """
 
 from __future__ import annotations
@@ -36,10 +37,11 @@ CAPTURE = 1.2
 NEW, UNDER = 0.65, 0.5
 #: Largest height of an estimated underside above a pin that its finger presses, m.
 REACHED = 6e-3
-#: Largest height of a pin above the underside of the fingertip that owns it, m: a higher one is held up by
-#: the blister of another finger, and would attract the master.
+#: Largest height of a pin above the underside of the fingertip that owns it, m: a higher one is
+#: held up by the blister of another finger, and would attract the master.
 ASIDE = 1.5e-3
-#: Largest distance of an underside above a pressed pin at which its finger may be the one that presses, m.
+#: Largest distance of an underside above a pressed pin at which its finger may be the one that
+#: presses, m.
 UNCLEAR = 0.2e-3
 #: Share of a finger in a pin that is hidden from it, with its height.
 HIDDEN = -1.0
@@ -47,8 +49,8 @@ HIDDEN = -1.0
 NOBODY = -1
 #: Rank of the command of the finger that presses the pin: above all others.
 PRESSING = 2.0
-#: Row of Method II with the periods since a pin became critical, and its value for fingers that the pin does
-#: not obey.
+#: Row of Method II with the periods since a pin became critical, and its value for fingers that the
+#: pin does not obey.
 PERIODS, ANOTHER = 0, -1.0
 #: Position of a finger that is not followed: beyond every pin.
 NOWHERE = (BEYOND, BEYOND)
@@ -140,7 +142,8 @@ class PinDivision:
         x, y = touched.quadratic_basis[1:3, pressed]
         while idle and force.max() >= self.felt:
             strongest = int(find_first_largest(force))
-            # The true finger only names the new one, so that figures of finger and controller agree.
+            # The true finger only names the new one, so that figures of finger and controller
+            # agree.
             assert touched.pressing is not None
             presses = int(find_first_largest(touched.pressing[:, pressed[strongest]]))
             finger = presses if presses in idle else idle[0]
@@ -168,7 +171,9 @@ class PinDivision:
         nearest = find_lowest(np.where(tips < touched.height[pressed] - ASIDE, np.inf, tips))
         return np.where(nearest == NOBODY, owner, nearest)
 
-    def share_pressed(self, owner: Cells, under: Floats, touched: Measurement, pressed: Cells) -> Floats:
+    def share_pressed(
+        self, owner: Cells, under: Floats, touched: Measurement, pressed: Cells
+    ) -> Floats:
         """Return the share of each finger in the force on each pressed pin, (f, q)."""
         return self.share_whole(owner)
 
@@ -201,16 +206,17 @@ class PinDivision:
     ) -> Cells:
         """Return the entry of the command that each pin in several discs obeys, (g,).
 
-        In this order: that of its owner; of the finger above it; of the blister that moves it farthest off
-        the ground; of the nearest finger, of those that move it. `target`: commanded heights, m.
+        In this order: that of its owner; of the finger above it; of the blister that moves it
+        farthest off the ground; of the nearest finger, of those that move it. `target`: commanded
+        heights, m.
         """
         copies = columns.copies
         finger, (x, y) = copies.row, columns.positions
         blisters = self.find_blisters(memory)
         limits = blisters.radius * np.abs(blisters.radius), (UNDER * self.captures[:, 0]) ** 2
-        limit, near, ground, at_x, at_y = np.array((*limits, blisters.ground, blisters.x, blisters.y)).take(
-            finger, axis=1
-        )
+        limit, near, ground, at_x, at_y = np.array(
+            (*limits, blisters.ground, blisters.x, blisters.y)
+        ).take(finger, axis=1)
         square = (x - at_x) ** 2 + (y - at_y) ** 2
         commanded = target[copies.number]
         still = np.abs(commanded - seen.target[columns.cells]) <= TIE
@@ -239,9 +245,9 @@ class PinDivision:
 class CellDivision(PinDivision):
     """Rules for Method II, which has neither a master nor an estimate of the fingertip.
 
-    Pins of a high fingertip may be next to those of a low one. So each controller sees the modes of the
-    blister only at pins that obeyed it last. A pressed pin belongs to the finger whose underside is nearest,
-    since no pin is pressed deeply, and pins obey the nearer finger.
+    Pins of a high fingertip may be next to those of a low one. So each controller sees the modes of
+    the blister only at pins that obeyed it last. A pressed pin belongs to the finger whose
+    underside is nearest, since no pin is pressed deeply, and pins obey the nearer finger.
     """
 
     def find_positions(self, memory: Hands) -> Floats:
@@ -268,8 +274,8 @@ class CellDivision(PinDivision):
     ) -> Cells:
         """Return the entry of the command that each pin in several discs obeys, (g,): of the nearer finger.
 
-        A finger that would leave the pin unchanged has no say unless it is above it; the pressing finger has
-        priority.
+        A finger that would leave the pin unchanged has no say unless it is above it; the pressing
+        finger has priority.
         """
         copies = columns.copies
         finger, (x, y) = copies.row, columns.positions
@@ -312,10 +318,13 @@ class PredictedDivision(PinDivision):
                 under[followed] = controller.predict_under(followers, basis)
         return np.where(measure_square(x, y, basis) > self.captures**2, np.inf, under)
 
-    def share_pressed(self, owner: Cells, under: Floats, touched: Measurement, pressed: Cells) -> Floats:
+    def share_pressed(
+        self, owner: Cells, under: Floats, touched: Measurement, pressed: Cells
+    ) -> Floats:
         """Return the share of each finger in the force on each pressed pin, (f, q); `HIDDEN`: not visible.
 
-        A pin of a finger that is not followed yet is shared with no other: it would attract their estimates.
+        A pin of a finger that is not followed yet is shared with no other: it would attract their
+        estimates.
         """
         shares, certain = self.divide_force(owner, under, touched, pressed)
         shares[:, owner == NOBODY] = 0.0
@@ -327,8 +336,8 @@ class PredictedDivision(PinDivision):
     ) -> tuple[Floats, Flags]:
         """Return the shares of fingers in the forces on pins (q,), (f, q), and which pins are certain.
 
-        If several fingers may press a pin, they share its force in the ratio of the predicted forces; without
-        a predicted force the pin is uncertain.
+        If several fingers may press a pin, they share its force in the ratio of the predicted
+        forces; without a predicted force the pin is uncertain.
         """
         shares, certain = self.share_whole(owner), np.ones(pins.size, np.bool_)
         height = measured.height[pins]
@@ -340,15 +349,17 @@ class PredictedDivision(PinDivision):
                 forces[fingers] = controller.predict_force(forces[fingers], rows[fingers])
             total = forces.sum(axis=0)
             certain[several] = total > 0.0
-            shares[:, several] = np.where(total > 0.0, forces / np.maximum(total, TINY), shares[:, several])
+            shares[:, several] = np.where(
+                total > 0.0, forces / np.maximum(total, TINY), shares[:, several]
+            )
         return shares, certain
 
     def claim(self, memory: Hands, seen: Measurement, shared: Cells) -> tuple[Cells, Floats]:
         """Return the owner of each pin in several discs, (g,), and each finger's share of it, (f, g).
 
-        A pin belongs to the fingertip that presses it, or that would press it at the top of a blister. If the
-        blister of only one of two fingers would press the pin into the other fingertip, the pin is hidden
-        from that finger, which must not raise it.
+        A pin belongs to the fingertip that presses it, or that would press it at the top of a
+        blister. If the blister of only one of two fingers would press the pin into the other
+        fingertip, the pin is hidden from that finger, which must not raise it.
         """
         if not shared.size:
             return super().claim(memory, seen, shared)
@@ -356,7 +367,10 @@ class PredictedDivision(PinDivision):
         under = self.find_undersides(memory, basis, height)
         owner = find_lowest(under)
         shares, _ = self.divide_force(owner, under, seen, shared)
-        lowest, second = under.min(axis=0), np.where(owner == self.fingers, np.inf, under).min(axis=0)
+        lowest, second = (
+            under.min(axis=0),
+            np.where(owner == self.fingers, np.inf, under).min(axis=0),
+        )
         blisters = self.find_blisters(memory)
         square = measure_square(blisters.x, blisters.y, basis)
         inside = square <= (blisters.radius * np.abs(blisters.radius))[:, None]

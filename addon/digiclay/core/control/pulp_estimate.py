@@ -1,8 +1,8 @@
 """Observer of the pulp: tensions of cells, and undersides over them, from their measured forces.
 
-The relaxation filters ``dz_i/dt = ν_i (T - z_i)`` and ``F = f_d (T - Σ ĉ_i z_i)`` (equations 10 to 14) are
-solved for the tension T, which is taken as linear in time over a control period. The equation is linear:
-there is no iteration.
+The relaxation filters ``dz_i/dt = ν_i (T - z_i)`` and ``F = f_d (T - Σ ĉ_i z_i)`` (equations 10 to
+14) are solved for the tension T, which is taken as linear in time over a control period. The
+equation is linear: there is no iteration.
 """
 
 from dataclasses import dataclass
@@ -16,17 +16,19 @@ from ..base.arrays import TIE, Flags, Floats
 from ..model.touch import Touch
 from .finger_sections import WHOLE, Whole
 
-#: Expected force from which on a cell counts as touched: a share of the least one that is no noise; and N. At
-#: 1 mN cells at the rim are taken whose undersides are known less exactly, and tilted fingertips are lost.
+#: Expected force from which on a cell counts as touched: a share of the least one that is no noise;
+#: and N. At 1 mN cells at the rim are taken whose undersides are known less exactly, and tilted
+#: fingertips are lost.
 EXPECTED, LEAST = 0.2, 10e-3
 
 
 class Span(NamedTuple):
     """Change over a time, for a tension that goes linearly from T_0 to T_1.
 
-    ``z_1 = decay z_0 + early T_0 + late T_1``; of T_1 the share ``Σ ĉ_i late_i`` is lost to relaxation,
-    `held` is not. `late` (k + 1, 1): what T_1 adds to filters and tension. `remaining` (k + 1, k + 1), of
-    filters and tension before: the filters after, but for T_1, and the tension lost of it, over `held`.
+    ``z_1 = decay z_0 + early T_0 + late T_1``; of T_1 the share ``Σ ĉ_i late_i`` is lost to
+    relaxation, `held` is not. `late` (k + 1, 1): what T_1 adds to filters and tension. `remaining`
+    (k + 1, k + 1), of filters and tension before: the filters after, but for T_1, and the tension
+    lost of it, over `held`.
     """
 
     remaining: Floats
@@ -70,7 +72,9 @@ class PulpEstimate:
         held = 1.0 - float(pulp.shares @ late)
         remaining = np.column_stack((np.diag(decay), 1.0 - decay - late))
         return Span(
-            np.vstack((remaining, pulp.shares @ remaining / held)), np.append(late, 1.0)[:, None], held
+            np.vstack((remaining, pulp.shares @ remaining / held)),
+            np.append(late, 1.0)[:, None],
+            held,
         )
 
     def age(self, pulp: Floats, periods: Floats) -> None:
@@ -81,13 +85,14 @@ class PulpEstimate:
     def observe(self, pulp: Floats, force: Floats, expected: Floats) -> Flags:
         """Update filters and tensions of cells, in place; return which cells are touched.
 
-        Pulp that is relieved faster than it relaxes is still indented, but carries no force. So a cell
-        without a force has the expected tension, at most that at which a force would be measured. A cell with
-        an expected force counts as touched even if none is measured, since this tells where the fingertip
-        ends; a selection by noisy forces would prefer cells with positive noise.
+        Pulp that is relieved faster than it relaxes is still indented, but carries no force. So a
+        cell without a force has the expected tension, at most that at which a force would be
+        measured. A cell with an expected force counts as touched even if none is measured, since
+        this tells where the fingertip ends; a selection by noisy forces would prefer cells with
+        positive noise.
 
-        `pulp` (k + 1, m), filters z and tension T a period before, N; `expected` (m,), tension under the
-        predicted fingertip, N.
+        `pulp` (k + 1, m), filters z and tension T a period before, N; `expected` (m,), tension
+        under the predicted fingertip, N.
         """
         span = self.once
         remaining, share = span.remaining.dot(pulp), self.touch.contact.share * span.held
@@ -115,7 +120,9 @@ class PulpEstimate:
         force *= self.later.held * self.touch.contact.share
         return force
 
-    def find_underside(self, height: Floats, tension: Floats, noise: float) -> tuple[Floats, Floats]:
+    def find_underside(
+        self, height: Floats, tension: Floats, noise: float
+    ) -> tuple[Floats, Floats]:
         """Return the undersides over cells, m, and their standard deviations for that of the force, N.
 
         The indentation is equation 11 solved for x; the stiffness is ``f_d dT/dx = f_d (b + m T)``.
@@ -130,7 +137,8 @@ class PulpEstimate:
         return height - depth, (noise / (contact.share * contact.stiffness)) / stiffening
 
 
-#: Heights of the top that are tried, about a guess, as shares of what pins can reach, 0.5 mm on a level bed.
+#: Heights of the top that are tried, about a guess, as shares of what pins can reach, 0.5 mm on a
+#: level bed.
 SHARES = np.array([-1.0, -0.4, -0.15, -0.04, 0.0, 0.04, 0.15, 0.4, 1.0])[:, None]
 
 
@@ -172,8 +180,9 @@ def find_tops(
 ) -> list[tuple[float, float]]:
     """Return the heights of tops at which the predicted forces add up to forces, m, and their sums, N.
 
-    Where none does, it is the end of the range nearest to it. `guesses`: where tops are sought most closely,
-    m; `under` (m,), predicted undersides, m; `lost` (m,), from `PulpEstimate.predict_loss`, N.
+    Where none does, it is the end of the range nearest to it. `guesses`: where tops are sought most
+    closely, m; `under` (m,), predicted undersides, m; `lost` (m,), from
+    `PulpEstimate.predict_loss`, N.
     """
     highest_part = sections.repeat(sections.reduce(np.maximum, reach.part))
     (level,) = (reach.part >= highest_part - TIE).nonzero()
@@ -193,9 +202,13 @@ def find_tops(
     np.minimum(depths, most, out=depths)
     depths -= under
     forces = sections.reduce(np.add, pulp.predict_force(depths, lost))
-    tried = sections.reduce(np.maximum, tops)  # those of each finger, all of whose cells have the same
+    tried = sections.reduce(
+        np.maximum, tops
+    )  # those of each finger, all of whose cells have the same
     results = []
     for force, sums, heights in zip(wanted, forces.T, tried.T, strict=True):
         weakest, *_, strongest = sums.tolist()
-        results.append((float(np.interp(force, sums, heights)), min(max(force, weakest), strongest)))
+        results.append(
+            (float(np.interp(force, sums, heights)), min(max(force, weakest), strongest))
+        )
     return results

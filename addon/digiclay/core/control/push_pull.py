@@ -1,8 +1,8 @@
 """Push and pull: contact from commanded less measured height, without a force sensor.
 
-A shut valve locks its pin, and a locked pin does not move under a force. So pins near the hand listen: their
-valves open slightly to the high and to the low reservoir in turn. A free pin ends each cycle where it began;
-a loaded one rises less than it falls, and its drift reveals the hand.
+A shut valve locks its pin, and a locked pin does not move under a force. So pins near the hand
+listen: their valves open slightly to the high and to the low reservoir in turn. A free pin ends
+each cycle where it began; a loaded one rises less than it falls, and its drift reveals the hand.
 """
 
 from dataclasses import dataclass, replace
@@ -45,13 +45,21 @@ class PushPull(DriveParameters):
         20e-3, "speed of a free touched pin, up and down", unit="m/s", symbol="v_f", above=0.0
     )
     threshold: float = quantity(
-        0.1e-3, "commanded less measured height at which contact is detected", unit="m", symbol="θ", above=0.0
+        0.1e-3,
+        "commanded less measured height at which contact is detected",
+        unit="m",
+        symbol="θ",
+        above=0.0,
     )
     centring_time: float = quantity(
         0.5, "time constant of a listening pin's centering", unit="s", symbol="τ_c", above=0.0
     )
     assist: float = quantity(
-        0.5, "share of its last drift speed that a touched pin keeps", symbol="a", at_least=0.0, at_most=0.9
+        0.5,
+        "share of its last drift speed that a touched pin keeps",
+        symbol="a",
+        at_least=0.0,
+        at_most=0.9,
     )
     release_time: float = quantity(
         0.1, "time without drift until a pin is released", unit="s", symbol="t_r", at_least=0.0
@@ -61,16 +69,18 @@ class PushPull(DriveParameters):
         """The following speed is at least the listening speed."""
         if not self.following_speed >= self.listening_speed:
             rule = f"must be at least listening_speed, {self.listening_speed:g} m/s"
-            raise ParameterError("PushPull", "following_speed", rule, f"{self.following_speed:g} m/s")
+            raise ParameterError(
+                "PushPull", "following_speed", rule, f"{self.following_speed:g} m/s"
+            )
 
 
 @dataclass(frozen=True, eq=False)
 class PushPullControl:
     """Controller of push and pull for a bed.
 
-    With e = H_com - H at the end of a cycle, a cell is pushed if e > θ and pulled if e < -θ; its commanded
-    height then follows to within θ of the measured one. Rows of a cell: remaining cycles in which it counts
-    as touched, and its last drift speed, m/s.
+    With e = H_com - H at the end of a cycle, a cell is pushed if e > θ and pulled if e < -θ; its
+    commanded height then follows to within θ of the measured one. Rows of a cell: remaining cycles
+    in which it counts as touched, and its last drift speed, m/s.
     """
 
     parameters: PushPull
@@ -90,7 +100,10 @@ class PushPullControl:
         memory = memory._replace(period=memory.period + 1, radius=-1.0)
         if not touched.height.size:
             return memory, None
-        low, high = touched.quadratic_basis[1:3].min(axis=1), touched.quadratic_basis[1:3].max(axis=1)
+        low, high = (
+            touched.quadratic_basis[1:3].min(axis=1),
+            touched.quadratic_basis[1:3].max(axis=1),
+        )
         x, y = ((low + high) / 2).tolist()
         radius = float(np.hypot(*(high - low))) / 2 + self.margin
         return memory._replace(x=x, y=y, radius=radius), (x, y, radius)
@@ -98,7 +111,11 @@ class PushPullControl:
     def command(self, memory: Listening, seen: Measurement) -> tuple[Listening, Commands]:
         """Drag commanded heights along, and move every pin up or down; see `Controller`."""
         speeds, target = self.parameters, seen.target
-        limit = memory.radius * memory.radius * (1.0 + RELATIVE_TOLERANCE) if memory.radius >= 0.0 else -1.0
+        limit = (
+            memory.radius * memory.radius * (1.0 + RELATIVE_TOLERANCE)
+            if memory.radius >= 0.0
+            else -1.0
+        )
         listening = measure_square(memory.x, memory.y, seen.quadratic_basis) <= limit
         rising = memory.period % CYCLE == 0
         if rising:  # a whole cycle is over: the remaining error is no ripple

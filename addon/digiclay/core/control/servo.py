@@ -1,7 +1,7 @@
 """Common parts of the controllers: height control, lock of overloaded cells, one run or a batch.
 
-The cells of one run are arrays (m,), those of a batch of b runs (m, b). A number that differs between runs is
-an array (b,), which numpy broadcasts along the last axis.
+The cells of one run are arrays (m,), those of a batch of b runs (m, b). A number that differs
+between runs is an array (b,), which numpy broadcasts along the last axis.
 """
 
 from __future__ import annotations
@@ -25,12 +25,18 @@ class Tracking(ControlParameters):
     position_gain: float = quantity(
         500.0, "proportional gain of height", unit="1/m", symbol="K_p", at_least=0.0
     )
-    dead_band: float = quantity(10e-6, "height error without a command", unit="m", symbol="δ", at_least=0.0)
+    dead_band: float = quantity(
+        10e-6, "height error without a command", unit="m", symbol="δ", at_least=0.0
+    )
     travel: float = quantity(
         1.5e-3, "distance traveled that determines the direction", unit="m", symbol="d_t", above=0.0
     )
     behind: float = quantity(
-        -0.3, "cosine below which a cell lies behind the fingertip", symbol="cos_f", at_least=-1.0, below=0.0
+        -0.3,
+        "cosine below which a cell lies behind the fingertip",
+        symbol="cos_f",
+        at_least=-1.0,
+        below=0.0,
     )
 
     def command(self, target: Floats, height: Floats) -> Floats:
@@ -57,7 +63,9 @@ class Tracking(ControlParameters):
 def declare_again(owner: type[Parameters], name: str, default: float | None = None) -> Any:
     """Declare a parameter of another class again, with another default if given."""
     field = next(field for field in dataclasses.fields(owner) if field.name == name)
-    return dataclasses.field(default=field.default if default is None else default, metadata=field.metadata)
+    return dataclasses.field(
+        default=field.default if default is None else default, metadata=field.metadata
+    )
 
 
 def mark_formed(target: Floats, rest: float | Floats, band: float | Floats) -> Modes:

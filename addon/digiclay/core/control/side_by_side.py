@@ -19,8 +19,9 @@ Part = TypeVar("Part")
 def merge_parts(parts: Sequence[Part]) -> Part:
     """Return one part for all runs; the first one itself if all are equal.
 
-    The parts must be equal by `classify`. A number that differs becomes an array (b,), an array gets a last
-    axis, and inner parts are merged likewise. The rules of parameters are not checked again.
+    The parts must be equal by `classify`. A number that differs becomes an array (b,), an array
+    gets a last axis, and inner parts are merged likewise. The rules of parameters are not checked
+    again.
     """
     first: Any = parts[0]
     names = [field.name for field in fields(first)]

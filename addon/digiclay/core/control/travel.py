@@ -1,8 +1,9 @@
 """Direction of the fingertip, and the cells behind it (Fig. 6 of the paper).
 
 The direction depends on the distance traveled, not on speed: a fingertip that slows down or rests
-keeps its direction, and cells that it has formed are not called back. The basis of cells has the rows
-1, x, y, x², x y, y², (6, m) of one run or (6, m, b) of a batch; numbers that differ between runs are (b,).
+keeps its direction, and cells that it has formed are not called back. The basis of cells has the
+rows 1, x, y, x², x y, y², (6, m) of one run or (6, m, b) of a batch; numbers that differ between
+runs are (b,).
 """
 
 from __future__ import annotations
@@ -16,13 +17,13 @@ from ..base.arrays import TIE, Floats
 
 #: A direction is opposite to another when the cosine of the angle between them is below this.
 BACK = -0.5
-#: A fingertip moves off the bed if the cosine between its direction and the outward normal is above this:
-#: under one that moves along the rim the centroid of the forces varies.
+#: A fingertip moves off the bed if the cosine between its direction and the outward normal is above
+#: this: under one that moves along the rim the centroid of the forces varies.
 OUTWARD = 0.1
 
 
-#: Parts of a meter to which the position of a fingertip is rounded. A blister that rises under a fingertip on
-#: a line of symmetry may be unstable across it: rounding errors must not grow.
+#: Parts of a meter to which the position of a fingertip is rounded. A blister that rises under a
+#: fingertip on a line of symmetry may be unstable across it: rounding errors must not grow.
 PARTS = 1e13
 
 
@@ -56,11 +57,13 @@ class Heading(NamedTuple):
     toward_y: float = 0.0
 
 
-def update_heading(heading: Heading, x: float, y: float, travel: float, reversal: float = 0.0) -> Heading:
+def update_heading(
+    heading: Heading, x: float, y: float, travel: float, reversal: float = 0.0
+) -> Heading:
     """Return the heading of a fingertip at x, y, m; a new one after a distance `travel`, m.
 
-    A direction within 60 degrees of the opposite one takes `reversal`, m, if that is longer: on a slope the
-    centroid of the forces varies under a fingertip that moves straight on.
+    A direction within 60 degrees of the opposite one takes `reversal`, m, if that is longer: on a
+    slope the centroid of the forces varies under a fingertip that moves straight on.
     """
     dx, dy = x - heading.x, y - heading.y
     gone = math.hypot(dx, dy)
@@ -76,7 +79,9 @@ def measure_lead(heading: Heading, x: float, y: float, basis: Floats) -> Floats:
     return np.dot([-x * toward_x - y * toward_y, toward_x, toward_y], basis[:3])
 
 
-def measure_offsets(x: Any, y: Any, toward_x: Any, toward_y: Any, basis: Floats) -> tuple[Floats, Floats]:
+def measure_offsets(
+    x: Any, y: Any, toward_x: Any, toward_y: Any, basis: Floats
+) -> tuple[Floats, Floats]:
     """Return the distances of cells from a point, and ahead of it in a direction, (m[, b]) each, m.
 
     Points and directions (m,): one per cell, for cells of several fingers.

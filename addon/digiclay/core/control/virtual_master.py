@@ -34,17 +34,17 @@ from .ground import GROUNDS, EdgeGround, OwnGround, raise_blister
 from .servo import BatchControl, Tracking, lock_overloaded, mark_formed, sum_weighted
 from .travel import PARTS, Heading, Rim, measure_excess, update_heading
 
-#: Least share of the total force on the cell in the middle of the fingertip while shaping: 0.23 to 0.33 were
-#: measured under a slow fingertip.
+#: Least share of the total force on the cell in the middle of the fingertip while shaping: 0.23 to
+#: 0.33 were measured under a slow fingertip.
 HEAVIEST = 0.25
 NONE = Constants((0.0,))
 #: Least number of runs whose masters are led side by side: for fewer, plain numbers are faster.
 MANY = 40
 #: Position of an idle master, m, so far away that no cell is in its blister.
 NOWHERE = 1e3
-#: Largest rise of frozen cells with a blister that searches for the fingertip, as a share of its radius: 1.5
-#: of 15 mm. The paper's pins rise by 1.2 mm within the loss time, fast ones by 5 mm, which would remain as
-#: spikes.
+#: Largest rise of frozen cells with a blister that searches for the fingertip, as a share of its
+#: radius: 1.5 of 15 mm. The paper's pins rise by 1.2 mm within the loss time, fast ones by 5 mm,
+#: which would remain as spikes.
 CARRIED = 0.1
 
 
@@ -179,9 +179,15 @@ class VirtualMaster(Tracking):
         above=0.0,
     )
     spring_stiffness: float = quantity(
-        200.0, "stiffness of the virtual spring before shaping", unit="N/m", symbol="k_VS", above=0.0
+        200.0,
+        "stiffness of the virtual spring before shaping",
+        unit="N/m",
+        symbol="k_VS",
+        above=0.0,
     )
-    force_gain: float = quantity(5.0, "proportional gain of force", unit="1/N", symbol="K_f", at_least=0.0)
+    force_gain: float = quantity(
+        5.0, "proportional gain of force", unit="1/N", symbol="K_f", at_least=0.0
+    )
     radius: float = quantity(
         8e-3,
         "radius of the search for the fingertip around the master",
@@ -259,7 +265,14 @@ class VirtualMasterControl(BatchControl):
     # Decisions about one master, in plain numbers.
 
     def follow(
-        self, master: Master, total: float, x: float, y: float, near: float, near_x: float, near_y: float
+        self,
+        master: Master,
+        total: float,
+        x: float,
+        y: float,
+        near: float,
+        near_x: float,
+        near_y: float,
     ) -> Master:
         """VM Locate: centroid of the forces near the master; at first touch, of all (equation 13); N, N m."""
         gains = self.parameters
@@ -272,10 +285,13 @@ class VirtualMasterControl(BatchControl):
                 x, y = round(near_x / near * PARTS) / PARTS, round(near_y / near * PARTS) / PARTS
                 reversal, reach = self.reversal, self.rim.reach
                 if self.rim.is_under(x, y, reach):
-                    # The contact patch varies beside the rim: only a longer way back is a new direction.
+                    # The contact patch varies beside the rim: only a longer way back is a new
+                    # direction.
                     reversal = max(reversal, reach)
                 heading = update_heading(heading, x, y, gains.travel, reversal)
-                return Master._make((phase, x, y, height, opening, reference, edge, heading, felt, 0, losses))
+                return Master._make(
+                    (phase, x, y, height, opening, reference, edge, heading, felt, 0, losses)
+                )
             # The fingertip has jumped out of reach: a new touch begins.
             losses += 1
         x, y = x / total, y / total
@@ -312,7 +328,9 @@ class VirtualMasterControl(BatchControl):
                 effort = min(effort, 0.0) if leaves else effort
             height, opening = self.model.advance(height, opening, bound(effort, -1.0, 1.0))
             felt = height if alone == 0 else felt
-        return Master._make((phase, x, y, height, opening, reference, edge, heading, felt, alone, losses))
+        return Master._make(
+            (phase, x, y, height, opening, reference, edge, heading, felt, alone, losses)
+        )
 
     def find_disc(self, master: Master) -> Disc | None:
         """Return the disc that a master controls, m."""
@@ -335,7 +353,9 @@ class VirtualMasterControl(BatchControl):
             return master
         phase, x, y, height, opening, reference, _, heading, felt, alone, losses = master
         edge = bound(level / count, 0.0, self.actuator.stroke)
-        return Master._make((phase, x, y, height, opening, reference, edge, heading, felt, alone, losses))
+        return Master._make(
+            (phase, x, y, height, opening, reference, edge, heading, felt, alone, losses)
+        )
 
     def get_heights(self, master: Master) -> tuple[float, float, np.int8, bool]:
         """Return heights around and of a master, m, mode of felt cells, whether frozen ones stay behind."""
@@ -369,12 +389,14 @@ class VirtualMasterControl(BatchControl):
         (none,) = NONE[force.shape]
         total, *center = self.to_numbers(sum_weighted(basis, force))
         near = self.to_numbers(sum_weighted(basis, np.where(beyond > none, none, force)))
-        # Near the master the controlled force includes readings below the noise floor, since they add up;
-        # farther away only those above it count, see docs/equations.md.
+        # Near the master the controlled force includes readings below the noise floor, since they
+        # add up; farther away only those above it count, see docs/equations.md.
         hidden = (beyond <= 0.0) & (touched.force < self.floor) if self._noisy else None
         noise = () if hidden is None else (self.to_numbers(sum_weighted(touched.force, hidden)),)
         memory = self.follow(memory, total, *center[:2], *near[:3])
-        surface = self.to_numbers(sum_weighted(touched.height, force)) if self.is_new(memory) else total
+        surface = (
+            self.to_numbers(sum_weighted(touched.height, force)) if self.is_new(memory) else total
+        )
         memory = self.lead(memory, total, surface, *noise)
         return memory, self.find_disc(memory)
 
@@ -384,7 +406,9 @@ class VirtualMasterControl(BatchControl):
         mode = mark_formed(target, *self._limits[target.shape])
         if self.is_active(memory):
             memory, target = self._create_blister(memory, seen, mode)
-        command = lock_overloaded(self.parameters.command(target, seen.height), seen.force, self.lift)
+        command = lock_overloaded(
+            self.parameters.command(target, seen.height), seen.force, self.lift
+        )
         return memory, Commands(target, mode, command)
 
     def _create_blister(self, memory: Memory, seen: Measurement, mode: Modes) -> tuple[Any, Floats]:
@@ -393,7 +417,9 @@ class VirtualMasterControl(BatchControl):
         facing = self._rule.find_edge(cells)
         level = self.to_numbers(sum_weighted(seen.height, facing))
         memory = self.set_edge(memory, level, count_true(facing))
-        return memory, raise_blister(self._rule, self.ground, cells, seen, self.get_heights(memory), mode)
+        return memory, raise_blister(
+            self._rule, self.ground, cells, seen, self.get_heights(memory), mode
+        )
 
     @cached_property
     def _noisy(self) -> bool:
@@ -404,7 +430,9 @@ class VirtualMasterControl(BatchControl):
     def _rule(self) -> BlisterRule:
         """Rule for frozen and touched cells of the blister."""
         gains = self.parameters
-        release = np.maximum(gains.release_force, self.floor) if self._noisy else gains.release_force
+        release = (
+            np.maximum(gains.release_force, self.floor) if self._noisy else gains.release_force
+        )
         return BlisterRule(self.blister, gains.behind, release, self.floor)
 
     @cached_property

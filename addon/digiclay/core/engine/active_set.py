@@ -23,8 +23,8 @@ from ..model.physics import Cell
 from ..model.touch import FingerPeriod
 from .state import ActiveSet, Rows, State
 
-#: A set is renewed, without the cells at rest by then, after this number of control periods, or this time,
-#: s, if that is longer.
+#: A set is renewed, without the cells at rest by then, after this number of control periods, or
+#: this time, s, if that is longer.
 LASTING_PERIODS, LASTING_TIME = 32, 0.16
 
 
@@ -43,7 +43,9 @@ class Selection:
     #: The margin of a set, in pitches.
     margin_pitches: ClassVar[float] = 1.0
     #: The larger and the smaller of two numbers, of a run or (b,) of a batch.
-    larger: ClassVar[Callable[..., Any]] = staticmethod(lambda value, other: max(value, float(other)))
+    larger: ClassVar[Callable[..., Any]] = staticmethod(
+        lambda value, other: max(value, float(other))
+    )
     smaller: ClassVar[Callable[..., Any]] = staticmethod(min)
 
     @cached_property
@@ -75,7 +77,9 @@ class Selection:
         """Return the controlled disc."""
         return control
 
-    def serves(self, active: ActiveSet, period: int, window: Window | None, control: Discs | None) -> bool:
+    def serves(
+        self, active: ActiveSet, period: int, window: Window | None, control: Discs | None
+    ) -> bool:
         """Return whether a set includes all cells that can change in a period."""
         return (
             period < active.until

@@ -1,8 +1,8 @@
 """Engine of a bed under several fingertips: active cells and their motion.
 
-A cell and a fingertip that may touch it are a pair. Each pair is moved as if its fingertip were alone; for
-the stepper all pairs are the cells of one large bed. The lowest pair of a cell is correct unless two
-fingertips press the cell: then it is moved again under both.
+A cell and a fingertip that may touch it are a pair. Each pair is moved as if its fingertip were
+alone; for the stepper all pairs are the cells of one large bed. The lowest pair of a cell is
+correct unless two fingertips press the cell: then it is moved again under both.
 """
 
 from __future__ import annotations
@@ -24,14 +24,15 @@ from .system import System
 
 #: Lifetime of a set, relative to that under one finger.
 LONGER = 8
-#: Largest rise of pins while a set serves, m, at least that of two periods: the smaller, the fewer cells a
-#: fingertip may touch.
+#: Largest rise of pins while a set serves, m, at least that of two periods: the smaller, the fewer
+#: cells a fingertip may touch.
 RISE = 3e-3
-#: Largest motion of a fingertip while a set serves, m, at least a pitch: fast strokes cross a narrow margin
-#: in a few periods.
+#: Largest motion of a fingertip while a set serves, m, at least a pitch: fast strokes cross a
+#: narrow margin in a few periods.
 ROOM = 2.25e-3
-#: Moves cells that several fingers press: heights (g,), openings and commands (l, g), filters (r, c, g),
-#: undersides at the period's instants (p, c, g), fingers (c, g); returns heights, filters, forces (c, g), N.
+#: Moves cells that several fingers press: heights (g,), openings and commands (l, g), filters (r,
+#: c, g), undersides at the period's instants (p, c, g), fingers (c, g); returns heights, filters,
+#: forces (c, g), N.
 PressTogether = Callable[[Floats, Floats, Floats, Floats, Cells], tuple[Floats, Floats, Floats]]
 
 
@@ -86,7 +87,9 @@ class HandSelection(Selection):
             rows = [finger.pulp.rows for finger in touch.each]
             apart = ~find_pairs(active)
             waited = (state.period - (active.until - self.lifetime)) * self.period
-            touch.pulp.age(active.block[self.cell.pulp_rows, :near], np.repeat(apart * waited, rows, axis=0))
+            touch.pulp.age(
+                active.block[self.cell.pulp_rows, :near], np.repeat(apart * waited, rows, axis=0)
+            )
         return super().release(state)
 
     def take(self, state: State, chosen: ActiveSet) -> ActiveSet:
@@ -131,7 +134,12 @@ class Pairs:
     """Pairs of equal fingers, which the stepper moves as the cells of one bed."""
 
     def __init__(
-        self, system: HandSystem, active: ActiveSet, inside: Flags, fingers: list[int], others: Cells
+        self,
+        system: HandSystem,
+        active: ActiveSet,
+        inside: Flags,
+        fingers: list[int],
+        others: Cells,
     ) -> None:
         cell, rows, width = system.cells[fingers[0]], system.rows, active.cells.size
         finger, self.cells = inside[fingers].nonzero()
@@ -140,13 +148,23 @@ class Pairs:
         self.positions = self.positions._replace(fingers=np.array(fingers)[self.positions.fingers])
         self.columns = columns = np.concatenate([self.cells, others])
         filters = np.arange(cell.pulp_rows.start, cell.pulp_rows.stop)[:, None]
-        common = [0, *range(system.rows.physics)[system.cell.lag_rows], *range(rows.count)[rows.commands]]
-        # Indices in the block of a pair's rows: height, filters of its finger, openings and commands.
+        common = [
+            0,
+            *range(system.rows.physics)[system.cell.lag_rows],
+            *range(rows.count)[rows.commands],
+        ]
+        # Indices in the block of a pair's rows: height, filters of its finger, openings and
+        # commands.
         of_pairs = (filters + self.fingers * filters.size) * width + self.cells
-        self.filters, self.forces = of_pairs, (rows.pressing.start + self.fingers) * width + self.cells
+        self.filters, self.forces = (
+            of_pairs,
+            (rows.pressing.start + self.fingers) * width + self.cells,
+        )
         shared = np.array(common)[:, None] * width + columns
         unused = np.zeros((filters.size, others.size), np.intp)
-        self.index = np.concatenate([shared[:1], np.concatenate([of_pairs, unused], axis=1), shared[1:]])
+        self.index = np.concatenate(
+            [shared[:1], np.concatenate([of_pairs, unused], axis=1), shared[1:]]
+        )
         self.rows = np.empty(self.index.shape)
         self.pulp, count = slice(1, 1 + filters.size), self.cells.size
         self.lag = slice(self.pulp.stop, self.pulp.stop + cell.lag.rows)
@@ -163,7 +181,9 @@ class Pairs:
         after = self.move(under)
         flat[self.forces] = after
         flat[self.filters] = self.rows[self.pulp, :count]
-        return Moved(before[:, :count], self.rows[0, :count], np.maximum(forces, after) > TIE, under)
+        return Moved(
+            before[:, :count], self.rows[0, :count], np.maximum(forces, after) > TIE, under
+        )
 
 
 class Moved(NamedTuple):

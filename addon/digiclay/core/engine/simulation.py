@@ -24,8 +24,8 @@ Stopped = Callable[[], bool] | None
 
 #: Control periods whose finger poses are computed at a time.
 CHUNK = 256
-#: Most numbers of a dot product for which numpy's library uses one thread: several cost more time than they
-#: save.
+#: Most numbers of a dot product for which numpy's library uses one thread: several cost more time
+#: than they save.
 THREADED = 10_000
 
 
@@ -97,12 +97,14 @@ def simulate_period(
     return state.end_period(memory)
 
 
-def repeat_period(system: System, state: State, finger: FingerPeriod | None, leader: State) -> State:
+def repeat_period(
+    system: System, state: State, finger: FingerPeriod | None, leader: State
+) -> State:
     """Simulate the last control period of a run, or a batch, again, under its commands.
 
-    `state`, before the period, is overwritten; `leader` is the run's state after it, of the same bed and
-    rows. Its active cells are used here too: the two differ only by errors of the integration, far less than
-    the margin of a set.
+    `state`, before the period, is overwritten; `leader` is the run's state after it, of the same
+    bed and rows. Its active cells are used here too: the two differ only by errors of the
+    integration, far less than the margin of a set.
     """
     if state.active.cells is not leader.active.cells:
         system.selection.release(state)
@@ -132,7 +134,9 @@ def find_divergence(
     )
 
 
-def periods(system: System, trajectories: Sequence[Trajectory], state: State, count: int) -> Iterator[State]:
+def periods(
+    system: System, trajectories: Sequence[Trajectory], state: State, count: int
+) -> Iterator[State]:
     """Yield the state after each control period along the fingers' trajectories, valid until the next one."""
     done = 0
     while done < count:

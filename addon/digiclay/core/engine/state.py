@@ -202,7 +202,9 @@ class State(NamedTuple):
 
     def end_period(self, memory: Any) -> State:
         """Return the state one control period later, with the controller's memory."""
-        return State(self.period + 1, self.rows, self.modes, self.aged, self.peak, self.active, memory)
+        return State(
+            self.period + 1, self.rows, self.modes, self.aged, self.peak, self.active, memory
+        )
 
     def row(self, index: int) -> Floats:
         """Return a row of all cells, (n,) or (n, b), as a new array; see `Rows`."""

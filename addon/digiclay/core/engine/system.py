@@ -75,7 +75,9 @@ def make_segments(
         times = {t for t in times if abs(t - cut) > 1e-9 * period} | {cut}
     edges = sorted(times)
     pairs = list(pairwise(edges))
-    times_of_nodes = [[a + node * (b - a) if node < 1.0 else b for node in stepper.nodes] for a, b in pairs]
+    times_of_nodes = [
+        [a + node * (b - a) if node < 1.0 else b for node in stepper.nodes] for a, b in pairs
+    ]
     instants = sorted({time for nodes in times_of_nodes for time in nodes})
     segments = tuple(
         Segment(a, b - a, tuple(map(instants.index, nodes)))

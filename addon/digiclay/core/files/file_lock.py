@@ -53,10 +53,14 @@ def _find_start_in_linux(pid: int) -> float | None:
     """Return the start time of a process from /proc."""
     try:
         status = Path(f"/proc/{pid}/stat").read_text(encoding="utf-8", errors="replace")
-        booted = re.search(r"^btime (\d+)$", Path("/proc/stat").read_text(encoding="ascii"), re.MULTILINE)
+        booted = re.search(
+            r"^btime (\d+)$", Path("/proc/stat").read_text(encoding="ascii"), re.MULTILINE
+        )
     except OSError:
         return None
-    state, *fields = status.rpartition(")")[2].split()  # the command's name may have blanks and brackets
+    state, *fields = status.rpartition(")")[
+        2
+    ].split()  # the command's name may have blanks and brackets
     if state in "ZX":  # it has ended, and its parent has not read its status
         return None
     return int(booted[1]) + int(fields[18]) / os.sysconf("SC_CLK_TCK") if booted else 0.0
@@ -85,7 +89,9 @@ def _find_start_in_windows(pid: int) -> float | None:
     try:
         owned, code = system.c_void_p(handle), system.c_ulong()
         times = [system.c_ulonglong() for _ in range(4)]
-        if kernel.GetExitCodeProcess(owned, system.byref(code)) and code.value != 259:  # STILL_ACTIVE
+        if (
+            kernel.GetExitCodeProcess(owned, system.byref(code)) and code.value != 259
+        ):  # STILL_ACTIVE
             return None
         if not kernel.GetProcessTimes(owned, *map(system.byref, times)):
             return 0.0
@@ -96,7 +102,8 @@ def _find_start_in_windows(pid: int) -> float | None:
 
 #: Seconds between two attempts.
 PAUSE = 0.05
-#: Attempts to make a file in a folder that has just been removed: beyond, it takes no files, as /proc.
+#: Attempts to make a file in a folder that has just been removed: beyond, it takes no files, as
+#: /proc.
 MOST_MISSED = 100
 #: A record without a name that is older than this is abandoned, s; a newer one is being written.
 BEING_WRITTEN = 10.0
@@ -126,7 +133,9 @@ def hold_lock(path: Path, refusal: str, patience: float = 0.0) -> Iterator[None]
     try:
         yield
     finally:
-        if os.name == "nt":  # which cannot remove an open file; one that another process waits for remains
+        if (
+            os.name == "nt"
+        ):  # which cannot remove an open file; one that another process waits for remains
             os.close(taken)
         with suppress(OSError):
             path.unlink()
@@ -164,7 +173,9 @@ def _take(path: Path) -> int | None:
         except BaseException:
             os.close(file)
             raise
-        os.close(file)  # it was removed between opening and locking: the next attempt makes another file
+        os.close(
+            file
+        )  # it was removed between opening and locking: the next attempt makes another file
 
 
 def _lock(file: int) -> bool:

@@ -54,7 +54,9 @@ def read_heads(archive: zipfile.ZipFile, names: Sequence[str]) -> dict[str, Head
             head = _head(file, name)
             actual = entry.file_size - file.tell()
         if head.size != actual:
-            raise ValueError(f"{name} must have {head.size:,} bytes, as its header says (got {actual:,})")
+            raise ValueError(
+                f"{name} must have {head.size:,} bytes, as its header says (got {actual:,})"
+            )
         heads[name] = head
     return heads
 

@@ -62,7 +62,8 @@ def make_unique_names(texts: Sequence[str]) -> list[str]:
     return names
 
 
-#: ``.NAME.PID@HOST.KIND``: the new NAME, the former NAME, frames of a film. Older versions name no host.
+#: ``.NAME.PID@HOST.KIND``: the new NAME, the former NAME, frames of a film. Older versions name no
+#: host.
 UNFINISHED = r"\.(?P<name>.+)\.(?P<pid>\d{1,10})(?:@(?P<host>[\w-]+))?\.(?P<kind>part|old|frames)"
 
 
@@ -246,7 +247,9 @@ def claim_folder(
         with explain_os_error(f"{out} cannot be made"):
             until_the_end.enter_context(lock_name(out, patience))
         remove_abandoned(target.parent, target.name)
-        check_folder(out, overwrite=overwrite, content=content)  # another process may just have ended
+        check_folder(
+            out, overwrite=overwrite, content=content
+        )  # another process may just have ended
         yield Claim(out, overwrite)
 
 
@@ -277,7 +280,9 @@ def claim_files(files: Sequence[Path], patience: float = 0.0) -> Iterator[None]:
                 remove_abandoned(file.parent, file.name)
         except OSError as error:
             folder = files[0].parent
-            raise OutputError(f"{folder} cannot be written to: {error.strerror or error}.") from None
+            raise OutputError(
+                f"{folder} cannot be written to: {error.strerror or error}."
+            ) from None
         yield
 
 
@@ -306,4 +311,6 @@ def find_file(word: str, samples: Mapping[str, Path], kind: str) -> Path:
         raise SceneError(f"{shown}: there is no such file.")
     close = find_nearest_name(word, list(samples))
     asked = f" Did you mean {close}?" if close else ""
-    raise SceneError(f"{shown or repr(word)} is neither a file nor a {kind} ({', '.join(samples)}).{asked}")
+    raise SceneError(
+        f"{shown or repr(word)} is neither a file nor a {kind} ({', '.join(samples)}).{asked}"
+    )

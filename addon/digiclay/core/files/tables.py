@@ -12,17 +12,19 @@ import numpy as np
 from ..base.errors import ParameterError
 from ..base.quantity import Parameters, find_nearest_name, list_quantities, parse
 
-#: Named values, as TOML and JSON have them: those that are read only, and those that may be changed.
+#: Named values, as TOML and JSON have them: those that are read only, and those that may be
+#: changed.
 Table = Mapping[str, Any]
 Record = dict[str, Any]
 
 #: Most bytes of a text: the packed heights of the largest bed, 20 million cells, take 107 MB.
 LARGEST = 128_000_000
-#: Most names of a dotted key, each stored with all before it, and most letters of a word or a number.
+#: Most names of a dotted key, each stored with all before it, and most letters of a word or a
+#: number.
 PARTS, LETTERS = 16, 1000
 _NAME = r'(?:[A-Za-z0-9_-]++|"(?:[^"\\\n]|\\.)*+"|\'[^\'\n]*+\')'
-#: Parts of a text: a key of too many names, a word, texts, a comment. Without backtracking: an unterminated
-#: text extends as far as possible.
+#: Parts of a text: a key of too many names, a word, texts, a comment. Without backtracking: an
+#: unterminated text extends as far as possible.
 _PIECES = re.compile(
     rf"(?P<key>{_NAME}(?:[ \t]*+\.[ \t]*+{_NAME}){{{PARTS}}})|(?P<word>[A-Za-z0-9_-]++)"
     r'|"""(?:[^"\\]|\\.|"(?!""))*+(?:""")?|\'\'\'(?:[^\']|\'(?!\'\'))*+(?:\'\'\')?'
@@ -34,7 +36,9 @@ _PIECES = re.compile(
 def parse_tables(text: str) -> Record:
     """Return the tables of a TOML text; ValueError with ``(at line ...)`` if known, or RecursionError."""
     if len(text) > LARGEST:
-        raise ValueError(f"must have at most {LARGEST // 1_000_000} MB (got {len(text) / 1e6:.0f} MB)")
+        raise ValueError(
+            f"must have at most {LARGEST // 1_000_000} MB (got {len(text) / 1e6:.0f} MB)"
+        )
     for piece in _PIECES.finditer(text):
         if piece["key"]:
             rule = f"a key must have at most {PARTS} names, got {piece['key'][:20]}..."
@@ -84,7 +88,9 @@ def read_part(section: str, kind: type[Part], defaults: Table, table: Table) -> 
     quantities = list_quantities(kind)
     names = (*quantities, "method") if section == "control" else tuple(quantities)
     refuse_unknown(section, table, names)
-    given = {key: _measured(section, key, value, quantities[key].unit) for key, value in table.items()}
+    given = {
+        key: _measured(section, key, value, quantities[key].unit) for key, value in table.items()
+    }
     try:
         return kind(**{**defaults, **given})
     except ParameterError as error:

@@ -38,10 +38,18 @@ class Model(Parameters):
         at_most=64,
     )
     base_thickness: float = quantity(
-        BASE_THICKNESS, "material under the lowest point of solid and pins", unit="m", above=0.0, at_most=1.0
+        BASE_THICKNESS,
+        "material under the lowest point of solid and pins",
+        unit="m",
+        above=0.0,
+        at_most=1.0,
     )
     cap: float = quantity(
-        1e-3, "radius of a pin's flat end, on which the membrane lies", unit="m", above=0.0, at_most=1.0
+        1e-3,
+        "radius of a pin's flat end, on which the membrane lies",
+        unit="m",
+        above=0.0,
+        at_most=1.0,
     )
 
     @property
@@ -116,14 +124,16 @@ def _pins(formed: Formed, model: Model, names: tuple[str, ...], label: Faces) ->
     """Return the stepped bed; walls and undersides belong to the feature of their pin."""
     vertices, faces, pin = make_pins_solid(formed, model.base_thickness)
     owner = np.full(len(vertices), NO_PIN)
-    # Every vertex above the base is a corner or the middle of a pin's top, whose triangles begin with the
-    # middle.
+    # Every vertex above the base is a corner or the middle of a pin's top, whose triangles begin
+    # with the middle.
     tops = faces[:, 0] < len(formed.height)
     owner[faces[tops]] = pin[tops, None]
     group, vertex_group = np.empty((2, 0), np.int32)
     if names:
         group, vertex_group = label[pin], np.where(owner >= 0, label[owner], 0).astype(np.int32)
-    return Body("pins", vertices, faces, _of_pins(formed, vertices, owner), names, group, vertex_group)
+    return Body(
+        "pins", vertices, faces, _of_pins(formed, vertices, owner), names, group, vertex_group
+    )
 
 
 def _of_pins(formed: Formed, vertices: Floats, owner: Indices) -> dict[str, Floats]:

@@ -1,6 +1,7 @@
 """Reader of glTF files, GLB and JSON: the triangles of all nodes of the scene, in meters, y up.
 
-Materials and pictures are not opened; a file of vertices must lie in the glTF's folder, or below it.
+Materials and pictures are not opened; a file of vertices must lie in the glTF's folder, or below
+it.
 """
 
 import base64
@@ -35,7 +36,9 @@ NUMBERS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126
 ITEMS = {"SCALAR": 1, "VEC3": 3}
 TRIANGLES, STRIP, FAN = 4, 5, 6
 #: Extensions that change no vertex, or that are read.
-HARMLESS = re.compile(r"KHR_(materials|texture|lights|xmp|animation|mesh_quantization)\w*|EXT_texture\w*")
+HARMLESS = re.compile(
+    r"KHR_(materials|texture|lights|xmp|animation|mesh_quantization)\w*|EXT_texture\w*"
+)
 #: Extensions that add copies or hide nodes, which a reader may ignore unless they are required.
 OPTIONAL = ("EXT_mesh_gpu_instancing", "KHR_node_visibility")
 
@@ -46,10 +49,14 @@ def read(path: Path, data: bytes) -> tuple[Floats, Indices]:
         tree, binary = _chunks(data, path.name) if data[:4] == b"glTF" else (json.loads(data), None)
         if not str(tree["asset"]["version"]).startswith("2."):
             raise ValueError(f"its version is {tree['asset']['version']}")
-        needed = [name for name in tree.get("extensionsRequired", []) if not HARMLESS.fullmatch(name)]
+        needed = [
+            name for name in tree.get("extensionsRequired", []) if not HARMLESS.fullmatch(name)
+        ]
         needed += [name for name in OPTIONAL if name in tree.get("extensionsUsed", [])]
         if needed:
-            raise make_refusal("must not need an extension that changes its vertices", path.name, needed[0])
+            raise make_refusal(
+                "must not need an extension that changes its vertices", path.name, needed[0]
+            )
         file = _File(path, tree, binary)
         parts = list(file.surfaces())
         refuse_many_triangles(path.name, sum(file.triangles(part) for part, _ in parts))
@@ -63,7 +70,14 @@ def read(path: Path, data: bytes) -> tuple[Floats, Indices]:
         content = "nested too deeply"
     except KeyError as error:
         content = f"{error} is missing"
-    except (ValueError, TypeError, IndexError, AttributeError, OverflowError, struct.error) as error:
+    except (
+        ValueError,
+        TypeError,
+        IndexError,
+        AttributeError,
+        OverflowError,
+        struct.error,
+    ) as error:
         content = str(error)
     raise make_refusal("must be a glTF 2.0 file that can be read", path.name, content)
 
@@ -79,7 +93,9 @@ def _chunks(data: bytes, name: str) -> tuple[Any, bytes | None]:
     while at + 8 <= length:
         size, kind = struct.unpack_from("<I4s", data, at)
         if at + 8 + size > length:
-            raise make_refusal("must be whole", name, f"a part of {size:,} bytes that are not there")
+            raise make_refusal(
+                "must be whole", name, f"a part of {size:,} bytes that are not there"
+            )
         chunks.append((kind, data[at + 8 : at + 8 + size]))
         at += 8 + size
     if not chunks or chunks[0][0] != b"JSON":
@@ -133,7 +149,9 @@ class _File:
     def triangles(self, primitive: Any) -> int:
         """Return how many triangles a part of a mesh has."""
         corners = self.size(primitive.get("indices", primitive["attributes"]["POSITION"]))
-        return corners // 3 if primitive.get("mode", TRIANGLES) == TRIANGLES else max(0, corners - 2)
+        return (
+            corners // 3 if primitive.get("mode", TRIANGLES) == TRIANGLES else max(0, corners - 2)
+        )
 
     def mesh(self, primitive: Any) -> tuple[Floats, Indices]:
         """Return vertices and triangles of a part of a mesh."""
@@ -147,7 +165,8 @@ class _File:
                 raise ValueError(f"{corners.size} corners are no triangles")
             return vertices, corners.reshape(-1, 3)
         number = np.arange(self.triangles(primitive))
-        # Every other triangle of a strip has the opposite orientation; those of a fan share the first corner.
+        # Every other triangle of a strip has the opposite orientation; those of a fan share the
+        # first corner.
         first, odd = (0 * number, 0) if mode == FAN else (number, number % 2)
         return vertices, corners[np.column_stack([first, number + 1 + odd, number + 2 - odd])]
 

@@ -7,7 +7,8 @@ import numpy as np
 from ..base.arrays import Floats, Indices
 from ..base.errors import ParameterError
 
-#: Most triangles of a mesh: as many as a bed may have cells. Fitting them to a bed takes about 5 GB.
+#: Most triangles of a mesh: as many as a bed may have cells. Fitting them to a bed takes about 5
+#: GB.
 MOST_TRIANGLES = 20_000_000
 #: Most bytes of a mesh's file, unpacked if it is compressed.
 MOST_BYTES = 2_000_000_000
@@ -49,7 +50,9 @@ def nest_placement(inner: Floats, outer: Floats) -> Floats:
     return placement
 
 
-def join_meshes(meshes: Iterable[tuple[Floats, Indices, Floats]], name: str) -> tuple[Floats, Indices]:
+def join_meshes(
+    meshes: Iterable[tuple[Floats, Indices, Floats]], name: str
+) -> tuple[Floats, Indices]:
     """Return vertices (v, 3) and triangles (f, 3) of meshes (vertices, triangles, placement) as one mesh."""
     points, triangles, first = [np.empty((0, 3))], [np.empty((0, 3), np.int64)], 0
     for vertices, faces, placement in meshes:

@@ -20,7 +20,11 @@ from .obj_reader import UP, find_forward, make_axes
 
 #: One triangle of a binary file.
 TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("spare", "<u2")])
-TEXT = "facet normal %.6e %.6e %.6e\nouter loop\n" + 3 * "vertex %.9g %.9g %.9g\n" + "endloop\nendfacet\n"
+TEXT = (
+    "facet normal %.6e %.6e %.6e\nouter loop\n"
+    + 3 * "vertex %.9g %.9g %.9g\n"
+    + "endloop\nendfacet\n"
+)
 
 
 def write_binary(file: BinaryIO, bodies: Sequence[Body], factor: float) -> None:
@@ -44,7 +48,9 @@ def write_ascii(file: BinaryIO, bodies: Sequence[Body], factor: float) -> None:
         file.write(f"endsolid {body.name}\n".encode())
 
 
-def _triangles(body: Body, factor: float) -> Iterator[tuple[NDArray[np.float32], NDArray[np.float32]]]:
+def _triangles(
+    body: Body, factor: float
+) -> Iterator[tuple[NDArray[np.float32], NDArray[np.float32]]]:
     """Yield corners (k, 3, 3), as they are written, and unit normals (k, 3), piece by piece."""
     for faces in split_pieces(body.faces):
         corners = (body.vertices[faces] * factor).astype(np.float32)
@@ -67,9 +73,15 @@ def write_ply(file: BinaryIO, bodies: Sequence[Body], factor: float) -> None:
         "format binary_little_endian 1.0",
         f"comment digiclay, lengths and height in {'mm' if factor > 1.0 else 'm'}, z up",
         f"comment force in N, pressing down is positive; mode {NO_PIN}: no pin",
-        *(f"comment {body.name}: {len(body.vertices)} vertices, {len(body.faces)} faces" for body in bodies),
+        *(
+            f"comment {body.name}: {len(body.vertices)} vertices, {len(body.faces)} faces"
+            for body in bodies
+        ),
         f"element vertex {sum(len(body.vertices) for body in bodies)}",
-        *(f"property {'int' if kind == '<i4' else 'float'} {name}" for name, kind in NUMBERS.items()),
+        *(
+            f"property {'int' if kind == '<i4' else 'float'} {name}"
+            for name, kind in NUMBERS.items()
+        ),
         f"element face {sum(len(body.faces) for body in bodies)}",
         "property list uchar int vertex_indices",
         "end_header\n",
@@ -92,11 +104,15 @@ def write_ply(file: BinaryIO, bodies: Sequence[Body], factor: float) -> None:
         first += len(body.vertices)
 
 
-def write_obj(file: BinaryIO, bodies: Sequence[Body], factor: float, up: str = UP, forward: str = "") -> None:
+def write_obj(
+    file: BinaryIO, bodies: Sequence[Body], factor: float, up: str = UP, forward: str = ""
+) -> None:
     """Write the bodies, lengths in 1 / `factor` m to the nearest nanometer; faces of no group come first."""
     axes, unit = make_axes(up, forward), "mm" if factor > 1.0 else "m"
     line = "v {0} {0} {0}\n".format("%.6f" if factor > 1.0 else "%.9f")
-    file.write(f"# digiclay, lengths in {unit}, {up} up, {forward or find_forward(up)} forward\n".encode())
+    file.write(
+        f"# digiclay, lengths in {unit}, {up} up, {forward or find_forward(up)} forward\n".encode()
+    )
     first = 1
     for body in bodies:
         file.write(f"o {body.name}\n".encode())
@@ -150,14 +166,20 @@ def _describe(bodies: Sequence[Body]) -> Record:
     start = 0
     for number, body in enumerate(bodies):
         for count, target in ((len(body.vertices), VERTICES), (len(body.faces), INDICES)):
-            views.append({"buffer": 0, "byteOffset": start, "byteLength": 12 * count, "target": target})
+            views.append(
+                {"buffer": 0, "byteOffset": start, "byteLength": 12 * count, "target": target}
+            )
             start += 12 * count
         # The bounds must be those of the stored numbers.
         low, high = body.vertices.min(axis=0), body.vertices.max(axis=0)
         low, high = _upright(np.array([[low[0], high[1], low[2]], [high[0], low[1], high[2]]]))
         bounds = {"min": low.astype("<f4").tolist(), "max": high.astype("<f4").tolist()}
         vertices = {"bufferView": 2 * number, "componentType": FLOAT, "count": len(body.vertices)}
-        indices = {"bufferView": 2 * number + 1, "componentType": UNSIGNED, "count": 3 * len(body.faces)}
+        indices = {
+            "bufferView": 2 * number + 1,
+            "componentType": UNSIGNED,
+            "count": 3 * len(body.faces),
+        }
         accessors += [{**vertices, "type": "VEC3", **bounds}, {**indices, "type": "SCALAR"}]
         part = {"attributes": {"POSITION": 2 * number}, "indices": 2 * number + 1, "material": 0}
         meshes.append({"name": body.name, "primitives": [part]})
@@ -207,17 +229,23 @@ def write_3mf(file: BinaryIO, bodies: Sequence[Body], factor: float) -> None:
         model = zipfile.ZipInfo("3D/3dmodel.model", MOMENT)
         model.compress_type = zipfile.ZIP_DEFLATED
         with archive.open(model, "w", force_zip64=True) as part:
-            part.write(f'{HEAD}<model unit="{unit}" xml:lang="en-US" xmlns="{CORE}">\n<resources>\n'.encode())
+            part.write(
+                f'{HEAD}<model unit="{unit}" xml:lang="en-US" xmlns="{CORE}">\n<resources>\n'.encode()
+            )
             for number, body in enumerate(bodies, 1):
                 # Only a closed body may be a "model".
                 kind = "model" if body.closed else "surface"
-                part.write(f'<object id="{number}" type="{kind}" name="{body.name}"><mesh>\n'.encode())
+                part.write(
+                    f'<object id="{number}" type="{kind}" name="{body.name}"><mesh>\n'.encode()
+                )
                 part.write(b"<vertices>\n")
                 _write_rows(part, vertex, (piece * factor for piece in split_pieces(body.vertices)))
                 part.write(b"</vertices>\n<triangles>\n")
                 _write_rows(part, '<triangle v1="%d" v2="%d" v3="%d"/>\n', split_pieces(body.faces))
                 part.write(b"</triangles>\n</mesh></object>\n")
-            items = "".join(f'<item objectid="{number}"/>\n' for number in range(1, len(bodies) + 1))
+            items = "".join(
+                f'<item objectid="{number}"/>\n' for number in range(1, len(bodies) + 1)
+            )
             part.write(f"</resources>\n<build>\n{items}</build>\n</model>\n".encode())
 
 
@@ -234,7 +262,8 @@ FORMATS: dict[str, Format] = {
     "stl": Format("STL, binary", write_binary),
     "stl_ascii": Format("STL as text", write_ascii),
     "obj": Format(
-        "Wavefront OBJ, with a group for each feature; y up as in Blender's, other axes by option", write_obj
+        "Wavefront OBJ, with a group for each feature; y up as in Blender's, other axes by option",
+        write_obj,
     ),
     "ply": Format("Stanford PLY, binary, with height, force and mode of each vertex", write_ply),
     "glb": Format("binary glTF, in meters and y up as its standard says", write_glb),
@@ -270,7 +299,9 @@ def write(
     target = Path(path)
     format_name = find_format(target.suffix if kind is None else kind)
     writer = (
-        partial(write_obj, up=up, forward=forward) if format_name == "obj" else FORMATS[format_name].write
+        partial(write_obj, up=up, forward=forward)
+        if format_name == "obj"
+        else FORMATS[format_name].write
     )
     make_axes(up, forward)  # refuses axes before the file is opened
     if unit not in UNITS:

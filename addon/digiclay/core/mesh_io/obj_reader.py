@@ -108,6 +108,8 @@ def _refuse_cut_line(data: bytes, name: str) -> None:
     """Refuse a file that ends within its last line, which has no end."""
     last = data[max(data.rfind(b"\n"), data.rfind(b"\r")) + 1 :].partition(b"#")[0].split()
     # All corners of a face have the same form, with or without texture and normal.
-    forms = {tuple(map(bool, word.split(b"/"))) for word in last[1:]} if last[:1] == [b"f"] else set()
+    forms = (
+        {tuple(map(bool, word.split(b"/"))) for word in last[1:]} if last[:1] == [b"f"] else set()
+    )
     if last == [b"v"] or (last[:1] == [b"f"] and (len(last) < 4 or len(forms) > 1)):
         raise make_refusal(CUT, name, repr(b" ".join(last).decode(errors="replace")))

@@ -116,7 +116,9 @@ class _Element:
     @property
     def least(self) -> int:
         """Least number of bytes of a row, whose lists are empty."""
-        return struct.calcsize(self.order + "".join(part.length or part.code for part in self.properties))
+        return struct.calcsize(
+            self.order + "".join(part.length or part.code for part in self.properties)
+        )
 
     def make_row(self, sizes: tuple[int, ...]) -> np.dtype[Any]:
         """Return the type of a row whose lists have these lengths; a number has any."""
@@ -145,8 +147,12 @@ class _Element:
         row = self.make_row(sizes)
         end = start + self.count * row.itemsize
         groups = [np.frombuffer(body, row, self.count, start)] if end <= len(body) else []
-        lists = [(part, size) for part, size in zip(self.properties, sizes, strict=True) if part.length]
-        if not groups or not all(np.all(groups[0][_name_length(part)] == size) for part, size in lists):
+        lists = [
+            (part, size) for part, size in zip(self.properties, sizes, strict=True) if part.length
+        ]
+        if not groups or not all(
+            np.all(groups[0][_name_length(part)] == size) for part, size in lists
+        ):
             groups, end = self._read_unlike(body, start)
         return {part.name: [group[part.name] for group in groups] for part in self.properties}, end
 
@@ -211,7 +217,9 @@ def _read_head(head: str) -> tuple[bool, list[_Element]]:
             elif keyword == "property":
                 kinds = words[1 if words[0] == "list" else 0 : -1]
                 codes = ["d" if text else NUMBERS[word] for word in kinds]
-                elements[-1][2].append(_Property(words[-1], codes[-1], codes[-2] if len(codes) > 1 else ""))
+                elements[-1][2].append(
+                    _Property(words[-1], codes[-1], codes[-2] if len(codes) > 1 else "")
+                )
         except (ValueError, IndexError, KeyError):
             raise ValueError(f"{line[:60]!r} in its head") from None
     return text, [_Element(*element, order) for element in elements]
@@ -229,7 +237,9 @@ def _cut(polygons: list[Array], name: str) -> Indices:
 
 def _read_off(data: bytes, name: str) -> tuple[Floats, Indices]:
     """Read an OFF, also with colors and normals behind the places and faces."""
-    lines = [line for line in (part.partition(b"#")[0].split() for part in data.splitlines()) if line]
+    lines = [
+        line for line in (part.partition(b"#")[0].split() for part in data.splitlines()) if line
+    ]
     head = lines.pop(0)
     if re.fullmatch(rb"(?i:(ST)?C?N?OFF)", head[0]):
         head = head[1:] or lines.pop(0)

@@ -1,7 +1,7 @@
 """Reader of 3MF files: a zip of XML parts, with objects, their components, and the items of a build.
 
-The standard library reads the XML as a stream: trimesh would need lxml and networkx. A document type, which
-can define entities, is refused, as 3MF forbids it.
+The standard library reads the XML as a stream: trimesh would need lxml and networkx. A document
+type, which can define entities, is refused, as 3MF forbids it.
 """
 
 from __future__ import annotations
@@ -242,12 +242,16 @@ def _meshes(model: _Model, extents: dict[Key, _Extent]) -> Iterator[tuple[Floats
                 yield np.array(shape.vertices).reshape(-1, 3), corners, placement
 
 
-def _measure(model: _Model, key: Key, name: str, extents: dict[Key, _Extent], depth: int) -> _Extent:
+def _measure(
+    model: _Model, key: Key, name: str, extents: dict[Key, _Extent], depth: int
+) -> _Extent:
     """Return the extent of an object with its components; that of a support is empty."""
     if key not in extents:
         shape = model.objects.get(key)
         if shape is None:
-            raise make_refusal("must hold the objects it refers to", name, f"no object {key[1]} in {key[0]}")
+            raise make_refusal(
+                "must hold the objects it refers to", name, f"no object {key[1]} in {key[0]}"
+            )
         components = shape.components if depth <= DEEPEST else []
         inside = [_measure(model, inner, name, extents, depth + 1) for inner, _ in components]
         below = 1 + max((extent.depth for extent in inside), default=-1)

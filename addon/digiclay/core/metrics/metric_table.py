@@ -33,7 +33,9 @@ class Metric(NamedTuple):
 
 #: Metrics of a history, from `summary.compute_metrics`, in its order.
 METRICS: dict[str, Metric] = {
-    "duration": Metric("s", "neither", "simulated time from the first row to the last", "duration", "s"),
+    "duration": Metric(
+        "s", "neither", "simulated time from the first row to the last", "duration", "s"
+    ),
     "set_point": Metric(
         "N",
         "neither",
@@ -42,7 +44,11 @@ METRICS: dict[str, Metric] = {
         "N",
     ),
     "rfd": Metric(
-        "N", "higher", "rms over time of (total force - set point) while the fingertip touches", "RFD", "mN"
+        "N",
+        "higher",
+        "rms over time of (total force - set point) while the fingertip touches",
+        "RFD",
+        "mN",
     ),
     "rfd_shaping": Metric(
         "N",
@@ -51,8 +57,12 @@ METRICS: dict[str, Metric] = {
         "RFD while shaping",
         "mN",
     ),
-    "rfd_session": Metric("N", "higher", "the same over the whole session; without contact the force is 0"),
-    "contact_share": Metric("1", "lower", "share of the session's time in which the fingertip touches"),
+    "rfd_session": Metric(
+        "N", "higher", "the same over the whole session; without contact the force is 0"
+    ),
+    "contact_share": Metric(
+        "1", "lower", "share of the session's time in which the fingertip touches"
+    ),
     "contact_loss_share": Metric(
         "1",
         "higher",
@@ -76,13 +86,17 @@ METRICS: dict[str, Metric] = {
         "mN",
     ),
     "force_oscillation": Metric(
-        "N", "higher", "rms over time of the total force minus its moving average over 0.25 s, while shaping"
+        "N",
+        "higher",
+        "rms over time of the total force minus its moving average over 0.25 s, while shaping",
     ),
     "force_overshoot": Metric(
         "1", "higher", "first touch: largest force beyond the set point, as a share of it"
     ),
     "settling_time": Metric(
-        "s", "absent", "first touch: from touching down until the force stays within 10 % of its set point"
+        "s",
+        "absent",
+        "first touch: from touching down until the force stays within 10 % of its set point",
     ),
     "height_deviation": Metric(
         "m",
@@ -91,15 +105,23 @@ METRICS: dict[str, Metric] = {
         "height deviation",
         "mm",
     ),
-    "ridge_offset": Metric("m", "higher", "mean height of what the fingertip left behind over its path"),
+    "ridge_offset": Metric(
+        "m", "higher", "mean height of what the fingertip left behind over its path"
+    ),
     "ridge_error": Metric("m", "higher", "rms of the same", "ridge-height error", "mm"),
     "ridge_unevenness": Metric("m", "higher", "standard deviation of the same", "unevenness", "mm"),
     "max_cell_force": Metric("N", "higher", "largest force on one cell"),
-    "max_total_force": Metric("N", "higher", "largest force on all cells together", "largest force", "N"),
+    "max_total_force": Metric(
+        "N", "higher", "largest force on all cells together", "largest force", "N"
+    ),
     "lowest": Metric("m", "neither", "height of the lowest pin at the end"),
     "highest": Metric("m", "neither", "height of the highest pin at the end"),
     "height_range": Metric(
-        "m", "neither", "highest minus lowest pin: the relief that was formed", "relief formed", "mm"
+        "m",
+        "neither",
+        "highest minus lowest pin: the relief that was formed",
+        "relief formed",
+        "mm",
     ),
     "raised_volume": Metric("m3", "neither", "volume formed above the initial surface"),
     "sunk_volume": Metric("m3", "neither", "volume formed below the initial surface"),
@@ -128,14 +150,18 @@ METRICS: dict[str, Metric] = {
 #: Metrics of a run beside those of its history.
 RUN: dict[str, Metric] = {
     "losses": Metric(
-        "1", "higher", "how often the controller lost the fingertip, at every lift-off too", "losses"
+        "1",
+        "higher",
+        "how often the controller lost the fingertip, at every lift-off too",
+        "losses",
     ),
     "run_time": Metric("s", "higher", "time the simulation took", "run time", "s"),
     "real_time_factor": Metric("1", "lower", "simulated time over run time"),
     "simulated": Metric("s", "neither", "simulated time", "simulated", "s"),
     "max_indentation": Metric("m", "higher", "largest indentation of the fingertip by a pin"),
 }
-#: Errors of a run, for which it is integrated once more. Each covers the truth in 95 of 100 runs: no bound.
+#: Errors of a run, for which it is integrated once more. Each covers the truth in 95 of 100 runs:
+#: no bound.
 ERRORS: dict[str, Metric] = {
     "height_error": Metric(
         "m", "higher", "largest error of a pin's height, estimated", "height error, about", "µm"
@@ -144,26 +170,45 @@ ERRORS: dict[str, Metric] = {
         "N", "higher", "largest error of the force on a cell, estimated", "force error, about", "mN"
     ),
     "total_force_error": Metric(
-        "N", "higher", "largest error of the total force, estimated", "total force error, about", "mN"
+        "N",
+        "higher",
+        "largest error of the total force, estimated",
+        "total force error, about",
+        "mN",
     ),
 }
 #: Largest speeds at which a fingertip is followed.
 SPEEDS: dict[str, Metric] = {
-    "largest_drag_speed": Metric("m/s", "lower", "fastest straight level drag of a ridge that is followed"),
+    "largest_drag_speed": Metric(
+        "m/s", "lower", "fastest straight level drag of a ridge that is followed"
+    ),
     "largest_lift_speed": Metric("m/s", "lower", "fastest lift straight up that is followed"),
 }
 #: Metrics of a method beside those of a history.
 METHOD: dict[str, Metric] = {
     "relief_rms": Metric(
-        "m", "higher", "rms deviation of the formed relief from the nominal one", "relief error", "mm"
+        "m",
+        "higher",
+        "rms deviation of the formed relief from the nominal one",
+        "relief error",
+        "mm",
     ),
-    "relief_largest": Metric("m", "higher", "largest deviation of the formed relief from the nominal one"),
+    "relief_largest": Metric(
+        "m", "higher", "largest deviation of the formed relief from the nominal one"
+    ),
     "losses": Metric(
-        "1", "higher", "how often contact ended though the fingertip rose no faster than a pin can", "losses"
+        "1",
+        "higher",
+        "how often contact ended though the fingertip rose no faster than a pin can",
+        "losses",
     ),
     "speed_limit": Metric("m/s", "lower", "largest speed that is followed", "speed limit", "mm/s"),
     "period_cost": Metric(
-        "s", "higher", "processor time per control period, including the device", "cost per period", "µs"
+        "s",
+        "higher",
+        "processor time per control period, including the device",
+        "cost per period",
+        "µs",
     ),
     "cost_ratio": Metric("1", "higher", "the same over that of the first method", "cost, ratio"),
 }
@@ -182,7 +227,9 @@ def describe_losses(metrics: Mapping[str, Any]) -> str:
 
 def describe_time(metrics: Mapping[str, Any]) -> str:
     """Return how long a run took, ``26.5 s simulated in 0.65 s (41 x real time)``."""
-    simulated, spent, factor = (metrics[name] for name in ("simulated", "run_time", "real_time_factor"))
+    simulated, spent, factor = (
+        metrics[name] for name in ("simulated", "run_time", "real_time_factor")
+    )
     return f"{simulated:.1f} s simulated in {spent:.2g} s ({factor:.3g} x real time)"
 
 
@@ -190,6 +237,8 @@ def describe_errors(metrics: Mapping[str, Any]) -> str:
     """Return the estimated errors of a run, or why there are none; ``errors_in_doubt`` too."""
     if metrics.get("height_error") is None:
         return f"errors not estimated ({metrics.get('errors_absent') or 'not asked for'})"
-    height, force = (ERRORS[name].factor * metrics[name] for name in ("height_error", "force_error"))
+    height, force = (
+        ERRORS[name].factor * metrics[name] for name in ("height_error", "force_error")
+    )
     doubt = f" (or more: {metrics['errors_in_doubt']})" if metrics.get("errors_in_doubt") else ""
     return f"height error about {height:.2g} µm, force error about {force:.2g} mN{doubt}"

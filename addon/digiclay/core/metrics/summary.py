@@ -24,8 +24,8 @@ from .metric_table import METRICS
 AWAY = 12e-3
 #: Radius of the ball a fingertip is taken for, m, where it is asked which of several presses a pin.
 BALL = 10e-3
-#: Distances from a finger to cells looked at at a time: those of a long session on a large bed would not fit
-#: in memory.
+#: Distances from a finger to cells looked at at a time: those of a long session on a large bed
+#: would not fit in memory.
 AT_ONCE = 2**17
 
 
@@ -65,7 +65,8 @@ class CellSums(NamedTuple):
 def sum_cells(history: Mapping[str, ArrayLike]) -> CellSums:
     """Return the sums over the cells of a history, the arrays of ``history.npz``, of at least one row."""
     total, height, force, position = (
-        np.asarray(history[name], dtype=np.float64) for name in ("total_force", "height", "force", "position")
+        np.asarray(history[name], dtype=np.float64)
+        for name in ("total_force", "height", "force", "position")
     )
     x, y = (np.broadcast_to(along[:, None], force.T.shape) for along in position.T)
     _, x, y, lifted, strongest = sum_row(force.T, x, y, height.T)
@@ -86,7 +87,8 @@ def sum_row(force: Floats, x: Floats, y: Floats, height: Floats) -> Floats:
 def measure_lag(sums: CellSums, fingertip: ArrayLike) -> Floats:
     """Return how far the blister is behind the fingertip, (t, 7), in the rows in contact, m.
 
-    ``lag = |p - sum F_j r_j / sum F_j|`` in the horizontal plane, p the lowest point, r_j the positions.
+    ``lag = |p - sum F_j r_j / sum F_j|`` in the horizontal plane, p the lowest point, r_j the
+    positions.
     """
     rows = sums.touching
     centroid = np.column_stack([sums.x, sums.y])[rows] / sums.total[rows, None]
@@ -106,8 +108,8 @@ def measure_ridge_errors(
 
     ``e_j = H_j(end) - z(t_j)``, t_j the last row of `rows` in which no cell is nearer to the
     fingertip than cell j. A cell counts when the fingertip went on, in rows of the same unbroken
-    stretch, to a place at least `away` from it: where it pressed or left is no ridge. Returned are the
-    cells that count, in the order in which the fingertip passed them.
+    stretch, to a place at least `away` from it: where it pressed or left is no ridge. Returned are
+    the cells that count, in the order in which the fingertip passed them.
     """
     place, tip = np.asarray(position, dtype=np.float64), np.asarray(fingertip, dtype=np.float64)
     chosen = np.flatnonzero(rows)
@@ -128,9 +130,9 @@ def measure_ridge_errors(
     return np.array(errors)
 
 
-#: Window of the moving average that is taken off for an oscillation, s. What is left of a sine of f Hz is
-#: 1 - sinc(f WINDOW): less than a tenth below 1 Hz, where fingers move on purpose, and all of it at 4 Hz; a
-#: controller on its limit of stability oscillates at 4 to 10 Hz (digiclay paper).
+#: Window of the moving average that is taken off for an oscillation, s. What is left of a sine of f
+#: Hz is 1 - sinc(f WINDOW): less than a tenth below 1 Hz, where fingers move on purpose, and all of
+#: it at 4 Hz; a controller on its limit of stability oscillates at 4 to 10 Hz (digiclay paper).
 WINDOW = 0.25
 
 
@@ -164,7 +166,8 @@ def compute_deviation(values: Floats, weight: Floats) -> float | None:
 def measure_overshoot(values: ArrayLike, target: float) -> float | None:
     """Return how far a signal goes beyond its target, as a share of its way there.
 
-    ``max_i (y_i - y_target) / (y_target - y_0)``, at least 0; None for a signal at its target from the start.
+    ``max_i (y_i - y_target) / (y_target - y_0)``, at least 0; None for a signal at its target from
+    the start.
     """
     signal = np.asarray(values, dtype=np.float64)
     if not len(signal) or signal[0] == target:
@@ -173,7 +176,9 @@ def measure_overshoot(values: ArrayLike, target: float) -> float | None:
     return max(0.0, float(np.max((signal - target) / way)))
 
 
-def measure_settling_time(time: ArrayLike, values: ArrayLike, target: float, band: float) -> float | None:
+def measure_settling_time(
+    time: ArrayLike, values: ArrayLike, target: float, band: float
+) -> float | None:
     """Return the time after which ``|y_i - y_target| <= band`` to the end, s; None when it never does."""
     moment, signal = np.asarray(time, dtype=np.float64), np.asarray(values, dtype=np.float64)
     outside = np.flatnonzero(~(np.abs(signal - target) <= band))
@@ -200,14 +205,17 @@ def measure_frequency(time: ArrayLike, values: ArrayLike) -> float | None:
 def find_stretches(rows: Flags) -> list[slice]:
     """Return the unbroken stretches of chosen rows, in order. `rows` bool (t,)."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], rows, [False]])))
-    return [slice(int(first), int(after)) for first, after in zip(edges[::2], edges[1::2], strict=True)]
+    return [
+        slice(int(first), int(after)) for first, after in zip(edges[::2], edges[1::2], strict=True)
+    ]
 
 
 def measure_oscillation(time: ArrayLike, values: ArrayLike, rows: Flags) -> float | None:
     """Return the rms over time of a signal less its moving average.
 
-    ``sqrt(sum w_i (y_i - m_i)² / sum w_i)``, m_i the mean of y over the window, s, around row i. A row
-    counts when its whole window is within an unbroken stretch of the chosen rows; None when no row does.
+    ``sqrt(sum w_i (y_i - m_i)² / sum w_i)``, m_i the mean of y over the window, s, around row i. A
+    row counts when its whole window is within an unbroken stretch of the chosen rows; None when no
+    row does.
     """
     moment, signal = np.asarray(time, dtype=np.float64), np.asarray(values, dtype=np.float64)
     off: list[Floats] = []
@@ -216,7 +224,9 @@ def measure_oscillation(time: ArrayLike, values: ArrayLike, rows: Flags) -> floa
         t, y = moment[stretch], signal[stretch]
         area = np.concatenate([[0.0], np.cumsum(0.5 * (y[1:] + y[:-1]) * np.diff(t))])
         # Half a millionth of the window: an edge on the first row is within.
-        inner = (t - 0.5 * WINDOW >= t[0] - 5e-7 * WINDOW) & (t + 0.5 * WINDOW <= t[-1] + 5e-7 * WINDOW)
+        inner = (t - 0.5 * WINDOW >= t[0] - 5e-7 * WINDOW) & (
+            t + 0.5 * WINDOW <= t[-1] + 5e-7 * WINDOW
+        )
         below, above = (np.interp(t[inner] + side * WINDOW, t, area) for side in (-0.5, 0.5))
         off.append(y[inner] - (above - below) / WINDOW)
         weight.append(compute_weights(t)[inner])
@@ -243,12 +253,15 @@ def perceive(
 ) -> dict[str, float | None]:
     """Return the `METRICS` in units of touch; None where there is nothing to compute from.
 
-    `deviation`: of the force from its reference, N; `force`: reference force, N; `unevenness`: of a surface,
-    m. Raises ParameterError when a deviation is negative or not finite, or the force is no reference.
+    `deviation`: of the force from its reference, N; `force`: reference force, N; `unevenness`: of a
+    surface, m. Raises ParameterError when a deviation is negative or not finite, or the force is no
+    reference.
     """
     for name, value, unit in (("deviation", deviation, "N"), ("unevenness", unevenness, "m")):
         if value is not None and not (math.isfinite(value) and value >= 0.0):
-            raise ParameterError("Perception", name, f"must be at least 0 {unit} and finite", f"{value:g}")
+            raise ParameterError(
+                "Perception", name, f"must be at least 0 {unit} and finite", f"{value:g}"
+            )
     least = most = None
     if deviation is not None and force is not None:
         fine, coarse = find_weber_fractions(force)
@@ -270,10 +283,10 @@ def compute_rfd(
 
     ``RFD = sqrt(sum w_i (F_i - F_ref,i)² / sum w_i)`` with the `weights` of the rows.
 
-    `time` (t,), s; `total_force` (t,), N; `set_point` (t,) or (), total force asked for, N; rows in which it
-    is NaN are left out; `rows` bool (t,), rows to judge; those in contact by default. They include touching
-    down, and leave out the gaps when the fingertip is lost: read it next to `compute_contact_loss_share`.
-    Returns none when there is no such row.
+    `time` (t,), s; `total_force` (t,), N; `set_point` (t,) or (), total force asked for, N; rows in
+    which it is NaN are left out; `rows` bool (t,), rows to judge; those in contact by default. They
+    include touching down, and leave out the gaps when the fingertip is lost: read it next to
+    `compute_contact_loss_share`. Returns none when there is no such row.
     """
     force = np.asarray(total_force, dtype=np.float64)
     wanted = np.broadcast_to(np.asarray(set_point, dtype=np.float64), force.shape)
@@ -347,8 +360,9 @@ def measure_touchdown(
 def split_fingers(history: Mapping[str, Any]) -> Iterator[Mapping[str, Any]]:
     """Give the history of each finger; a pin's force counts for the nearest, where two press it.
 
-    That is the nearest ball on a lowest point: what a lower fingertip presses may be beneath the other one.
-    Where two are equally near it counts for both, and for a finger without any the nearest that is pressed.
+    That is the nearest ball on a lowest point: what a lower fingertip presses may be beneath the
+    other one. Where two are equally near it counts for both, and for a finger without any the
+    nearest that is pressed.
     """
     if "finger_force" not in history:
         yield history
@@ -376,7 +390,10 @@ def split_fingers(history: Mapping[str, Any]) -> Iterator[Mapping[str, Any]]:
         # All of a finger together are exact.
         scale = np.divide(total, found, out=np.zeros_like(total), where=found > 0.0)[:, None]
         rows = {name: np.zeros_like(history[name]) for name in ("force", "mode")}  # at rest
-        rows["force"][:, cells], rows["mode"][:, cells] = own * given * scale, own * history["mode"][:, cells]
+        rows["force"][:, cells], rows["mode"][:, cells] = (
+            own * given * scale,
+            own * history["mode"][:, cells],
+        )
         yield {**common, **rows, "total_force": total, "fingertip": tips[:, finger]}
 
 
@@ -416,18 +433,22 @@ def compute_cell_area(position: ArrayLike) -> float | None:
     return (along or across) * (across or along) or None
 
 
-def compute_metrics(history: Mapping[str, ArrayLike], set_point: SetPoint | None) -> dict[str, float | None]:
+def compute_metrics(
+    history: Mapping[str, ArrayLike], set_point: SetPoint | None
+) -> dict[str, float | None]:
     """Return every metric of a session by the keys of `METRICS`, SI; None without a basis, never a NaN.
 
-    `history`: the arrays of ``history.npz``; of several fingers see `take_worst`. Raises ParameterError
-    when the history has no rows.
+    `history`: the arrays of ``history.npz``; of several fingers see `take_worst`. Raises
+    ParameterError when the history has no rows.
     """
     if "finger_force" in history:
         return take_worst([compute_metrics(own, set_point) for own in split_fingers(history)])
     time = np.asarray(history["time"], dtype=np.float64)
     if not len(time):
         raise ParameterError("History", "time", "must have at least one row", "none")
-    fingertip, position = (np.asarray(history[name], dtype=np.float64) for name in ("fingertip", "position"))
+    fingertip, position = (
+        np.asarray(history[name], dtype=np.float64) for name in ("fingertip", "position")
+    )
     return compute_metrics_from_sums(sum_cells(history), time, fingertip, position, set_point)
 
 
@@ -442,7 +463,8 @@ def compute_metrics_from_sums(
 ) -> dict[str, float | None]:
     """Return every metric of a session of t rows, (t,) or (t, 7), and n cells, (n, 2); see `compute_metrics`.
 
-    `near`: the cells nearest to the fingertip at some time: only they can be left behind in a ridge.
+    `near`: the cells nearest to the fingertip at some time: only they can be left behind in a
+    ridge.
     """
     total, weight, felt, rows = sums.total, compute_weights(time), sums.touching, sums.shaping
     # A fingertip straight above its blister is a rounding error away from it, not 1e-17 m.
@@ -480,7 +502,8 @@ def compute_metrics_from_sums(
         "sunk_volume": None if area is None else area * float(np.sum(np.maximum(-formed, 0.0))),
     }
     metrics = {
-        name: value if value is not None and np.isfinite(value) else None for name, value in values.items()
+        name: value if value is not None and np.isfinite(value) else None
+        for name, value in values.items()
     }
     return metrics | perceive(metrics["rfd"], metrics["set_point"], metrics["ridge_unevenness"])
 

@@ -15,10 +15,18 @@ class Supply(Parameters):
     """Reservoirs at constant gauge pressure, selected by the sign of the opening."""
 
     high: float = quantity(
-        0.5e5, "gauge pressure of the reservoir that raises pins", unit="Pa", symbol="P_high", source="P"
+        0.5e5,
+        "gauge pressure of the reservoir that raises pins",
+        unit="Pa",
+        symbol="P_high",
+        source="P",
     )
     low: float = quantity(
-        -0.5e5, "gauge pressure of the reservoir that lowers pins", unit="Pa", symbol="P_low", source="P"
+        -0.5e5,
+        "gauge pressure of the reservoir that lowers pins",
+        unit="Pa",
+        symbol="P_low",
+        source="P",
     )
 
     def check(self) -> None:
@@ -47,7 +55,9 @@ class Actuator(Parameters):
     stroke: float = quantity(
         100e-3, "height of the upper end stop", unit="m", symbol="H_max", source="P", above=0.0
     )
-    rest_height: float = quantity(40e-3, "initial height of all pins", unit="m", symbol="H_0", at_least=0.0)
+    rest_height: float = quantity(
+        40e-3, "initial height of all pins", unit="m", symbol="H_0", at_least=0.0
+    )
 
     def check(self) -> None:
         """Refuse a rest height above the upper end stop."""

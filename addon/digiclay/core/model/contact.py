@@ -61,9 +61,15 @@ class ExponentialLaw:
 class Contact(ExponentialLaw, Parameters):
     """``T(x) = (b/m) (exp(m (x - x0)) - 1)`` for x > x0, else 0; a cell carries the share f_d of it."""
 
-    stiffness: float = quantity(250.0, "stiffness at first touch", unit="N/m", symbol="b", above=0.0)
-    exponent: float = quantity(2000.0, "rate of stiffening of the pulp", unit="1/m", symbol="m", above=0.0)
-    offset: float = quantity(0.0, "indentation at which force begins", unit="m", symbol="x0", at_least=0.0)
+    stiffness: float = quantity(
+        250.0, "stiffness at first touch", unit="N/m", symbol="b", above=0.0
+    )
+    exponent: float = quantity(
+        2000.0, "rate of stiffening of the pulp", unit="1/m", symbol="m", above=0.0
+    )
+    offset: float = quantity(
+        0.0, "indentation at which force begins", unit="m", symbol="x0", at_least=0.0
+    )
     share: float = quantity(
         0.34, "share of a cell in the flat-plate law", symbol="f_d", source="D", above=0.0
     )

@@ -52,7 +52,9 @@ class Commands(NamedTuple):
 
     def take(self, entries: Cells) -> "Commands":
         """Return some of them, by their numbers in a row."""
-        return Commands(self.target.take(entries), self.mode.take(entries), self.command.take(entries))
+        return Commands(
+            self.target.take(entries), self.mode.take(entries), self.command.take(entries)
+        )
 
 
 def count_losses(memory: Memory) -> int | None:

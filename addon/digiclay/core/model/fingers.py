@@ -1,7 +1,7 @@
 """Several fingertips on one bed: their pulps, and their paths over it.
 
-The relaxation of the pulp belongs to a pair of fingertip and cell: a cell has the filters of each finger, one
-after the other. The forces of fingertips over the same cell add.
+The relaxation of the pulp belongs to a pair of fingertip and cell: a cell has the filters of each
+finger, one after the other. The forces of fingertips over the same cell add.
 """
 
 from collections.abc import Sequence
@@ -73,7 +73,10 @@ class HandTouch(Touch):
     def shapes(self) -> list[tuple[Fingertip, list[int]]]:
         """The different fingertips, and which fingers have each."""
         tips = [touch.fingertip for touch in self.each]
-        return [(tip, [i for i, other in enumerate(tips) if other == tip]) for tip in dict.fromkeys(tips)]
+        return [
+            (tip, [i for i, other in enumerate(tips) if other == tip])
+            for tip in dict.fromkeys(tips)
+        ]
 
 
 @dataclass(eq=False)
@@ -92,7 +95,9 @@ class HandPath:
 
     def under(self, number: int, positions: Positions) -> Floats:
         """Return the undersides in a period at the positions of all fingers, (p, k), m."""
-        return self._ahead.find(number, positions, self.join.shape[3] * positions.basis.size, self._compute)
+        return self._ahead.find(
+            number, positions, self.join.shape[3] * positions.basis.size, self._compute
+        )
 
     def _compute(self, several: slice, positions: Positions) -> Floats:
         """Return the undersides in several periods, (t, p, k), m."""
@@ -128,7 +133,9 @@ def trace_hands(touch: HandTouch, poses: Floats) -> list[HandPeriod]:
     forms = np.empty((fingers, periods, 2 * instants, 6))
     join, windows = np.empty((fingers, periods, 2, instants, 1)), np.empty((fingers, periods, 6))
     for tip, alike in touch.shapes:  # fingers of one shape together, as periods in sequence
-        traced = trace_periods(tip, poses[:, :, alike].transpose(2, 0, 1, 3).reshape(-1, instants, 7))
+        traced = trace_periods(
+            tip, poses[:, :, alike].transpose(2, 0, 1, 3).reshape(-1, instants, 7)
+        )
         for rows, of_alike in zip((forms, join, windows), traced, strict=True):
             rows[alike] = of_alike.reshape(len(alike), *rows.shape[1:])
     path = HandPath(forms, join, np.ascontiguousarray(windows.transpose(1, 2, 0)))

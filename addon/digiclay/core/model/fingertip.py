@@ -19,8 +19,8 @@ from ..base.quantity import Parameters, quantity
 from .layout import Discs
 
 Item = TypeVar("Item")
-#: Path of a fingertip in a period: center x, y and half its length, m; base, m, tilt and bend, 1/m, of the
-#: paraboloid below it. Of b runs the rows of an array (6, b), or (6, 1) of one for all.
+#: Path of a fingertip in a period: center x, y and half its length, m; base, m, tilt and bend, 1/m,
+#: of the paraboloid below it. Of b runs the rows of an array (6, b), or (6, 1) of one for all.
 Window = tuple[float, float, float, float, float, float] | Floats
 
 #: Squared reduced radius from which the paraboloid replaces the ellipsoid.
@@ -88,8 +88,8 @@ class Fingertip(Parameters):
     def outline(self, poses: Floats) -> Floats:
         """Return the parameters of the undersides at poses (k, 7), (k, 10).
 
-        Center x, y, z, m; matrix of the squared reduced radius S_xx, S_xy, S_yy, 1/m²; tilt of the mid
-        surface t_x, t_y; half thickness over the center, m; smaller eigenvalue of S, 1/m².
+        Center x, y, z, m; matrix of the squared reduced radius S_xx, S_xy, S_yy, 1/m²; tilt of the
+        mid surface t_x, t_y; half thickness over the center, m; smaller eigenvalue of S, 1/m².
         """
         turns, outlines = poses[:, 3:], np.empty((len(poses), 10))
         if len(turns) and (turns == turns[0]).all():
@@ -132,7 +132,8 @@ def compute_reaches(outline: Floats) -> Floats:
 def compute_reach(window: Window, peak: Floats | float) -> Discs | None:
     """Return the disc, or that of each of b runs, outside which the underside is above `peak`, m.
 
-    A paraboloid is below the underside at any tilt, also with the smallest base and bend of several poses.
+    A paraboloid is below the underside at any tilt, also with the smallest base and bend of several
+    poses.
     """
     x, y, spread, base, tilt, bend = window
     square = tilt * tilt + 2.0 * bend * (peak - base)
@@ -145,12 +146,12 @@ def compute_reach(window: Window, peak: Floats | float) -> Discs | None:
 def compute_forms(outline: Floats) -> tuple[Floats, Floats]:
     """Return the quadratic forms of the position that `compute_underside` needs.
 
-    With r² the squared reduced radius, t the half thickness over the center, and
-    ``R = c (1 - r²) / (1 - JOIN)``, the underside is ``tangent + (sqrt(max(R, c)) - sqrt(c))²``: the
-    tangent, a quadratic form, is the paraboloid from R = c on, and c is in m.
+    With r² the squared reduced radius, t the half thickness over the center, and ``R = c (1 - r²) /
+    (1 - JOIN)``, the underside is ``tangent + (sqrt(max(R, c)) - sqrt(c))²``: the tangent, a
+    quadratic form, is the paraboloid from R = c on, and c is in m.
 
-    For outlines (..., p, 10): `forms` (..., 2 p, 6), coefficients of 1, x, y, x², x y, y², p rows of R, then
-    p rows of the tangent, m; `join` (..., 2, p, 1), c, m, and its root.
+    For outlines (..., p, 10): `forms` (..., 2 p, 6), coefficients of 1, x, y, x², x y, y², p rows
+    of R, then p rows of the tangent, m; `join` (..., 2, p, 1), c, m, and its root.
     """
     x, y, z, xx, xy, yy, tilt_x, tilt_y, half, _ = (outline[..., part] for part in range(10))
     count = outline.shape[-2]
@@ -176,9 +177,12 @@ def compute_forms(outline: Floats) -> tuple[Floats, Floats]:
 def compute_underside(forms: Floats, join: Floats, basis: Floats) -> Floats:
     """Return the undersides (..., p, k), m, at positions with rows 1, x, y, x², x y, y² (6, k)."""
     count = join.shape[-2]
-    # Not one large product, so that the result of a pose does not depend on the others, bit for bit.
+    # Not one large product, so that the result of a pose does not depend on the others, bit for
+    # bit.
     rows = np.matmul(forms, basis)
-    return join_surfaces(rows[..., :count, :], rows[..., count:, :], join[..., 0, :, :], join[..., 1, :, :])
+    return join_surfaces(
+        rows[..., :count, :], rows[..., count:, :], join[..., 0, :, :], join[..., 1, :, :]
+    )
 
 
 def join_surfaces(inner: Floats, tangent: Floats, least: Floats, root: Floats) -> Floats:

@@ -1,7 +1,7 @@
 """Interfaces of the parts between fingertip and pins, as protocols.
 
-A part implements its interface, and so does a null part from `null_parts`, which has no state rows and
-computes nothing. Parts hold only parameters: state is an argument and a result.
+A part implements its interface, and so does a null part from `null_parts`, which has no state rows
+and computes nothing. Parts hold only parameters: state is an argument and a result.
 """
 
 from __future__ import annotations
@@ -14,9 +14,9 @@ from ..base.arrays import Floats
 from .control_interface import Measurement
 from .delay import Queue
 
-#: Moves a block of cells by one control period, in place. It takes the underside of the fingertip over the
-#: first k cells at the period's instants, (p, k), m, and returns the force on them at the end, (k,), N. For
-#: b runs all arrays have another axis, the last.
+#: Moves a block of cells by one control period, in place. It takes the underside of the fingertip
+#: over the first k cells at the period's instants, (p, k), m, and returns the force on them at the
+#: end, (k,), N. For b runs all arrays have another axis, the last.
 Movement = Callable[[Floats], Floats]
 
 
@@ -123,7 +123,8 @@ class Stepper(Protocol):
     def prepare(self, plan: Any, rows: Floats, near: int) -> Movement:
         """Return the movement of cells, of which the fingertip may touch the first `near`.
 
-        Rows (r + q, n[, b]) are those of `physics.Cell`, then the commands of the queue, oldest first.
+        Rows (r + q, n[, b]) are those of `physics.Cell`, then the commands of the queue, oldest
+        first.
         """
 
 

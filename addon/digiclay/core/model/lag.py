@@ -19,7 +19,9 @@ SHUT = 1e-9
 class ValveLag(Parameters):
     """``τ_v dK/dt + K = K_com``: exact while the command is held."""
 
-    time_constant: float = quantity(2e-3, "time constant of the valve", unit="s", symbol="τ_v", above=0.0)
+    time_constant: float = quantity(
+        2e-3, "time constant of the valve", unit="s", symbol="τ_v", above=0.0
+    )
 
     @property
     def rows(self) -> int:
@@ -39,7 +41,9 @@ class ValveLag(Parameters):
         response = np.zeros((len(times), 1 + queue.length))
         for row, time in zip(response, times, strict=True):
             row[0] = math.exp(-time / self.time_constant)
-            row[1] = math.exp(-max(time - queue.cut, 0.0) / self.time_constant) if queue.cut else 1.0
+            row[1] = (
+                math.exp(-max(time - queue.cut, 0.0) / self.time_constant) if queue.cut else 1.0
+            )
             row[1] -= row[0]
             if queue.cut:
                 row[2] = -math.expm1(-max(time - queue.cut, 0.0) / self.time_constant)

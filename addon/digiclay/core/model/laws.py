@@ -1,8 +1,8 @@
 """Laws of a scene's valve and contact: one row per law, one module each.
 
-A section with one law has the parameters of that law. A section with several has the parameters of all, and
-`law`, which selects one: scene files, ``--set``, Blender and the nomenclature use this class. A parameter
-that an earlier law of the section declares is not declared again.
+A section with one law has the parameters of that law. A section with several has the parameters of
+all, and `law`, which selects one: scene files, ``--set``, Blender and the nomenclature use this
+class. A parameter that an earlier law of the section declares is not declared again.
 """
 
 import importlib
@@ -14,9 +14,9 @@ from typing import Any
 from ..base.errors import ParameterError
 from ..base.quantity import Parameters, quantity
 
-#: By section: name of a law, its module within the core, and the class of its parameters there. The first is
-#: the default. A valve law has a method ``flow_law(fluid)``, see `valve.Valve`; a contact law is a
-#: `contact.ExponentialLaw`. Scene files have only the keys of the selected law.
+#: By section: name of a law, its module within the core, and the class of its parameters there. The
+#: first is the default. A valve law has a method ``flow_law(fluid)``, see `valve.Valve`; a contact
+#: law is a `contact.ExponentialLaw`. Scene files have only the keys of the selected law.
 LAWS: dict[str, dict[str, tuple[str, str]]] = {
     "valve": {
         "orifice": ("model.valve", "Valve"),
@@ -90,9 +90,17 @@ def _merge(section: str, names: tuple[str, ...]) -> type[Parameters]:
         return frozenset(field.name for field in fields(self)) - used
 
     def reduce(self: Any) -> Any:
-        return _restore, (section, {field.name: getattr(self, field.name) for field in fields(self)})
+        return _restore, (
+            section,
+            {field.name: getattr(self, field.name) for field in fields(self)},
+        )
 
-    namespace = {"check": check, "list_idle": list_idle, "__reduce__": reduce, "__doc__": first.__doc__}
+    namespace = {
+        "check": check,
+        "list_idle": list_idle,
+        "__reduce__": reduce,
+        "__doc__": first.__doc__,
+    }
     namespace["__module__"] = __name__
     parts = [(name, kind, field) for name, (kind, field) in declared.items()]
     return make_dataclass(first.__name__, parts, bases=(first,), frozen=True, namespace=namespace)

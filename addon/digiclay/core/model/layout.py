@@ -22,8 +22,8 @@ Discs = tuple[Any, Any, Any]
 class Arrangement(NamedTuple):
     """Distance of rows and shift of odd ones along x, in pitches; meaning; share of the contact law.
 
-    A pin has four neighbors if rows are not shifted, and six if they are shifted by half a pitch; features
-    that need neighbors refuse all other beds. `share` is None for the default of the law.
+    A pin has four neighbors if rows are not shifted, and six if they are shifted by half a pitch;
+    features that need neighbors refuse all other beds. `share` is None for the default of the law.
     """
 
     spacing: float
@@ -35,13 +35,18 @@ class Arrangement(NamedTuple):
 #: Arrangements of the cells by name; all else is derived from this table.
 ARRANGEMENTS = {
     "aligned": Arrangement(1.0, 0.0, "A square grid"),
-    "staggered": Arrangement(1.0, 0.5, "Every other row shifted by half a pitch, rows one pitch apart"),
+    "staggered": Arrangement(
+        1.0, 0.5, "Every other row shifted by half a pitch, rows one pitch apart"
+    ),
     "hexagonal": Arrangement(
-        math.sqrt(0.75), 0.5, "Every other row shifted, six neighbors at the same distance", share=0.29
+        math.sqrt(0.75),
+        0.5,
+        "Every other row shifted, six neighbors at the same distance",
+        share=0.29,
     ),
 }
-#: Steps (rows, columns) to the neighbors, counter-clockwise: in a square grid, with diagonal ones; in a
-#: shifted one, of rows behind their neighbors along x, and of rows ahead of them.
+#: Steps (rows, columns) to the neighbors, counter-clockwise: in a square grid, with diagonal ones;
+#: in a shifted one, of rows behind their neighbors along x, and of rows ahead of them.
 SQUARE = ((0, 1), (1, 1), (1, 0), (1, -1), (0, -1), (-1, -1), (-1, 0), (-1, 1))
 BACK = ((0, 1), (1, 0), (1, -1), (0, -1), (-1, -1), (-1, 0))
 FORWARD = ((0, 1), (1, 1), (1, 0), (0, -1), (-1, 0), (-1, 1))
@@ -60,7 +65,12 @@ class Layout(Parameters):
         25, "number of rows, counted along y", symbol="n_y", source="P", at_least=1, at_most=10_000
     )
     columns: int = quantity(
-        25, "number of cells in a row, along x", symbol="n_x", source="P", at_least=1, at_most=10_000
+        25,
+        "number of cells in a row, along x",
+        symbol="n_x",
+        source="P",
+        at_least=1,
+        at_most=10_000,
     )
     # More is a number in millimeters whose unit was forgotten.
     pitch: float = quantity(
@@ -135,9 +145,13 @@ class Grid:
         plan = self.layout
         spacing, (left, bottom) = plan.row_spacing, self.corner
         low_row = max(0, math.ceil((y - radius - bottom) / spacing - RELATIVE_TOLERANCE))
-        high_row = min(plan.rows - 1, math.floor((y + radius - bottom) / spacing + RELATIVE_TOLERANCE))
+        high_row = min(
+            plan.rows - 1, math.floor((y + radius - bottom) / spacing + RELATIVE_TOLERANCE)
+        )
         low = max(0, math.ceil((x - radius - left - plan.shift) / plan.pitch - RELATIVE_TOLERANCE))
-        high = min(plan.columns - 1, math.floor((x + radius - left) / plan.pitch + RELATIVE_TOLERANCE))
+        high = min(
+            plan.columns - 1, math.floor((x + radius - left) / plan.pitch + RELATIVE_TOLERANCE)
+        )
         rows = np.arange(low_row * plan.columns, high_row * plan.columns + 1, plan.columns)
         return (rows[:, None] + np.arange(low, high + 1)).ravel()
 
@@ -191,7 +205,9 @@ class Grid:
         """Return the cells nearest to positions, m, (k,)."""
         plan, (left, bottom) = self.layout, self.corner
         row = np.clip(np.rint((y - bottom) / plan.row_spacing), 0, plan.rows - 1)
-        column = np.clip(np.rint((x - left - (row % 2) * plan.shift) / plan.pitch), 0, plan.columns - 1)
+        column = np.clip(
+            np.rint((x - left - (row % 2) * plan.shift) / plan.pitch), 0, plan.columns - 1
+        )
         return (row * plan.columns + column).astype(np.intp)
 
     def compute_basis(self, cells: Cells) -> Floats:
@@ -233,7 +249,9 @@ def read_places(position: ArrayLike) -> Floats:
             "Surface", "position", "must have two coordinates per pin", f"shape {points.shape}"
         )
     if not np.all(np.isfinite(points)):
-        raise ParameterError("Surface", "position", "must be finite", name_first_bad(points.sum(axis=1)))
+        raise ParameterError(
+            "Surface", "position", "must be finite", name_first_bad(points.sum(axis=1))
+        )
     return points
 
 
@@ -291,7 +309,8 @@ def encloses(outer: Discs | None, inner: Discs | None) -> bool:
     if inner is None or outer is None:
         return inner is None
     (x, y, radius), (other_x, other_y, limit) = inner, outer
-    # A disc that touches the limit is inside: the last bit, which may differ in a batch, must not decide.
+    # A disc that touches the limit is inside: the last bit, which may differ in a batch, must not
+    # decide.
     limit = limit * (1.0 + RELATIVE_TOLERANCE)
     if isinstance(limit, float):
         return bool(math.hypot(x - other_x, y - other_y) + radius <= limit)

@@ -14,10 +14,11 @@ from .physics import Cell
 #: Root mean square opening in a control period below which a valve counts as shut: its flow is so
 #: small under any load that the motion does not tell the force.
 SHUT = 0.05
-#: Nodes of the averages over each stretch of a held command: the opening decays exponentially in it.
+#: Nodes of the averages over each stretch of a held command: the opening decays exponentially in
+#: it.
 NODES = 6
-#: Rounds in which the conductance converges; one is enough for laminar flow. For turbulent flow each
-#: round halves the logarithm of the error, and the force of the last period is a good start.
+#: Rounds in which the conductance converges; one is enough for laminar flow. For turbulent flow
+#: each round halves the logarithm of the error, and the force of the last period is a good start.
 ROUNDS = 6
 
 

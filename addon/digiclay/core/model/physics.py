@@ -58,8 +58,8 @@ class Speeds:
     def reach(self, height: Floats, under: Floats, time: Floats | float) -> tuple[Floats, Floats]:
         """Return the lowest and the highest possible heights of pins after a time, (n, ..), m.
 
-        A fingertip pushes a pin at most to its own underside, (p, k, ..), m, and a pin that is not pushed is
-        no faster than its valve permits.
+        A fingertip pushes a pin at most to its own underside, (p, k, ..), m, and a pin that is not
+        pushed is no faster than its valve permits.
         """
         lowest = height.copy()
         near = lowest[: under.shape[1]]
@@ -98,7 +98,9 @@ def compute_rates(cell: Cell, y: Floats, under: Floats, command: Floats) -> Floa
         drop = drop - load
     # If no drop reaches the knee, all flow is laminar, and a third of the time is enough.
     laminar = drop.size > 0 and -cell.flow.knee < drop.min() and drop.max() < cell.flow.knee
-    conductance = cell.flow.laminar_conductance(opening) if laminar else cell.flow.conductance(opening, drop)
+    conductance = (
+        cell.flow.laminar_conductance(opening) if laminar else cell.flow.conductance(opening, drop)
+    )
     change[0] = cell.actuator.rate(conductance * drop, height)
     change[cell.lag_rows] = cell.lag.rate(lag, command)
     return change

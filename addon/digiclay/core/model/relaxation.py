@@ -19,7 +19,12 @@ class Relaxation(Parameters):
     """
 
     times: tuple[float, ...] = quantity(
-        (4e-3, 70e-3, 1.4), "relaxation times", unit="s", symbol="1/ν_i", source="Pawluk 1999", at_least=1e-9
+        (4e-3, 70e-3, 1.4),
+        "relaxation times",
+        unit="s",
+        symbol="1/ν_i",
+        source="Pawluk 1999",
+        at_least=1e-9,
     )
     weights: tuple[float, ...] = quantity(
         (0.08, 0.62, 0.20, 0.10),
@@ -72,7 +77,9 @@ class Relaxation(Parameters):
         held = -np.expm1(-turns) / turns
         # For small turns the difference is only rounding error, and its series is used.
         series = turns / 3.0 - turns * turns / 12.0
-        share = float(self.shares @ np.where(turns < 1e-3, series, 1.0 - 2.0 * (1.0 - held) / turns))
+        share = float(
+            self.shares @ np.where(turns < 1e-3, series, 1.0 - 2.0 * (1.0 - held) / turns)
+        )
         return np.append(self.shares * held, self.shares @ (1.0 - held) - share), share
 
     def propagator(self, step: float) -> Floats:

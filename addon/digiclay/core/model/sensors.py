@@ -21,14 +21,15 @@ from .interfaces import Sensors
 
 Words = NDArray[np.uint64]
 
-#: Standard deviations above which a reading is not noise: noise exceeds them once in 3.5 million readings.
+#: Standard deviations above which a reading is not noise: noise exceeds them once in 3.5 million
+#: readings.
 SURE = 5.0
 #: Finest step a reading can have: below it, rounding errors are larger than the step.
 FINEST = 1e-12
 #: Odd constants of the 64-bit mixer SplitMix64 (Steele, Lea and Flood 2014).
 WEYL, FIRST, SECOND = 0x9E3779B97F4A7C15, 0xBF58476D1CE4E5B9, 0x94D049BB133111EB
-#: Control periods whose noise is drawn at once, one more than a set of active cells serves; and most numbers
-#: at once.
+#: Control periods whose noise is drawn at once, one more than a set of active cells serves; and
+#: most numbers at once.
 AHEAD, MOST = 33, 200_000
 
 
@@ -37,10 +38,20 @@ class Sensing(Parameters):
     """Parameters of the sensor model; 0 omits an effect."""
 
     force_noise: float = quantity(
-        0.0, "standard deviation of the force sensors", unit="N", symbol="σ_F", at_least=0.0, at_most=100.0
+        0.0,
+        "standard deviation of the force sensors",
+        unit="N",
+        symbol="σ_F",
+        at_least=0.0,
+        at_most=100.0,
     )
     height_noise: float = quantity(
-        0.0, "standard deviation of the height sensors", unit="m", symbol="σ_H", at_least=0.0, at_most=1.0
+        0.0,
+        "standard deviation of the height sensors",
+        unit="m",
+        symbol="σ_H",
+        at_least=0.0,
+        at_most=1.0,
     )
     force_step: float = quantity(
         0.0, "resolution of a force reading", unit="N", symbol="q_F", at_least=0.0, at_most=100.0
@@ -48,7 +59,9 @@ class Sensing(Parameters):
     height_step: float = quantity(
         0.0, "resolution of a height reading", unit="m", symbol="q_H", at_least=0.0, at_most=1.0
     )
-    delay: int = quantity(0, "delay of readings in control periods", symbol="d", at_least=0, at_most=100)
+    delay: int = quantity(
+        0, "delay of readings in control periods", symbol="d", at_least=0, at_most=100
+    )
     observer: str = quantity(
         "none",
         "replacement of the force sensors: none, or an estimate from heights and commands",
@@ -92,10 +105,10 @@ class Sensing(Parameters):
 def draw_polar(seed: Any, period: Any, cells: NDArray[np.intp]) -> tuple[Floats, Floats]:
     """Return a radius and an angle per cell, a pure function of the arguments.
 
-    A hashed counter replaces a generator: the noise of a cell does not depend on other cells
-    or earlier readings. The numbers are ([t,] m[, b]) for seeds (b,),
-    periods (t,) and cells (m[, b]). Radius times cosine and sine are two independent standard normal numbers
-    (Box and Muller); none is farther from 0 than 8.6.
+    A hashed counter replaces a generator: the noise of a cell does not depend on other cells or
+    earlier readings. The numbers are ([t,] m[, b]) for seeds (b,), periods (t,) and cells (m[, b]).
+    Radius times cosine and sine are two independent standard normal numbers (Box and Muller); none
+    is farther from 0 than 8.6.
     """
     periods = np.asarray(period, np.uint64)
     start = _mix(np.array(seed, np.uint64, ndmin=1))
@@ -122,8 +135,8 @@ def _draw_uniform(counter: Words) -> Floats:
 class NoiseAhead:
     """Noise of the coming periods, drawn at once for the cells read last.
 
-    It depends only on seed, a number or (b,), period and cell, so that it holds for any first part of the
-    cells. `deviations` are those of forces, N, and heights, m, numbers or (b,).
+    It depends only on seed, a number or (b,), period and cell, so that it holds for any first part
+    of the cells. `deviations` are those of forces, N, and heights, m, numbers or (b,).
     """
 
     def __init__(self, seed: Any, *deviations: Any) -> None:
@@ -138,14 +151,19 @@ class NoiseAhead:
         if not (continued and self._first <= period < self._end):
             # The first part of the cells is read before all of them.
             self._cells = self._cells if continued else cells.copy()
-            self._first, self._end = period, period + max(1, min(AHEAD, MOST // max(1, self._cells.size)))
+            self._first, self._end = (
+                period,
+                period + max(1, min(AHEAD, MOST // max(1, self._cells.size))),
+            )
             radius, angle = draw_polar(self._seed, np.arange(self._first, self._end), self._cells)
             turns: tuple[np.ufunc, ...] = np.cos, np.sin
             self._drawn = [
                 by * (radius * turn(angle)) if np.any(by) else None
                 for by, turn in zip(self._deviations, turns, strict=True)
             ]
-        return [noise if noise is None else noise[period - self._first, :count] for noise in self._drawn]
+        return [
+            noise if noise is None else noise[period - self._first, :count] for noise in self._drawn
+        ]
 
 
 @dataclass(frozen=True)
@@ -261,5 +279,7 @@ class Delayed(Sensors):
             return stored
         height = np.where(rows[0] > 0.0, rows[2], self.rest)
         # An idle cell has a shut valve and no queued command.
-        still = self._show_inner(seen)._replace(force=rows[1], height=height, command=np.zeros_like(height))
+        still = self._show_inner(seen)._replace(
+            force=rows[1], height=height, command=np.zeros_like(height)
+        )
         return np.where(missed, self.inner.measure(still, period), stored)

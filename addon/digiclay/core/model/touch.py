@@ -50,7 +50,9 @@ class Ahead:
         self, index: int, positions: Any, numbers: int, compute: Callable[[slice, Any], Floats]
     ) -> Floats:
         """Return the undersides of a period, (p, k), m; `numbers`: their count p k."""
-        if positions is not self._positions or not self._first <= index < self._first + len(self._unders):
+        if positions is not self._positions or not self._first <= index < self._first + len(
+            self._unders
+        ):
             count = max(1, min(AHEAD, MOST // max(1, numbers)))
             self._unders = compute(slice(index, index + count), positions)
             self._positions, self._first = positions, index
@@ -143,11 +145,12 @@ def relax_force(touch: Touch, tension: Floats, filters: Floats) -> Floats:
     return tension
 
 
-#: Largest total force at which the law and its relaxation were measured, N: Pawluk and Howe, Dynamic
-#: contact of the human fingerpad against a flat surface, J Biomech Eng 121(6), 605-611 (1999): 0 to 2 N.
+#: Largest total force at which the law and its relaxation were measured, N: Pawluk and Howe,
+#: Dynamic contact of the human fingerpad against a flat surface, J Biomech Eng 121(6), 605-611
+#: (1999): 0 to 2 N.
 MOST_FORCE = 2.0
-#: Largest measured indentation of fingerpads, m: Gulati and Srinivasan, Human fingerpad under indentation I:
-#: static and dynamic force response (1995), 0.5 to 3 mm. The bone is below.
+#: Largest measured indentation of fingerpads, m: Gulati and Srinivasan, Human fingerpad under
+#: indentation I: static and dynamic force response (1995), 0.5 to 3 mm. The bone is below.
 MOST_INDENTATION = 3e-3
 #: Rows whose undersides are computed at a time.
 ROWS = 64

@@ -26,7 +26,11 @@ class Waypoint(Parameters):
 
     time: float = quantity(0.0, "when", unit="s", at_least=0.0, at_most=1e6)
     position: tuple[float, ...] = quantity(
-        (0.0, 0.0, 46e-3), "lowest point of the fingertip: x, y, z", unit="m", at_least=-100.0, at_most=100.0
+        (0.0, 0.0, 46e-3),
+        "lowest point of the fingertip: x, y, z",
+        unit="m",
+        at_least=-100.0,
+        at_most=100.0,
     )
     orientation: tuple[float, ...] = quantity(
         (1.0, 0.0, 0.0, 0.0), "quaternion w, x, y, z", at_least=-1e6, at_most=1e6
@@ -45,10 +49,10 @@ class Waypoint(Parameters):
 class Trajectory:
     """Waypoints of the fingertip's lowest point, with orientations.
 
-    *smooth* joins them by monotone cubics (Fritsch and Carlson): velocity is continuous,
-    and no coordinate overshoots a waypoint. *linear* joins them by straight lines.
-    Before the first and after the last waypoint the fingertip rests. Raises ParameterError on values that are
-    not finite, times that do not increase, or a quaternion of length 0.
+    *smooth* joins them by monotone cubics (Fritsch and Carlson): velocity is continuous, and no
+    coordinate overshoots a waypoint. *linear* joins them by straight lines. Before the first and
+    after the last waypoint the fingertip rests. Raises ParameterError on values that are not
+    finite, times that do not increase, or a quaternion of length 0.
     """
 
     times: Floats
@@ -64,7 +68,9 @@ class Trajectory:
             rule = "must be one of smooth, linear"
             raise ParameterError("Trajectory", "interpolation", rule, repr(self.interpolation))
         if self.times.size == 0:
-            raise ParameterError("Trajectory", "waypoints", "must have at least one waypoint", "none")
+            raise ParameterError(
+                "Trajectory", "waypoints", "must have at least one waypoint", "none"
+            )
         for name in ("times", "positions", "orientations"):
             bad = np.argwhere(~np.isfinite(getattr(self, name)))
             if bad.size:
@@ -79,7 +85,9 @@ class Trajectory:
             raise ParameterError("Trajectory", "times", rule, value)
         lengths = np.linalg.norm(self.orientations, axis=1)
         if not np.all(lengths > 1e-9):
-            raise ParameterError("Trajectory", "orientations", "must have a length above 0", "0, 0, 0, 0")
+            raise ParameterError(
+                "Trajectory", "orientations", "must have a length above 0", "0, 0, 0, 0"
+            )
         object.__setattr__(self, "orientations", self.orientations / lengths[:, None])
 
     @property
@@ -94,7 +102,9 @@ class Trajectory:
             poses[:, :3], poses[:, 3:] = self.positions[0], self.orientations[0]
             return poses
         times = np.clip(times, self.times[0], self.times[-1])
-        piece = np.clip(np.searchsorted(self.times, times, side="right") - 1, 0, self.times.size - 2)
+        piece = np.clip(
+            np.searchsorted(self.times, times, side="right") - 1, 0, self.times.size - 2
+        )
         span = np.diff(self.times)[piece]
         part = ((times - self.times[piece]) / span)[:, None]
         start, end = self.positions[piece], self.positions[piece + 1]
@@ -103,8 +113,12 @@ class Trajectory:
             slopes = compute_inner_slopes(np.diff(self.times), self.positions)
             first, last = slopes[piece] * span[:, None], slopes[piece + 1] * span[:, None]
             bend = part * (1.0 - part)
-            poses[:, :3] += bend * ((1.0 - part) * (first - end + start) - part * (last - end + start))
-        poses[:, 3:] = _interpolate_turns(self.orientations[piece], self.orientations[piece + 1], part)
+            poses[:, :3] += bend * (
+                (1.0 - part) * (first - end + start) - part * (last - end + start)
+            )
+        poses[:, 3:] = _interpolate_turns(
+            self.orientations[piece], self.orientations[piece + 1], part
+        )
         return poses
 
 

@@ -17,7 +17,9 @@ from .interfaces import Flow
 class Fluid(Parameters):
     """An incompressible Newtonian fluid; the default is a silicone oil (Syltherm XLT at 20 °C)."""
 
-    density: float = quantity(855.0, "density", unit="kg/m3", symbol="ρ", source="Melinder 2010", above=0.0)
+    density: float = quantity(
+        855.0, "density", unit="kg/m3", symbol="ρ", source="Melinder 2010", above=0.0
+    )
     viscosity: float = quantity(
         1.6e-6, "kinematic viscosity", unit="m2/s", symbol="ν", source="Melinder 2010", above=0.0
     )
@@ -37,15 +39,26 @@ class Valve(Parameters):
     ``Re* = sqrt(Q / (ν h_v))`` (equation 4).
     """
 
-    orifice_diameter: float = quantity(0.5e-3, "diameter of the orifice", unit="m", symbol="d_o", above=0.0)
+    orifice_diameter: float = quantity(
+        0.5e-3, "diameter of the orifice", unit="m", symbol="d_o", above=0.0
+    )
     stroke: float = quantity(
-        30e-6, "lift of the fully open valve", unit="m", symbol="h_v", source="Roberts 2003", above=0.0
+        30e-6,
+        "lift of the fully open valve",
+        unit="m",
+        symbol="h_v",
+        source="Roberts 2003",
+        above=0.0,
     )
     discharge_slope: float = quantity(
         0.18, "discharge coefficient over relative opening", symbol="s", source="P", above=0.0
     )
     knee_reynolds: float = quantity(
-        200.0, "Reynolds number Re* at which the branches meet", symbol="Re_k", source="P", above=0.0
+        200.0,
+        "Reynolds number Re* at which the branches meet",
+        symbol="Re_k",
+        source="P",
+        above=0.0,
     )
     gap: str = quantity(
         "stroke",
@@ -107,6 +120,8 @@ class Orifice(Flow):
 def make_orifice(valve: Valve, fluid: Fluid) -> Orifice:
     """Return the flow law from the slope and the knee of equation 5, not from rounded constants."""
     area_term = math.pi * valve.discharge_slope * valve.orifice_diameter**2
-    laminar = area_term**2 / (8.0 * valve.knee_reynolds**2 * fluid.density * fluid.viscosity * valve.stroke)
+    laminar = area_term**2 / (
+        8.0 * valve.knee_reynolds**2 * fluid.density * fluid.viscosity * valve.stroke
+    )
     turbulent = area_term / 4.0 * math.sqrt(2.0 / fluid.density)
     return Orifice(laminar, turbulent, 2 if valve.gap == "stroke" else 1)

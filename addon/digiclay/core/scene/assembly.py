@@ -67,7 +67,11 @@ def _make_control(scene: Scene, bed: Grid, motion: Motion) -> tuple[Controller, 
     """Return the control method and the sensors, and the rows of all parts."""
     controller = _make_controller(scene, bed, (motion.cell,))
     sensors = _make_sensors(scene, motion.cell, motion.line)
-    return controller, sensors, Rows(motion.cell.rows, motion.line.length, controller.rows, sensors.rows)
+    return (
+        controller,
+        sensors,
+        Rows(motion.cell.rows, motion.line.length, controller.rows, sensors.rows),
+    )
 
 
 def assemble(scene: Scene) -> System:
@@ -105,7 +109,9 @@ def _assemble_hands(scene: Scene) -> System:
     from ..model.fingers import MOST_FINGERS, join_touches
 
     if not 0 < len(scene.fingers) <= MOST_FINGERS:
-        raise ParameterError("scene", "fingers", f"must be 1 to {MOST_FINGERS}", str(len(scene.fingers)))
+        raise ParameterError(
+            "scene", "fingers", f"must be 1 to {MOST_FINGERS}", str(len(scene.fingers))
+        )
     scene = replace(scene, fingers=_pad_relaxations(scene.fingers))
     different: dict[tuple[object, ...], Motion] = {}
     motions = []
@@ -166,7 +172,9 @@ def _make_touch(scene: Scene) -> Touch | None:
     finger = require_one(scene.fingers)
     if finger.fingertip is None or finger.contact is None:
         return None
-    return Touch(finger.fingertip, select_law("contact", finger.contact), finger.relaxation or Unrelaxed())
+    return Touch(
+        finger.fingertip, select_law("contact", finger.contact), finger.relaxation or Unrelaxed()
+    )
 
 
 def _make_sensors(scene: Scene, cell: Cell, line: Queue) -> Sensors:
@@ -201,7 +209,9 @@ def _make_controller(scene: Scene, bed: Grid, cells: tuple[Cell, ...]) -> Contro
     sensing = scene.sensors
     floors = (sensing.force_floor, sensing.height_floor) if sensing else (0.0, 0.0)
     dead_time = scene.delay.dead_time if scene.delay else 0.0
-    device = DeviceInfo(bed, cell, scene.simulation.control_period, scene.blister, None, *floors, dead_time)
+    device = DeviceInfo(
+        bed, cell, scene.simulation.control_period, scene.blister, None, *floors, dead_time
+    )
     if scene.shape:
         from ..shapes.fitting import fit_shape
 

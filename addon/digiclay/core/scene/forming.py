@@ -40,8 +40,8 @@ def find_display(system: System) -> ShapeDisplayControl | None:
 def compute_display_time(display: ShapeDisplayControl) -> float:
     """Return the time in which a free bed displays its shape, s, rounded up to a tenth.
 
-    A move lasts as long as its distance takes at the slower reservoir's speed, plus the settling of the
-    height control to the dead band; at most its patience.
+    A move lasts as long as its distance takes at the slower reservoir's speed, plus the settling of
+    the height control to the dead band; at most its patience.
     """
     shape, drive = display.parameters, display.drive
     distance = float(np.abs(display.heights - display.actuator.rest_height).max(initial=0.0))

@@ -96,7 +96,8 @@ class HistoryWriter:
 
     def __init__(self, count: int, cells: int) -> None:
         self.count = count
-        # Uninitialized: numpy then gets memory in large pages, which cost a quarter at their first use.
+        # Uninitialized: numpy then gets memory in large pages, which cost a quarter at their first
+        # use.
         self._felt, self._command = np.empty((2, count, cells)), np.empty((count, cells))
         self._mode = np.empty((count, cells), np.int8)
         self._now, self._mode_now = np.zeros((2, cells)), np.empty(cells, np.int8)
@@ -127,9 +128,19 @@ class HistoryWriter:
         count = 1 - (-period // every)
         self._felt[:, count - 1] = self._now
         self._command[count - 1], self._mode[count - 1] = 0.0, self._mode_now
-        (height, force), command, mode = self._felt[:, :count], self._command[:count], self._mode[:count]
+        (height, force), command, mode = (
+            self._felt[:, :count],
+            self._command[:count],
+            self._mode[:count],
+        )
         period_of_row = np.minimum(np.arange(count) * every, period)
-        return {"period": period_of_row, "height": height, "force": force, "command": command, "mode": mode}
+        return {
+            "period": period_of_row,
+            "height": height,
+            "force": force,
+            "command": command,
+            "mode": mode,
+        }
 
 
 class RunRecording(Recording):

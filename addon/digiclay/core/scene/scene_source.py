@@ -15,7 +15,8 @@ from ..files.tables import LARGEST, ReadParts, Record, Table, format_value, pars
 from .schema import FINGER_SECTIONS, Scene
 from .toml_table import ABSENT, FINGERS, merge_one_finger, resolve, tabulate
 
-#: What a scene is made of: another one, tables as of a file, a file, the folder of a run, or a sample's name.
+#: What a scene is made of: another one, tables as of a file, a file, the folder of a run, or a
+#: sample's name.
 Source = Scene | Table | str | os.PathLike[str]
 
 #: Folder of the sample scenes.
@@ -93,11 +94,15 @@ def load_recorded(path: Path) -> Scene:
 
 
 def make_scene(
-    path: Path | None, table: Table, settings: Sequence[Setting] = (), cache: ReadParts | None = None
+    path: Path | None,
+    table: Table,
+    settings: Sequence[Setting] = (),
+    cache: ReadParts | None = None,
 ) -> Scene:
     """Return a scene from the tables of its file, if any, overridden by settings; SceneError as `load`.
 
-    A shape may be beside the file. `cache`: parts of scenes of the same file, which are not read again.
+    A shape may be beside the file. `cache`: parts of scenes of the same file, which are not read
+    again.
     """
     try:
         merged = merge_one_finger(_find_beside(table, path.parent) if path else table)
@@ -120,7 +125,9 @@ def read_table(path: Path) -> Record:
     try:
         size = path.stat().st_size
         if size > LARGEST:
-            raise SceneError(f"{path} must have at most {LARGEST // 1_000_000} MB (got {size / 1e6:.0f} MB).")
+            raise SceneError(
+                f"{path} must have at most {LARGEST // 1_000_000} MB (got {size / 1e6:.0f} MB)."
+            )
         text = path.read_text(encoding="utf-8-sig")
         return parse_tables(text)
     except OSError as error:
@@ -143,7 +150,11 @@ def _find_beside(table: Table, folder: Path) -> Table:
     if not isinstance(name, str) or not Path(name).suffix or "\0" in name:
         return table
     file = folder / name
-    return {**table, "shape": {**table["shape"], "file": str(file.resolve())}} if file.is_file() else table
+    return (
+        {**table, "shape": {**table["shape"], "file": str(file.resolve())}}
+        if file.is_file()
+        else table
+    )
 
 
 def _override(table: Table, settings: Sequence[Setting]) -> Record:

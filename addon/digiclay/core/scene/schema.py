@@ -89,8 +89,8 @@ STEPPERS: dict[str, tuple[str, str]] = {
 }
 #: Most physics steps in a control period, and most queued control periods of a valve.
 MOST_STEPS = 1000
-#: Most physics steps in a control period of steppers that divide each step: their plans grow with the square,
-#: to a gigabyte.
+#: Most physics steps in a control period of steppers that divide each step: their plans grow with
+#: the square, to a gigabyte.
 MOST_CUT = {"adaptive": 10, "richardson": 500}
 
 #: Names of the classes of what a section may hold; those of the control depend on its method.
@@ -117,11 +117,17 @@ def import_parameters(section: str, method: str) -> type[Parameters]:
 class Simulation(Parameters):
     """Periods, steps and duration of the simulation."""
 
-    control_period: float = quantity(5e-3, "time between two commands", unit="s", symbol="T_c", above=0.0)
+    control_period: float = quantity(
+        5e-3, "time between two commands", unit="s", symbol="T_c", above=0.0
+    )
     physics_step: float = quantity(5e-3, "longest physics step", unit="s", symbol="h", above=0.0)
     stepper: str = quantity("bernoulli", "method of integration", choices=tuple(STEPPERS))
     tolerance: float = quantity(
-        1e-6, "error of the heights allowed to the adaptive stepper", unit="m", symbol="ε", at_least=1e-7
+        1e-6,
+        "error of the heights allowed to the adaptive stepper",
+        unit="m",
+        symbol="ε",
+        at_least=1e-7,
     )
     duration: float = quantity(
         0.0, "simulated time; 0: duration of the trajectory", unit="s", at_least=0.0, at_most=1e6
@@ -168,8 +174,8 @@ class Finger:
 class Scene(Described):
     """Complete definition of a session; equal scenes give equal sessions, bit for bit.
 
-    A part that is None is omitted: it costs nothing, and its module is not imported. Raises ParameterError
-    when parts are not compatible; its owner is the section's name.
+    A part that is None is omitted: it costs nothing, and its module is not imported. Raises
+    ParameterError when parts are not compatible; its owner is the section's name.
     """
 
     layout: Layout
@@ -195,7 +201,9 @@ class Scene(Described):
     def __post_init__(self) -> None:
         self._refuse_wrong_parts()
         if self.layout.pitch < self.actuator.bore:
-            rule = f"must be at least actuator.bore, {self.actuator.bore:g} m: cylinders would overlap"
+            rule = (
+                f"must be at least actuator.bore, {self.actuator.bore:g} m: cylinders would overlap"
+            )
             raise ParameterError("layout", "pitch", rule, f"{self.layout.pitch:g} m")
         plan = self.layout
         longer_side = max(plan.columns * plan.pitch, plan.rows * plan.row_spacing)
@@ -216,7 +224,8 @@ class Scene(Described):
     def _refuse_wrong_parts(self) -> None:
         """Refuse parts that are not of the classes of their sections, or not of the control method.
 
-        By the names of the classes: the file of a method of one's own may have been run again since.
+        By the names of the classes: the file of a method of one's own may have been run again
+        since.
         """
         if not all(isinstance(finger, Finger) for finger in self.fingers):
             raise ParameterError("fingers", "", "must be a tuple of Finger", str(self.fingers))
@@ -229,7 +238,11 @@ class Scene(Described):
             for part in self.list_parts(section):
                 name = "None" if part is None else type(part).__name__
                 if name not in names:
-                    method = f" with the method {self.method}" if section in ("control", "blister") else ""
+                    method = (
+                        f" with the method {self.method}"
+                        if section in ("control", "blister")
+                        else ""
+                    )
                     raise ParameterError(section, "", f"must be {' or '.join(names)}{method}", name)
 
     def describe(self) -> dict[str, str]:

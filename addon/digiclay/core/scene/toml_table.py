@@ -18,7 +18,16 @@ from ..files.tables import (
 )
 from ..model.layout import ARRANGEMENTS, Layout
 from ..model.trajectory import Path, Waypoint
-from .schema import FINGER_SECTIONS, NEEDS, OPTIONAL, SECTIONS, UNASKED, Finger, Scene, import_parameters
+from .schema import (
+    FINGER_SECTIONS,
+    NEEDS,
+    OPTIONAL,
+    SECTIONS,
+    UNASKED,
+    Finger,
+    Scene,
+    import_parameters,
+)
 
 #: Value of the section of an omitted part.
 ABSENT = "absent"
@@ -26,9 +35,12 @@ ABSENT = "absent"
 PRESETS: dict[str, dict[str, Record]] = {
     "paper": {},
     "fast": {"valve": {"orifice_diameter": 0.6e-3}},
-    "viscous": {"fluid": {"viscosity": 3.2e-6, "density": 908.0}, "valve": {"orifice_diameter": 0.6e-3}},
-    # For hands. The valve of Roberts 2003, whose lift the paper uses too, works at 1 kHz and above, against
-    # 3 bar and above: its lag is at most 1 / (2π 1 kHz).
+    "viscous": {
+        "fluid": {"viscosity": 3.2e-6, "density": 908.0},
+        "valve": {"orifice_diameter": 0.6e-3},
+    },
+    # For hands. The valve of Roberts 2003, whose lift the paper uses too, works at 1 kHz and above,
+    # against 3 bar and above: its lag is at most 1 / (2π 1 kHz).
     "design": {"valve": {"orifice_diameter": 0.6e-3}, "valve_lag": {"time_constant": 0.16e-3}},
 }
 TEXTS = ("name", "description", "preset")
@@ -52,7 +64,9 @@ def resolve(table: Table, name: str = "", cache: ReadParts | None = None) -> Sce
         for key, default in zip(TEXTS, (name, "", "paper"), strict=True)
     }
     if texts["preset"] not in PRESETS:
-        raise ParameterError("preset", "", f"must be one of {', '.join(PRESETS)}", repr(texts["preset"]))
+        raise ParameterError(
+            "preset", "", f"must be one of {', '.join(PRESETS)}", repr(texts["preset"])
+        )
     tables = _split_fingers(table)
     shared = {
         section: _read_section(section, table.get(section, ABSENT if section in UNASKED else {}))
@@ -64,7 +78,9 @@ def resolve(table: Table, name: str = "", cache: ReadParts | None = None) -> Sce
     parts = _read_parts(shared, defaults, cache, method)
     defaults = _add_share(defaults, parts["layout"])
     rest_height = parts["actuator"].rest_height
-    fingers = tuple(_read_finger(owner, given, defaults, rest_height, cache) for owner, given in tables)
+    fingers = tuple(
+        _read_finger(owner, given, defaults, rest_height, cache) for owner, given in tables
+    )
     return Scene(**parts, **texts, fingers=fingers, method=method)
 
 
@@ -131,7 +147,9 @@ def _split_fingers(table: Table) -> list[tuple[str, Table]]:
         return [("", single)]
     given = table[FINGERS]
     if not isinstance(given, list) or not all(isinstance(finger, dict) for finger in given):
-        raise ParameterError(FINGERS, "", f"must be a list of tables, [[{FINGERS}]]", show_value(given))
+        raise ParameterError(
+            FINGERS, "", f"must be a list of tables, [[{FINGERS}]]", show_value(given)
+        )
     if single:
         section = next(iter(single))
         rule = f"must be left out where there is [[{FINGERS}]]: give it there"
@@ -178,7 +196,9 @@ def _read_parts(
 def _refuse_another_method(given: Table, kind: type[Parameters], method: str) -> None:
     """Refuse a key that only other control methods have. `kind`: parameters of the chosen method."""
     for key in [key for key in given if key not in ("method", *list_quantities(kind))]:
-        others = [name for name in METHODS if key in list_quantities(import_parameters("control", name))]
+        others = [
+            name for name in METHODS if key in list_quantities(import_parameters("control", name))
+        ]
         if others:
             rule, hint = f"must be a parameter of {method}", f"It is one of {', '.join(others)}."
             raise ParameterError("control", key, rule, show_value(given[key]), hint)
@@ -188,7 +208,9 @@ def _read_finger(
     owner: str, table: Table, defaults: Mapping[str, Table], rest_height: float, cache: ReadParts
 ) -> Finger:
     """Return a finger from its sections; `owner`: prefix of their names in messages."""
-    tables = {section: _read_section(section, table.get(section, {}), owner) for section in FINGER_PARTS}
+    tables = {
+        section: _read_section(section, table.get(section, {}), owner) for section in FINGER_PARTS
+    }
     parts = _read_parts(tables, defaults, cache, owner=owner)
     path = cache.read(_read_path, f"{owner}trajectory", table.get("trajectory", {}), rest_height)
     return Finger(**parts, trajectory=path)

@@ -1,8 +1,8 @@
 """Error estimate of a session: second, finer integration under the same commands.
 
-The commands are those of the session, so that only the integration differs. The reference uses the closed
-form, which cannot diverge, or a more accurate stepper. A whole run is evaluated from its history; a live
-session has an `ErrorMonitor`, which follows it for a short stretch at intervals.
+The commands are those of the session, so that only the integration differs. The reference uses the
+closed form, which cannot diverge, or a more accurate stepper. A whole run is evaluated from its
+history; a live session has an `ErrorMonitor`, which follows it for a short stretch at intervals.
 """
 
 from __future__ import annotations
@@ -25,22 +25,25 @@ from ..model.trajectory import Path, interpolate_poses, sample_poses
 from ..scene.assembly import assemble
 from ..scene.schema import MOST_CUT, MOST_STEPS, Scene, Simulation
 
-#: Control periods of a session: the state after each, and the fingertip at both ends of it, (2, f, 7).
+#: Control periods of a session: the state after each, and the fingertip at both ends of it, (2, f,
+#: 7).
 Noted = tuple[tuple[State, Floats], ...]
 
-#: Error of a run per difference from its reference. The reference's own error is taken as a quarter of that
-#: of the run: with a quarter of the step, that remains of an error of first order, as across a kink. The
-#: estimate covers the true error in 95 of 100 runs: it is no bound, and is printed as "about".
+#: Error of a run per difference from its reference. The reference's own error is taken as a quarter
+#: of that of the run: with a quarter of the step, that remains of an error of first order, as
+#: across a kink. The estimate covers the true error in 95 of 100 runs: it is no bound, and is
+#: printed as "about".
 SHARE = 4.0 / 3.0
-#: Parts of a step in the reference of steppers that are more accurate than the closed form at a quarter of
-#: the step; the steps of the adaptive one are not known beforehand.
+#: Parts of a step in the reference of steppers that are more accurate than the closed form at a
+#: quarter of the step; the steps of the adaptive one are not known beforehand.
 FINER = {"richardson": 4, "adaptive": 8}
 #: Longest physics step of a reference, s: longer ones do not resolve the shortest time constants.
 LONGEST = 1.25e-3
-#: Control periods of a live session's stretch, of the pause between two stretches, and per period of the
-#: reference, which takes twice as long: so no tick is slow.
+#: Control periods of a live session's stretch, of the pause between two stretches, and per period
+#: of the reference, which takes twice as long: so no tick is slow.
 STRETCH, PAUSE, SPREAD = 20, 180, 4
-#: Largest deviation of the fingertip from a straight path within a step at which the estimate holds, m.
+#: Largest deviation of the fingertip from a straight path within a step at which the estimate
+#: holds, m.
 BENT = 0.1e-3
 #: Heights that are compared together, those of several control periods.
 TOGETHER = 20_000
@@ -120,7 +123,9 @@ def explain_absence(scene: Scene) -> str:
     except ParameterError:
         return "simulation.physics_step is too short to be halved"
     every = scene.recorder.every
-    return "" if every == 1 else f"recorder.every = {every} leaves out commands, with 1 all are there"
+    return (
+        "" if every == 1 else f"recorder.every = {every} leaves out commands, with 1 all are there"
+    )
 
 
 def reference_settings(simulation: Simulation) -> Simulation:
@@ -164,7 +169,9 @@ def estimate_errors(
         if last == most - 1 or row == done:
             rows = slice(row - last, row + 1)
             height, force = reference[:, : last + 1].transpose(0, 2, 1)
-            differences = compare(height, force, history["height"][rows].T, history["force"][rows].T)
+            differences = compare(
+                height, force, history["height"][rows].T, history["force"][rows].T
+            )
             largest = np.maximum(largest, differences.max(axis=1))
         if progress:
             progress(row, done)
@@ -176,7 +183,8 @@ def estimate_errors(
 def describe_bends(scene: Scene) -> str:
     """Return the reason to doubt the estimated errors of a run, or ``""``.
 
-    The run misses a contact that begins and ends within a step, and its reference resolves it only in part.
+    The run misses a contact that begins and ends within a step, and its reference resolves it only
+    in part.
     """
     paths, simulation = tuple(finger.trajectory for finger in scene.fingers), scene.simulation
     bend = _measure_bends(paths, simulation.physics_step, simulation.duration)
@@ -205,8 +213,11 @@ def _measure_bends(paths: tuple[Path, ...], step: float, duration: float) -> flo
 def start(scene: Scene) -> ErrorMonitor | None:
     """Return the monitor of a live session that begins; None if the step cannot be halved."""
     try:
-        # With the controller: a stretch begins with a copy of the session's state, which has its rows.
-        return ErrorMonitor(assemble(replace(scene, simulation=reference_settings(scene.simulation))))
+        # With the controller: a stretch begins with a copy of the session's state, which has its
+        # rows.
+        return ErrorMonitor(
+            assemble(replace(scene, simulation=reference_settings(scene.simulation)))
+        )
     except DigiclayError:
         return None
 
@@ -231,7 +242,11 @@ def begin_stretch(monitor: ErrorMonitor, state: State, pause: int = PAUSE) -> Er
         begun.rows[0] += monitor.carried
         begun.active.block[0] += monitor.carried[begun.active.cells]
     return ErrorMonitor(
-        monitor.system, begun, before=monitor.before, carried=monitor.carried, largest=monitor.largest
+        monitor.system,
+        begun,
+        before=monitor.before,
+        carried=monitor.carried,
+        largest=monitor.largest,
     )
 
 
@@ -267,7 +282,9 @@ def catch_up(monitor: ErrorMonitor, after: State, count: int) -> tuple[ErrorMoni
             largest = np.maximum(largest, monitor.largest)
         if not waiting and monitor.reached is not None:
             carried = state.row(0) - monitor.reached
-            monitor = ErrorMonitor(system, None, monitor.age, before=count, carried=carried, largest=largest)
+            monitor = ErrorMonitor(
+                system, None, monitor.age, before=count, carried=carried, largest=largest
+            )
             return monitor, Errors.estimate(largest)
         monitor = monitor._replace(
             state=state, largest=largest, done=monitor.done + 1, waiting=tuple(waiting)

@@ -40,17 +40,24 @@ class HistoryArray(NamedTuple):
     """Whether only some runs have it."""
 
 
-#: Arrays of a history, by name: those that a run records, ``history.npz`` holds and `read_run` accepts.
+#: Arrays of a history, by name: those that a run records, ``history.npz`` holds and `read_run`
+#: accepts.
 HISTORY_ARRAYS: dict[str, HistoryArray] = {
-    "time": HistoryArray("t", "s", "time of the row; row 0 is the bed before the first control period"),
+    "time": HistoryArray(
+        "t", "s", "time of the row; row 0 is the bed before the first control period"
+    ),
     "height": HistoryArray("t, n", "m", "height of each pin's top over the floor of the bed"),
     "force": HistoryArray("t, n", "N", "force of all fingers on each pin, positive downwards"),
     "command": HistoryArray(
-        "t, n", "1", "valve command of each pin in the control period that begins with the row, -1 to 1"
+        "t, n",
+        "1",
+        "valve command of each pin in the control period that begins with the row, -1 to 1",
     ),
     "mode": HistoryArray("t, n", "1", "code of each pin's mode in that control period", "i"),
     "fingertip": HistoryArray(
-        "t, f, 7", "m, 1", "pose of each fingertip: its lowest point x, y, z, its quaternion w, x, y, z"
+        "t, f, 7",
+        "m, 1",
+        "pose of each fingertip: its lowest point x, y, z, its quaternion w, x, y, z",
     ),
     "total_force": HistoryArray("t", "N", "force of all fingers on all pins"),
     "finger_force": HistoryArray("t, f", "N", "force of each of several fingers", optional=True),
@@ -81,7 +88,9 @@ def read_run(folder: Path, *names: str) -> Run:
         with zipfile.ZipFile(path) as archive:
             stored = {Path(name).stem for name in archive.namelist()}
             wanted = [
-                name for name in ("time", *names) if name in stored or not HISTORY_ARRAYS[name].optional
+                name
+                for name in ("time", *names)
+                if name in stored or not HISTORY_ARRAYS[name].optional
             ]
             heads = read_heads(archive, wanted)
             _refuse(path, scene, heads)
@@ -91,7 +100,9 @@ def read_run(folder: Path, *names: str) -> Run:
     for name, values in history.items():
         low, high = (0, len(Mode) - 1) if name == "mode" else (-LARGEST, LARGEST)
         if not (values.min() >= low and values.max() <= high):
-            raise OutputError(f"{path}: {name} must hold numbers from {low:g} to {high:g}, as a run leaves.")
+            raise OutputError(
+                f"{path}: {name} must hold numbers from {low:g} to {high:g}, as a run leaves."
+            )
     if (np.diff(history["time"]) <= 0.0).any():
         raise OutputError(f"{path}: time must increase from row to row.")
     return Run(scene, history)
@@ -125,7 +136,9 @@ def _refuse(path: Path, scene: Scene, heads: Mapping[str, Head]) -> None:
         several = len(scene.fingers) > 1
         shape = tuple(sizes.get(axis) or int(axis) for axis in axes if axis != "f" or several)
         if head.shape != shape:
-            raise OutputError(f"{path}: {name} must have the shape {shape} of its scene (got {head.shape}).")
+            raise OutputError(
+                f"{path}: {name} must have the shape {shape} of its scene (got {head.shape})."
+            )
         kinds = HISTORY_ARRAYS[name].kinds
         if head.kind.kind not in kinds or head.kind.itemsize > 8:
             raise OutputError(
@@ -148,7 +161,9 @@ def require_surface(scene: Scene, option: str) -> None:
 def has_files(folder: Path, sizes: Mapping[str, int]) -> bool:
     """Return whether a run's folder has all files with their sizes, bytes: copies may be incomplete."""
     try:
-        return bool(sizes) and all((folder / name).stat().st_size == size for name, size in sizes.items())
+        return bool(sizes) and all(
+            (folder / name).stat().st_size == size for name, size in sizes.items()
+        )
     except OSError:
         return False
 

@@ -22,17 +22,20 @@ from . import accuracy, snapshot
 
 #: Wall time over which the real-time factor is averaged, s.
 WINDOW = 1.0
-#: Longest time for the periods of a tick, as a share of the interval of ticks: the rest is for drawing and
-#: for the user.
+#: Longest time for the periods of a tick, as a share of the interval of ticks: the rest is for
+#: drawing and for the user.
 SHARE = 0.7
-#: Least time for the periods of a queue, as a share of Blender's drawing time, while a stroke is drawn, and
-#: after its end: software drawing takes half a second. At 30 frames per second, 15 are still displayed then.
+#: Least time for the periods of a queue, as a share of Blender's drawing time, while a stroke is
+#: drawn, and after its end: software drawing takes half a second. At 30 frames per second, 15 are
+#: still displayed then.
 LEAST, RELEASED = 0.5, 1.0
-#: Share of the time between the periods that is drawing for certain: Blender also waits for the next tick.
+#: Share of the time between the periods that is drawing for certain: Blender also waits for the
+#: next tick.
 DRAWN = 0.9
 #: Shortest interval of ticks that is assumed, s: ticks may come in a burst.
 SHORTEST = 1e-2
-#: An animation whose frame has not changed for this time is another scene's, s: software draws 1 frame per s.
+#: An animation whose frame has not changed for this time is another scene's, s: software draws 1
+#: frame per s.
 STANDS = 2.0
 #: Rounding error up to which times count as whole periods, in periods.
 SLACK = 1e-6
@@ -79,7 +82,8 @@ def periods_due(
 ) -> tuple[int, Clock]:
     """Return the number of control periods, s, to simulate now, s, at `most`, and the clock after them.
 
-    `moment`: time of an animation that plays, s, which counts instead, so that keyed motion has its speed.
+    `moment`: time of an animation that plays, s, which counts instead, so that keyed motion has its
+    speed.
     """
     last, shown = clock.moment, None if moment is None else (moment, now)
     shown = last if last and last[0] == moment else shown
@@ -191,7 +195,9 @@ class Recording:
     """(n,) each: Heights to which orders move pins, m."""
 
     @classmethod
-    def begin(cls, snapshot: bytes, period: int, pose: Floats, tick: int, room: int = 256) -> Recording:
+    def begin(
+        cls, snapshot: bytes, period: int, pose: Floats, tick: int, room: int = 256
+    ) -> Recording:
         """Return a recording of a start only: snapshot, period, poses (f, 7); `room`: its capacity."""
         rows = np.empty((room, pose.size + ORDER + 1))
         rows[0] = *pose.ravel(), *np.zeros(ORDER), tick
@@ -256,7 +262,9 @@ class Recording:
         """Return the first rows of the recording."""
         rows = self.rows[1:count, ORDERS]
         needed = int(rows[rows[:, 4] == Verb.PLACE, 0].max(initial=-1.0)) + 1
-        return replace(self, count=count, saved=min(self.saved, count), surfaces=self.surfaces[:needed])
+        return replace(
+            self, count=count, saved=min(self.saved, count), surfaces=self.surfaces[:needed]
+        )
 
 
 def _add_surfaces(
@@ -265,7 +273,9 @@ def _add_surfaces(
     """Return surfaces (n,) with those added, unless equal to the last one, and the numbers of the latter."""
     numbers = []
     for surface in added:
-        if not (surfaces and (surfaces[-1] is surface or surfaces[-1].tobytes() == surface.tobytes())):
+        if not (
+            surfaces and (surfaces[-1] is surface or surfaces[-1].tobytes() == surface.tobytes())
+        ):
             surfaces = (*surfaces, surface)
         numbers.append(len(surfaces) - 1)
     return surfaces, np.array(numbers, np.float64)
@@ -333,7 +343,9 @@ def follow_path(
         monitor, errors = accuracy.catch_up(monitor, state, len(path) - 1)
     recording = session.recording and session.recording.extend(path[1:], tick, orders)
     errors = errors or session.errors
-    return replace(session, state=state, poses=path[-1], recording=recording, monitor=monitor, errors=errors)
+    return replace(
+        session, state=state, poses=path[-1], recording=recording, monitor=monitor, errors=errors
+    )
 
 
 def start_recording(session: Session, now: bytes, tick: int = 0, room: int = 255) -> Session:

@@ -9,14 +9,14 @@ from ..engine.state import Rows
 from ..scene.recorder import CHUNK, Recorder
 from ..scene.schema import Scene
 
-#: Bytes per row and cell: height, force and command as float64, mode as int8, and one while the metrics are
-#: computed, for the rows in which a cell follows the force.
+#: Bytes per row and cell: height, force and command as float64, mode as int8, and one while the
+#: metrics are computed, for the rows in which a cell follows the force.
 BYTES_A_CELL = 3 * 8 + 1 + 1
 #: Bytes per cell besides its state's rows: position (2 float64), age (float64), mode (int8).
 BYTES_BESIDE = 2 * 8 + 8 + 1
-#: Bytes per cell of a recorded session while the metrics are computed, for any number of rows; per active
-#: cell in a control period; and for its rows that wait to be written (measured: about three times their
-#: size, `CHUNK` rows of 25 bytes).
+#: Bytes per cell of a recorded session while the metrics are computed, for any number of rows; per
+#: active cell in a control period; and for its rows that wait to be written (measured: about three
+#: times their size, `CHUNK` rows of 25 bytes).
 BYTES_JUDGED, BYTES_BUSY, BYTES_WAITING = 100, 850, 3 * 25 * CHUNK
 #: Bytes of memory that are assumed if the system does not tell.
 ASSUMED_MEMORY = 8 * 2**30
@@ -30,10 +30,14 @@ def count_busy_cells(scene: Scene) -> int:
 def check_memory(scene: Scene, rows: Rows) -> None:
     """Refuse a session that memory cannot hold, before it starts; ParameterError names the remedy."""
     busy = count_busy_cells(scene)
-    refuse_what_cannot_fit(scene.recorder, rows, scene.cells, scene.periods, measure_available_memory(), busy)
+    refuse_what_cannot_fit(
+        scene.recorder, rows, scene.cells, scene.periods, measure_available_memory(), busy
+    )
 
 
-def count_bytes_needed(recorder: Recorder | None, rows: Rows, cells: int, periods: int, busy: int = 0) -> int:
+def count_bytes_needed(
+    recorder: Recorder | None, rows: Rows, cells: int, periods: int, busy: int = 0
+) -> int:
     """Return the approximate memory of a session, bytes, with at most `busy` active cells."""
     each_cell = 8 * rows.count + BYTES_BESIDE
     at_work = BYTES_BUSY
@@ -68,7 +72,9 @@ def refuse_what_cannot_fit(
     spare = (available - begun) // (cells * BYTES_A_CELL)
     if recorder is None or spare < 2:
         rule = f"must be few enough for {memory}"
-        raise ParameterError("layout", "rows * columns", rule, f"{cells} cells, {alone / 1e9:.3g} GB")
+        raise ParameterError(
+            "layout", "rows * columns", rule, f"{cells} cells, {alone / 1e9:.3g} GB"
+        )
     rule = f"must be at least {-(-periods // (spare - 1))} for the history to fit into {memory}"
     value = f"{recorder.every}: {recorder.rows(periods)} rows of {cells} cells are {needed / 1e9:.3g} GB"
     raise ParameterError("recorder", "every", rule, value)

@@ -48,8 +48,8 @@ def steps(scene: Scene) -> Iterator[Step]:
     Returns
     -------
     iterator of Step
-        One for each control period, in its order: ``time``, s; ``height`` (n,), m; ``force`` (n,), N;
-        ``finger_forces`` (f,), N; ``mode`` (n,).
+        One for each control period, in its order: ``time``, s; ``height`` (n,), m; ``force`` (n,),
+        N; ``finger_forces`` (f,), N; ``mode`` (n,).
 
     Raises
     ------
@@ -61,7 +61,9 @@ def steps(scene: Scene) -> Iterator[Step]:
     def play() -> Iterator[Step]:
         for state in periods(system, scene.trajectories(), begin(system), scene.periods):
             height, force = state.row(0), state.row(system.rows.force)
-            yield Step(state.period * system.period, height, force, state.finger_forces(), state.mode())
+            yield Step(
+                state.period * system.period, height, force, state.finger_forces(), state.mode()
+            )
 
     return play()
 
@@ -77,15 +79,17 @@ def require_scene(scene: object) -> Scene:
 def force(scene: Scene, pose: ArrayLike) -> Floats:
     """Return the force of a finger on each pin of a bed whose pins are held at their rest height.
 
-    It is the elastic force of the first instant, ``F = f_d (b / m) (exp(m (δ - x0)) - 1)`` of the indentation
-    δ (equation 11); held on, it falls as ``G(t) F`` (equation 12, with the scene's ``relaxation``).
+    It is the elastic force of the first instant, ``F = f_d (b / m) (exp(m (δ - x0)) - 1)`` of the
+    indentation δ (equation 11); held on, it falls as ``G(t) F`` (equation 12, with the scene's
+    ``relaxation``).
 
     Parameters
     ----------
     scene : Scene
         With one finger. Control, valves and paths have no effect.
     pose : array_like, (3,) or (7,)
-        Lowest point of the finger, m, and its quaternion w, x, y, z; without one the finger is level.
+        Lowest point of the finger, m, and its quaternion w, x, y, z; without one the finger is
+        level.
 
     Returns
     -------
@@ -95,8 +99,8 @@ def force(scene: Scene, pose: ArrayLike) -> Floats:
     Raises
     ------
     DigiclayError
-        Without a fingertip or with several; for a pose of other than 3 or 7 finite numbers; for a finger
-        deeper in the bed than half its thickness. The law was measured up to 2 N and 3 mm.
+        Without a fingertip or with several; for a pose of other than 3 or 7 finite numbers; for a
+        finger deeper in the bed than half its thickness. The law was measured up to 2 N and 3 mm.
     """
     cell, bed = make_motion(require_scene(scene)).cell, make_grid(scene.layout)
     if cell.touch is None:
@@ -108,7 +112,9 @@ def force(scene: Scene, pose: ArrayLike) -> Floats:
     under = compute_underside(*forms, bed.compute_basis(np.arange(bed.count)))[0]
     depth, thickness = scene.actuator.rest_height - float(under.min()), cell.touch.fingertip.height
     if depth > thickness:
-        raise ParameterError("force", "pose", f"must press at most {thickness:g} m deep", f"{depth:g} m")
+        raise ParameterError(
+            "force", "pose", f"must press at most {thickness:g} m deep", f"{depth:g} m"
+        )
     state = np.zeros((cell.rows, bed.count))
     state[0] = scene.actuator.rest_height
     return find_contact_force(cell, state, under)
@@ -117,8 +123,8 @@ def force(scene: Scene, pose: ArrayLike) -> Floats:
 def free_speed(scene: Scene) -> Speeds:
     """Return the speeds of a pin without load behind a fully open valve.
 
-    They are ``q / A_a`` (equation 1) of the flow q at the opening K = -1 or 1 under the pressure of its
-    reservoir (equations 6 and 7), with the conduit, if the scene has one.
+    They are ``q / A_a`` (equation 1) of the flow q at the opening K = -1 or 1 under the pressure of
+    its reservoir (equations 6 and 7), with the conduit, if the scene has one.
 
     Parameters
     ----------
@@ -158,9 +164,9 @@ class ValveStep(Parameters):
 def step_response(scene: Scene, command: float, duration: float = 0.1) -> Response:
     """Return how a pin without load rises or falls after a step of its valve command.
 
-    After the dead time t_d the opening follows ``τ_v dK/dt + K = K_com`` (equation 9), and the height
-    ``dH/dt = q(K) / A_a`` (equations 1, 6 and 7), up to the end stops. It is integrated as a run, with at
-    least four steps in each of the run's.
+    After the dead time t_d the opening follows ``τ_v dK/dt + K = K_com`` (equation 9), and the
+    height ``dH/dt = q(K) / A_a`` (equations 1, 6 and 7), up to the end stops. It is integrated as a
+    run, with at least four steps in each of the run's.
 
     Parameters
     ----------
@@ -183,7 +189,9 @@ def step_response(scene: Scene, command: float, duration: float = 0.1) -> Respon
     """
     step = ValveStep(command=command, duration=duration)
     nothing = Finger(None, None, None, Path(waypoints=(Waypoint(),)))
-    simulation = reference_settings(replace(require_scene(scene).simulation, duration=step.duration))
+    simulation = reference_settings(
+        replace(require_scene(scene).simulation, duration=step.duration)
+    )
     single = Layout(rows=1, columns=1, pitch=scene.layout.pitch)
     parts: Any = dict.fromkeys(("control", "blister", "shape", "sensors", "recorder"))
     pin = replace(scene, layout=single, fingers=(nothing,), simulation=simulation, **parts)

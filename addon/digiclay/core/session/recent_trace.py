@@ -95,7 +95,8 @@ def exceeds_law(system: System, state: State, pose: Floats) -> bool:
     force, felt = near.force.sum(), near.force > 0.0
     if force > MOST_FORCE:
         return True
-    # Two cheap bounds: the fingertip is above its lowest point, and within a ball that touches it there.
+    # Two cheap bounds: the fingertip is above its lowest point, and within a ball that touches it
+    # there.
     depth = near.height[felt] - pose[2]
     if depth.max(initial=0.0) > MOST_INDENTATION:
         aside = near.quadratic_basis[1:3, felt].T - pose[:2]
@@ -107,7 +108,9 @@ def exceeds_law(system: System, state: State, pose: Floats) -> bool:
     return bool(np.any(is_beyond(force, find_indentations(fingertip, row))))
 
 
-def sample(system: System, state: State, set_point: SetPoint | None, pins: Sequence[int]) -> list[float]:
+def sample(
+    system: System, state: State, set_point: SetPoint | None, pins: Sequence[int]
+) -> list[float]:
     """Return a row of a trace for a state; `pins`: whose heights are traced."""
     active = state.active
     heights = [math.nan] * PICKED
@@ -115,7 +118,12 @@ def sample(system: System, state: State, set_point: SetPoint | None, pins: Seque
         (at,) = np.nonzero(active.cells == pin)
         heights[column] = float(active.block[0, at[0]] if at.size else state.rows[0, pin])
     wanted = find_set_point(set_point, np.count_nonzero(active.mode == FORCE_FOLLOW))
-    row = [state.period * system.period, measure_total_force(system, state), float(wanted), *heights]
+    row = [
+        state.period * system.period,
+        measure_total_force(system, state),
+        float(wanted),
+        *heights,
+    ]
     return [*row, *state.finger_forces().tolist()] if system.fingers > 1 else row
 
 

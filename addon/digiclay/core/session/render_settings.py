@@ -27,9 +27,13 @@ class Picture(Parameters):
 
     width: int = quantity(960, "width in pixels", at_least=16, at_most=16384)
     height: int = quantity(600, "height in pixels", at_least=16, at_most=16384)
-    engine: str = quantity("workbench", "renderer: quick and plain, or with soft shadows", choices=ENGINES)
+    engine: str = quantity(
+        "workbench", "renderer: quick and plain, or with soft shadows", choices=ENGINES
+    )
     samples: int = quantity(6, "samples per pixel (cycles)", at_least=1, at_most=65536)
-    color: str = quantity("mode", "whether pins show their control mode or the force on them", choices=COLORS)
+    color: str = quantity(
+        "mode", "whether pins show their control mode or the force on them", choices=COLORS
+    )
     arrows: bool = quantity(False, "whether arrows show the force on each pin")
 
 
@@ -76,11 +80,19 @@ class Film(Moving):
     """Session, or a part of it, from its recorded states."""
 
     arrows: bool = quantity(True, "whether arrows show the force on each pin")
-    strip: bool = quantity(True, "whether a strip in the picture shows the force of each fingertip over time")
+    strip: bool = quantity(
+        True, "whether a strip in the picture shows the force of each fingertip over time"
+    )
     speed: float = quantity(1.0, "simulated seconds per second of film", at_least=1e-3, at_most=1e3)
-    start: float = quantity(0.0, "simulated time of the first frame", unit="s", at_least=0.0, at_most=1e6)
+    start: float = quantity(
+        0.0, "simulated time of the first frame", unit="s", at_least=0.0, at_most=1e6
+    )
     stop: float = quantity(
-        0.0, "simulated time of the last frame; 0: the session's end", unit="s", at_least=0.0, at_most=1e6
+        0.0,
+        "simulated time of the last frame; 0: the session's end",
+        unit="s",
+        at_least=0.0,
+        at_most=1e6,
     )
 
     def count(self, time: Sequence[float] | Floats) -> int:

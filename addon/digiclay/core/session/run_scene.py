@@ -18,7 +18,14 @@ from ..base.errors import OutputError, explain_os_error
 from ..engine.simulation import Progress, Stopped, begin, periods
 from ..engine.system import System
 from ..files.tables import Described, Record, Table
-from ..metrics.metric_table import ERRORS, METRICS, RUN, describe_errors, describe_losses, describe_time
+from ..metrics.metric_table import (
+    ERRORS,
+    METRICS,
+    RUN,
+    describe_errors,
+    describe_losses,
+    describe_time,
+)
 from ..metrics.summary import (
     compute_metrics,
     compute_weights,
@@ -42,7 +49,10 @@ from .memory_limit import check_memory
 History = dict[str, Array]
 
 #: Metrics of every run with a history.
-RUN_METRICS = {**METRICS, **{name: RUN[name] for name in ("losses", "run_time", "real_time_factor")}}
+RUN_METRICS = {
+    **METRICS,
+    **{name: RUN[name] for name in ("losses", "run_time", "real_time_factor")},
+}
 
 
 class Contact(NamedTuple):
@@ -117,7 +127,8 @@ class Result(Described):
         beyond = self.metrics.get("beyond_a_finger")
         rows, pins = len(self.history.get("time", ())), self.scene.cells
         return {
-            "time": describe_time(self.metrics) + (", stopped before its end" if self.incomplete else ""),
+            "time": describe_time(self.metrics)
+            + (", stopped before its end" if self.incomplete else ""),
             "force": self._describe_force() or reached,
             "errors": describe_errors(self.metrics),
             **({"caution": beyond} if beyond else {}),
@@ -140,7 +151,9 @@ class Result(Described):
         if rfd is not None:
             felt = f"RFD {rfd:.2g} N{self._name_worst()}"
         if self.metrics.get("rfd_jnd_least") is not None:
-            felt += f" ({self.metrics['rfd_jnd_least']:.2g} to {self.metrics['rfd_jnd_most']:.2g} JND)"
+            felt += (
+                f" ({self.metrics['rfd_jnd_least']:.2g} to {self.metrics['rfd_jnd_most']:.2g} JND)"
+            )
         return ", ".join(filter(None, (felt, describe_losses(self.metrics))))
 
     def _name_worst(self) -> str:
@@ -223,7 +236,9 @@ def evaluate(
     if depths:
         depth = np.max(depths, axis=0)
         metrics["max_indentation"] = float(depth.max())
-        metrics["beyond_a_finger"] = describe_excess(metrics["max_total_force"], metrics["max_indentation"])
+        metrics["beyond_a_finger"] = describe_excess(
+            metrics["max_total_force"], metrics["max_indentation"]
+        )
         if metrics["beyond_a_finger"]:
             pressing = history.get("finger_force", history["total_force"][:, None])
             history["beyond_a_finger"] = is_beyond(pressing.max(axis=1), depth)
@@ -279,14 +294,17 @@ def run(
 ) -> Result:
     """Run a scene from rest to its end.
 
-    `progress`: called after each control period with the number done and the number of all; `stopped`: called
-    then too; when it returns True, the result is that so far; `versions`: further versions to note. Raises
-    ParameterError when the session does not fit in memory, DivergenceError when the integration diverges.
+    `progress`: called after each control period with the number done and the number of all;
+    `stopped`: called then too; when it returns True, the result is that so far; `versions`: further
+    versions to note. Raises ParameterError when the session does not fit in memory, DivergenceError
+    when the integration diverges.
     """
     system = assemble(scene)
     check_memory(scene, system.rows)
     start = begin(system)
-    recording = RunRecording(scene.recorder, system.rows, start, scene.periods) if scene.recorder else None
+    recording = (
+        RunRecording(scene.recorder, system.rows, start, scene.periods) if scene.recorder else None
+    )
     started = time.perf_counter()
     for state in periods(system, scene.trajectories(), start, scene.periods):
         if recording:

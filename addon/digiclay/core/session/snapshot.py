@@ -66,7 +66,9 @@ def _rebuild_like(template: Any, stored: Any, arrays: list[Array]) -> Any:
         name, *items = stored
         if name != kind.__name__:
             raise ValueError("another named tuple")
-        like = [_rebuild_like(part, item, arrays) for part, item in zip(template, items, strict=True)]
+        like = [
+            _rebuild_like(part, item, arrays) for part, item in zip(template, items, strict=True)
+        ]
         return kind(*like) if hasattr(kind, "_fields") else kind(like)
     if template is None:
         if stored is not None:
@@ -88,13 +90,13 @@ def _check_number(template: object, number: object) -> None:
         raise ValueError("a number that is too large")
 
 
-#: First bytes of a snapshot, with the version of its format. The first version had one fingertip, not in a
-#: list.
+#: First bytes of a snapshot, with the version of its format. The first version had one fingertip,
+#: not in a list.
 START, FIRST = b"digiclay state 2\n", b"digiclay state 1\n"
 #: Types of the arrays, by their names in `State` and `ActiveSet`.
 ARRAYS = {"rows": "<f8", "modes": "i1", "aged": "<f8", "cells": "<i8", "block": "<f8", "mode": "i1"}
-#: Arrays of which, with several fingers, only values other than 0 are written: at most one finger presses
-#: most cells.
+#: Arrays of which, with several fingers, only values other than 0 are written: at most one finger
+#: presses most cells.
 THIN = ("rows", "block")
 #: Tolerance of rounding beyond the ends of a height, m, or an opening.
 SLACK = 1e-6
@@ -120,11 +122,16 @@ def dump(system: System, state: State) -> bytes:
     arrays: list[Array] = []
     memory = flatten(state.memory, arrays)
     values = state.rows, state.modes, state.aged, active.cells, active.block, active.mode
-    body = [np.ascontiguousarray(array, kind) for array, kind in zip(values, ARRAYS.values(), strict=True)]
+    body = [
+        np.ascontiguousarray(array, kind)
+        for array, kind in zip(values, ARRAYS.values(), strict=True)
+    ]
     thin = []
     for number, name in enumerate(ARRAYS):
         if name in THIN and system.fingers > 1:
-            filled = body[number].view("<i8").reshape(-1) != 0  # by their bits, as -0.0 is to be restored
+            filled = (
+                body[number].view("<i8").reshape(-1) != 0
+            )  # by their bits, as -0.0 is to be restored
             body[number] = body[number].reshape(-1)[filled]
             thin.append(body[number].size)
             arrays.append(np.packbits(filled))
@@ -138,7 +145,9 @@ def dump(system: System, state: State) -> bytes:
             "cells": active.cells.size,
             "near": active.near,
             "fingers": [{"reach": reach} for reach in _list_discs(active.reach, system.fingers)],
-            "control": active.control if system.fingers == 1 else _list_discs(active.control, system.fingers),
+            "control": active.control
+            if system.fingers == 1
+            else _list_discs(active.control, system.fingers),
             "peak": active.peak,
             "until": active.until,
         },
@@ -235,13 +244,19 @@ def _read(data: bytes) -> Snapshot:
         if end != len(data):
             raise _make_error(f"must have {end} bytes and has {len(data)}")
         numbers = [header["peak"], gathered["peak"], header["control_period"]]
-        numbers += [read_count(value) for value in (header["period"], gathered["until"], gathered["near"])]
-        numbers += [number for discs in _read_discs(gathered) for disc in discs for number in disc or ()]
+        numbers += [
+            read_count(value) for value in (header["period"], gathered["until"], gathered["near"])
+        ]
+        numbers += [
+            number for discs in _read_discs(gathered) for disc in discs for number in disc or ()
+        ]
         stored = Snapshot(header, dict(zip(ARRAYS, arrays, strict=False)), arrays[len(ARRAYS) :])
         for name, bits in zip(thin, stored.memory[len(stored.memory) - len(thin) :], strict=True):
             stored.arrays[name] = _fill(stored.arrays[name], bits, whole[name])
         # An empty memory is None; a missing one is damage.
-        sound = "memory" in header and gathered["near"] <= taken and all(map(math.isfinite, numbers))
+        sound = (
+            "memory" in header and gathered["near"] <= taken and all(map(math.isfinite, numbers))
+        )
     except (ValueError, KeyError, TypeError, IndexError, OverflowError, RecursionError) as error:
         raise _make_error(f"is damaged: {type(error).__name__}") from None
     if not sound or not _is_sound(stored, cells):
@@ -259,7 +274,9 @@ def _fill(values: Array, bits: Array, shape: tuple[int, ...]) -> Floats:
     return whole.reshape(shape)
 
 
-def _read_arrays(data: bytes, at: int, shapes: list[tuple[str, tuple[int, ...]]]) -> tuple[list[Array], int]:
+def _read_arrays(
+    data: bytes, at: int, shapes: list[tuple[str, tuple[int, ...]]]
+) -> tuple[list[Array], int]:
     """Return copies of the arrays in `data` from byte `at` on, and the byte after them."""
     arrays = []
     for name, shape in shapes:
@@ -277,7 +294,9 @@ def _is_sound(stored: Snapshot, count: int) -> bool:
     cells = arrays["cells"]
     return bool(
         all((np.abs(arrays[name]) < LARGEST).all() for name in ("rows", "aged", "block"))
-        and all(((arrays[name] >= 0) & (arrays[name] < len(Mode))).all() for name in ("modes", "mode"))
+        and all(
+            ((arrays[name] >= 0) & (arrays[name] < len(Mode))).all() for name in ("modes", "mode")
+        )
         and ((cells >= 0) & (cells < count)).all()
         and np.unique(cells).size == cells.size
     )
@@ -300,13 +319,18 @@ def _read_discs(gathered: Record) -> tuple[list[Disc | None], list[Disc | None]]
     """Return the discs that the fingers may touch, and the controlled discs."""
     fingers = gathered["fingers"]
     controls = gathered["control"] if len(fingers) > 1 else [gathered["control"]]
-    return [_read_disc(finger["reach"]) for finger in fingers], [_read_disc(disc) for disc in controls]
+    return [_read_disc(finger["reach"]) for finger in fingers], [
+        _read_disc(disc) for disc in controls
+    ]
 
 
-def change_fingers(former: System, system: System, state: State, origins: Sequence[int | None]) -> State:
+def change_fingers(
+    former: System, system: System, state: State, origins: Sequence[int | None]
+) -> State:
     """Return a state for another number of fingers, of beds and methods that are otherwise the same.
 
-    `origins`: for each finger the number of the former one it was; None: it is new. Overwrites `state`.
+    `origins`: for each finger the number of the former one it was; None: it is new. Overwrites
+    `state`.
     """
     former.selection.release(state)
     fresh, old, new = begin(system), former.rows, system.rows
@@ -317,11 +341,15 @@ def change_fingers(former: System, system: System, state: State, origins: Sequen
     pressing = state.rows[old.pressing] if old.fingers else state.rows[old.force][None]
     rows[new.force] = sum(pressing[origin] for origin in origins if origin is not None)
     rows[new.sensed] = state.rows[old.sensed]
-    _take_fingers(rows[system.cell.pulp_rows], state.rows[former.cell.pulp_rows], former.fingers, origins)
+    _take_fingers(
+        rows[system.cell.pulp_rows], state.rows[former.cell.pulp_rows], former.fingers, origins
+    )
     # Behind the display of a shape stands the memory of the method.
     after, before = (getattr(memory, "method", memory) for memory in (fresh.memory, state.memory))
     if isinstance(after, Hands) or isinstance(before, Hands):
-        begun, had = (list(each.fingers) if isinstance(each, Hands) else [each] for each in (after, before))
+        begun, had = (
+            list(each.fingers) if isinstance(each, Hands) else [each] for each in (after, before)
+        )
         # A controller with other rows per cell begins anew.
         if new.control * former.fingers == old.control * system.fingers:
             _take_fingers(rows[new.controlled], state.rows[old.controlled], former.fingers, origins)

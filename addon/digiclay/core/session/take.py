@@ -32,10 +32,10 @@ from .live_session import AWAY, Recording, simulate_path
 STRAIGHT = 1e-12
 #: The arrays of a take.
 PARTS = ("scene", "start", "poses", "end")
-#: Versions of the format: 1, which is not written down, has poses (t + 1, 7) of one finger; 2 has (t + 1,
-#: f, 7); 3 also has the array `SMOOTHING` (t, 4), orders that smooth; 4 has orders (t, 5) and their
-#: surfaces (s, n) instead; 5 has more fingers than the scene. A take with neither is written as 2, which
-#: older releases read.
+#: Versions of the format: 1, which is not written down, has poses (t + 1, 7) of one finger; 2 has
+#: (t + 1, f, 7); 3 also has the array `SMOOTHING` (t, 4), orders that smooth; 4 has orders (t, 5)
+#: and their surfaces (s, n) instead; 5 has more fingers than the scene. A take with neither is
+#: written as 2, which older releases read.
 PLAIN, ORDERED, VERSION = 2, 4, 5
 SMOOTHING, ORDERS, SURFACES = "smoothing", "orders", "surfaces"
 #: Most parts of a physics step in a replay.
@@ -46,8 +46,8 @@ MOST_PARTS = 64
 class Take:
     """Stretch of a session.
 
-    Raises ParameterError when there is no period, a pose is not finite, the scene has another number of
-    fingers, or the orders are invalid.
+    Raises ParameterError when there is no period, a pose is not finite, the scene has another
+    number of fingers, or the orders are invalid.
     """
 
     scene: Scene
@@ -69,13 +69,20 @@ class Take:
         if not sized or kind != np.float64:
             rule = f"must have at least one control period of {fingers} x 7 numbers, one pose per finger"
             raise ParameterError("Take", "poses", rule, f"an array of the shape {shape} of {kind}")
-        sound = (np.abs(self.poses) <= FARTHEST) & (np.abs(self.poses[..., 3:]).max(2) > 0.1)[..., None]
+        sound = (np.abs(self.poses) <= FARTHEST) & (np.abs(self.poses[..., 3:]).max(2) > 0.1)[
+            ..., None
+        ]
         if not sound.all():
             rule = "must be finite numbers, quaternions not 0"
-            raise ParameterError("Take", "poses", rule, f"row {int(np.argwhere(~sound)[0][0])} is not")
+            raise ParameterError(
+                "Take", "poses", rule, f"row {int(np.argwhere(~sound)[0][0])} is not"
+            )
         if self.orders is None:
             return
-        pins, stroke = self.scene.layout.rows * self.scene.layout.columns, self.scene.actuator.stroke
+        pins, stroke = (
+            self.scene.layout.rows * self.scene.layout.columns,
+            self.scene.actuator.stroke,
+        )
         fault = find_fault(self.orders, self.periods, pins, stroke)
         if fault:
             rule = (
@@ -212,7 +219,9 @@ def from_bytes(data: bytes) -> Take:
             # `to_bytes` does not compress: a take unpacks to at most its own size.
             size = sum(head.size for head in heads.values())
             if size > len(data):
-                raise ValueError(f"it must unpack to at most its own {len(data):,} bytes (got {size:,})")
+                raise ValueError(
+                    f"it must unpack to at most its own {len(data):,} bytes (got {size:,})"
+                )
             parts = {name: read_array(archive, name) for name in names}
         scene, start, poses, end = (parts[name] for name in PARTS)
         if "version" not in parts:
@@ -221,7 +230,15 @@ def from_bytes(data: bytes) -> Take:
             raise ValueError(f"its version must be at most {VERSION} (got {parts['version']})")
         resolved = resolve(parse_tables(scene.tobytes().decode()))
         return Take(resolved, start.tobytes(), poses, end.tobytes(), _read_orders(parts))
-    except (OSError, EOFError, LookupError, ValueError, TypeError, ArithmeticError, *BROKEN_ZIP) as error:
+    except (
+        OSError,
+        EOFError,
+        LookupError,
+        ValueError,
+        TypeError,
+        ArithmeticError,
+        *BROKEN_ZIP,
+    ) as error:
         raise OutputError(f"The take is damaged and cannot be read: {error}.") from None
 
 

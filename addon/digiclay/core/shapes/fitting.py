@@ -70,7 +70,9 @@ def unpack(text: str, grid: Grid) -> Floats:
     if len(data) != wanted:
         plan = grid.layout
         rule = f"must hold the heights of the bed's {plan.rows} x {plan.columns} cells"
-        got = f"{len(data) // 4} heights" if len(data) < wanted else f"more than {grid.count} heights"
+        got = (
+            f"{len(data) // 4} heights" if len(data) < wanted else f"more than {grid.count} heights"
+        )
         raise ParameterError("shape", "heights", rule, got, HINT)
     heights = np.frombuffer(data, "<f4").astype(np.float64)
     if not np.all(np.isfinite(heights)):
@@ -170,7 +172,9 @@ def _placement(shape: Shape, relief: Relief, grid: Grid) -> Placement:
     }
     factor_x, factor_y = (factor * shape.scale for factor in factors[shape.fit])
     middle_x, middle_y = left + wide / 2, front + deep / 2
-    return Placement(factor_x, factor_y, shape.x - middle_x * factor_x, shape.y - middle_y * factor_y)
+    return Placement(
+        factor_x, factor_y, shape.x - middle_x * factor_x, shape.y - middle_y * factor_y
+    )
 
 
 def _heights(shape: Shape, relief: Relief, at: Placement, tops: Tops, actuator: Actuator) -> Floats:
@@ -181,14 +185,16 @@ def _heights(shape: Shape, relief: Relief, at: Placement, tops: Tops, actuator: 
         return np.where(tops.covered, tops.value * relief.value_length, foot)
     seen = tops.value[tops.covered]
     low, high = float(seen.min()), float(seen.max())
-    # A fully covered bed displays only the top surface; a shape that stands on the bed also shows its sides.
+    # A fully covered bed displays only the top surface; a shape that stands on the bed also shows
+    # its sides.
     if relief.underside is not None and not tops.covered.all():
         low = relief.underside
     if shape.relief == "true":
         if relief.value_length is None:
             rule = "must be rise or stroke for a picture: its values are not lengths"
             raise ParameterError("shape", "relief", rule, f"'true' for {relief.name}")
-        # A shape with a length in plan keeps its proportions; other heights are lengths of their own.
+        # A shape with a length in plan keeps its proportions; other heights are lengths of their
+        # own.
         factor = relief.value_length
         if relief.length is not None:
             factor *= math.sqrt(at.factor_x * at.factor_y) / relief.length

@@ -31,7 +31,8 @@ ALPHA, FORMAT, NO_DATA = 338, 339, 42113
 ITEMS = {2: 1, 3: 2, 4: 4, 16: 8}
 #: Most tags of a picture that are read, those of a TIFF that is not a BigTIFF.
 MOST_TAGS = 0xFFFF
-#: First bytes of a TIFF, of which BigTIFF has 43; its order of bytes; its offsets, count of tags, and tag.
+#: First bytes of a TIFF, of which BigTIFF has 43; its order of bytes; its offsets, count of tags,
+#: and tag.
 TIFFS = {
     b"II\x2a\0": ("<", "I", "H", "HHI4s"),
     b"MM\0\x2a": (">", "I", "H", "HHI4s"),
@@ -153,8 +154,8 @@ GRAY, COLORED = ("1", "L", "I", "I;16", "I;16B", "I;16L", "F"), ("LA", "RGB", "R
 BRIGHTNESS = np.array([0.299, 0.587, 0.114], np.float32)
 #: Most pixels of a picture: 16 000 x 8 000. docs/shapes.md has the memory that each needs.
 MOST = 128_000_000
-#: Readers of pictures in place of Pillow; the last one is used. They return the channels of the pixels as in
-#: the file, (rows, columns, channels), the lowest row first.
+#: Readers of pictures in place of Pillow; the last one is used. They return the channels of the
+#: pixels as in the file, (rows, columns, channels), the lowest row first.
 READERS: list[Callable[[Path], Pixels]] = []
 
 
@@ -220,7 +221,10 @@ def _read_by_pillow(path: Path, tags: Mapping[int, Any]) -> Pixels:
         hint = "Run 'pip install digiclay[images]'."
         raise ParameterError("shape", "file", rule, str(path), hint) from None
     image.init()  # else the named formats would not be registered
-    for order, raw in ((b"II", "F;64F"), (b"MM", "F;64BF")):  # Pillow can unpack them, but does not list them
+    for order, raw in (
+        (b"II", "F;64F"),
+        (b"MM", "F;64BF"),
+    ):  # Pillow can unpack them, but does not list them
         tiff.OPEN_INFO[order, 1, (3,), 1, (64,), ()] = "F", raw
     several = tags.get(PLANES) == 2 and tags.get(CHANNELS, 1) > 1
     if tags.get(BITS, 8) > 8 and (several or tags.get(PHOTOMETRIC) == 0):
@@ -238,7 +242,9 @@ def _read_by_pillow(path: Path, tags: Mapping[int, Any]) -> Pixels:
         except image.DecompressionBombError:
             raise _make_size_error(path, "too many pixels to open") from None
         except image.UnidentifiedImageError:
-            kind = f"{tags[CHANNELS]} channels of {tags.get(BITS, 1)} bits" if CHANNELS in tags else ""
+            kind = (
+                f"{tags[CHANNELS]} channels of {tags.get(BITS, 1)} bits" if CHANNELS in tags else ""
+            )
             reason = f"a TIFF of {kind}, unknown to Pillow" if kind else "not a picture, or cut off"
         except OSError as error:
             reason = error.strerror or "not a picture, or cut off"
@@ -267,7 +273,9 @@ def _read_levels(open_picture: Callable[[], Any], path: Path) -> Pixels:
         return high
     # Pillow keeps the higher byte of a color; read in the other byte order, that is the lower one.
     with open_picture() as opened:
-        _set_raw(opened, lambda raw: raw.replace("a;", "A;")[:-1] + ("L" if raw[-1] == "B" else "B"))
+        _set_raw(
+            opened, lambda raw: raw.replace("a;", "A;")[:-1] + ("L" if raw[-1] == "B" else "B")
+        )
         levels: Pixels = high.astype(np.uint16) << 8 | np.asarray(opened)
     return levels[..., :3] if "a;" in raw else levels  # colors multiplied by alpha need no alpha
 
@@ -276,7 +284,9 @@ def _set_raw(opened: Any, change: Callable[[str], str]) -> str:
     """Change how Pillow unpacks the bytes of a picture; return the name of the former format."""
     former: list[str] = [args if isinstance(args, str) else args[0] for *_, args in opened.tile]
     opened.tile = [
-        tile._replace(args=change(raw) if isinstance(tile.args, str) else (change(raw), *tile.args[1:]))
+        tile._replace(
+            args=change(raw) if isinstance(tile.args, str) else (change(raw), *tile.args[1:])
+        )
         for tile, raw in zip(opened.tile, former, strict=True)
     ]
     return former[0]
@@ -288,7 +298,9 @@ def _find_brightness(levels: Pixels) -> Pixels:
         return levels
     bright = np.empty(levels.shape[:2], np.float32)
     full = np.float32(1.0 if levels.dtype.kind == "f" else np.iinfo(levels.dtype).max)
-    for row, line in zip(levels, bright, strict=True):  # all at once would take many times the memory
+    for row, line in zip(
+        levels, bright, strict=True
+    ):  # all at once would take many times the memory
         line[:] = row[:, :3] @ BRIGHTNESS if row.shape[1] > 2 else row[:, 0]
         if row.shape[1] in (2, 4):
             line *= row[:, -1] / full

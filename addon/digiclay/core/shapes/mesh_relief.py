@@ -21,8 +21,8 @@ ROUNDS = 300
 
 def fill_holes(grid: Grid, value: Floats, missing: Flags) -> tuple[Floats, Flags]:
     """Return the values (n,), those over small holes interpolated from around, and which pins these are."""
-    # A hole is a group of neighboring pins that the surface misses, surrounded by pins under the surface: a
-    # group that reaches the rim of the bed is beside the shape.
+    # A hole is a group of neighboring pins that the surface misses, surrounded by pins under the
+    # surface: a group that reaches the rim of the bed is beside the shape.
     beside = grid.layout.find_neighbors(corners=False)
     number = np.flatnonzero(missing)
     position = np.full(grid.count + 1, -1)  # the last one, at -1, is beyond the rim
@@ -58,10 +58,12 @@ def _evened(value: Floats, hole: Flags, beside: Cells) -> Floats:
 
 #: Pairs of a ray and a triangle that are computed at a time.
 CHUNK = 2_000_000
-#: A pin over no triangle belongs to one that is at most this share of a pitch away: files round to float32 or
-#: to six digits, which moves the rim by up to a micrometer, and no pin is positioned so exactly.
+#: A pin over no triangle belongs to one that is at most this share of a pitch away: files round to
+#: float32 or to six digits, which moves the rim by up to a micrometer, and no pin is positioned so
+#: exactly.
 EDGE = 1e-3
-#: Faces of a mesh count as oriented outwards if more than this share of the pins sees an upper side.
+#: Faces of a mesh count as oriented outwards if more than this share of the pins sees an upper
+#: side.
 UPPER = 0.8
 #: Hits of a ray closer than this share of the mesh's height count as one.
 SAME = 1e-5
@@ -127,7 +129,8 @@ class ShapeMesh:
         same = SAME * float(np.ptp(self.used[:, 2]))
         new = np.append(True, (cell[1:] != cell[:-1]) | (np.diff(z) > same))[: cell.size]
         layers = np.bincount(cell[new], minlength=grid.count)
-        # A ray enters a closed mesh at its top and leaves it at its underside; it hits an open one once.
+        # A ray enters a closed mesh at its top and leaves it at its underside; it hits an open one
+        # once.
         overhang = layers > (2 if self.closed else 1)
         if self.closed:
             return Tops(value, covered, overhang)
@@ -138,7 +141,9 @@ class ShapeMesh:
         value, hole = fill_holes(grid, value, missing)
         return Tops(value, covered | hole, overhang & ~hole, int(np.count_nonzero(hole)))
 
-    def _hits(self, grid: Grid, at: Placement) -> Iterator[tuple[NDArray[np.intp], Floats, Flags, Flags]]:
+    def _hits(
+        self, grid: Grid, at: Placement
+    ) -> Iterator[tuple[NDArray[np.intp], Floats, Flags, Flags]]:
         """Yield cells whose rays hit or narrowly miss a triangle: height, whether hit, whether from above."""
         plan = self.vertices[:, :2] * (at.factor_x, at.factor_y) + (at.x, at.y)
         corners, z = plan[self.faces], self.vertices[self.faces, 2]
@@ -194,7 +199,9 @@ def _window(grid: Grid, low: Floats, high: Floats) -> tuple[Indices, Indices, In
     return first_row, last_row, first, last
 
 
-def make_shape_mesh(name: str, vertices: Floats, faces: Indices, up: str, length: float) -> ShapeMesh:
+def make_shape_mesh(
+    name: str, vertices: Floats, faces: Indices, up: str, length: float
+) -> ShapeMesh:
     """Make a shape of vertices (v, 3), `length` meters per unit, and faces (f, 3); `up`: a key of UPWARDS."""
     points, corners = np.asarray(vertices, np.float64), np.asarray(faces, np.int64)
     if points.ndim != 2 or points.shape[1:] != (3,) or corners.ndim != 2 or not corners.size:

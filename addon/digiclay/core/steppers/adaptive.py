@@ -20,8 +20,8 @@ from ..model.physics import Cell, Speeds, find_contact_force, find_speeds
 from .bernoulli import BernoulliExponential, BernoulliPlan
 from .richardson import bound
 
-#: A working block, the map to the fingertip's underside at the instants of a level's steps, and the movement
-#: of the block.
+#: A working block, the map to the fingertip's underside at the instants of a level's steps, and the
+#: movement of the block.
 Bound = tuple[Floats, Floats, Movement]
 
 #: Most halvings of a step.
@@ -99,11 +99,14 @@ class Adaptive:
             fine = _advance_copy(halves, start[:, open_cells], under[:, near])
             # Extrapolation is for errors of second order; that of a free cell is of fourth.
             gain = (fine[: cell.rows] - coarse[: cell.rows]) / 3.0
-            rows[: cell.rows, open_cells] = fine[: cell.rows] + gain * (share[open_cells] == PRESSED)
+            rows[: cell.rows, open_cells] = fine[: cell.rows] + gain * (
+                share[open_cells] == PRESSED
+            )
             off = np.abs(fine - coarse)
             wide = off[0] > plan.allowed * share[open_cells]
             wide |= (off[cell.pulp_rows] > plan.allowed_tension * PRESSED).any(axis=0)
-            # If a flow becomes turbulent or contact begins within a step, two levels may agree by accident.
+            # If a flow becomes turbulent or contact begins within a step, two levels may agree by
+            # accident.
             wide |= level < 2 and not plan.levels[0].laminar
             if not any_true(wide):
                 break
@@ -115,7 +118,11 @@ class Adaptive:
 def _prepare(plan: AdaptivePlan, level: int, shape: tuple[int, ...], near: int) -> Bound:
     """Return the working block of a shape, and its movement with the steps of a level."""
     block = np.empty(shape)
-    return block, plan.between[level], BernoulliExponential().prepare(plan.levels[level], block, near)
+    return (
+        block,
+        plan.between[level],
+        BernoulliExponential().prepare(plan.levels[level], block, near),
+    )
 
 
 def _advance_copy(bound: Bound, start: Floats, under: Floats) -> Floats:
@@ -126,7 +133,9 @@ def _advance_copy(bound: Bound, start: Floats, under: Floats) -> Floats:
     return block
 
 
-def _divided(segments: tuple[Segment, ...], parts: int, count: int) -> tuple[tuple[Segment, ...], Floats]:
+def _divided(
+    segments: tuple[Segment, ...], parts: int, count: int
+) -> tuple[tuple[Segment, ...], Floats]:
     """Return segments cut into equal parts, and the map from instants to their ends and middles."""
     cut: list[Segment] = []
     rows: list[Floats] = []
@@ -141,5 +150,9 @@ def _divided(segments: tuple[Segment, ...], parts: int, count: int) -> tuple[tup
 def _parabola(segment: Segment, part: float, count: int) -> Floats:
     """Return the weights of the period's instants in the parabola through a segment's three."""
     row = np.zeros(count)
-    row[list(segment.nodes)] = (1 - part) * (1 - 2 * part), 4 * part * (1 - part), part * (2 * part - 1)
+    row[list(segment.nodes)] = (
+        (1 - part) * (1 - 2 * part),
+        4 * part * (1 - part),
+        part * (2 * part - 1),
+    )
     return row

@@ -1,12 +1,12 @@
 """Closed-form stepper: exact for an exponential spring behind a linear flow resistance.
 
-The valve's opening is known in closed form for a whole period. Over a physics step its
-conductance, the force lost to relaxation and the fingertip's speed are frozen at their means, and
-the remaining equation is solved exactly (`closed_form`). The step is therefore stable at any length
-and stiffness, without iteration, and of second order. The largest error of frozen speeds, that the
-paths of a free pin and the finger are curved, is corrected by its mean, the chord deviation. A valve
-that changes reservoir within a step is no special case (conductance and drive are averaged at Gauss
-points of the exact opening), and contact with a cell begins and ends at the exact instant.
+The valve's opening is known in closed form for a whole period. Over a physics step its conductance,
+the force lost to relaxation and the fingertip's speed are frozen at their means, and the remaining
+equation is solved exactly (`closed_form`). The step is therefore stable at any length and
+stiffness, without iteration, and of second order. The largest error of frozen speeds, that the
+paths of a free pin and the finger are curved, is corrected by its mean, the chord deviation. A
+valve that changes reservoir within a step is no special case (conductance and drive are averaged at
+Gauss points of the exact opening), and contact with a cell begins and ends at the exact instant.
 """
 
 from __future__ import annotations
@@ -33,13 +33,14 @@ def _legendre(count: int) -> tuple[tuple[float, float], ...]:
     return tuple(zip((0.5 + 0.5 * nodes).tolist(), (0.5 * weights).tolist(), strict=True))
 
 
-#: Gauss points, nodes and weights, for a piece of at most this share of its step: a valve may open fully
-#: within a step, and only in part within a short piece.
+#: Gauss points, nodes and weights, for a piece of at most this share of its step: a valve may open
+#: fully within a step, and only in part within a short piece.
 POINTS = ((0.3, _legendre(2)), (0.6, _legendre(3)), (1.0, _legendre(4)))
 
-#: Largest chord deviation, in 1/m, at which a step is replaced by a straight one that is higher by it. A
-#: step without contact at its start, middle and end then has no mean tension, as it should: for a deviation
-#: b the mean is at most exp(b) (1 - exp(-3 b)) / (3 b) - 1, which is above 0 from b = 1.54 on.
+#: Largest chord deviation, in 1/m, at which a step is replaced by a straight one that is higher by
+#: it. A step without contact at its start, middle and end then has no mean tension, as it should:
+#: for a deviation b the mean is at most exp(b) (1 - exp(-3 b)) / (3 b) - 1, which is above 0 from b
+#: = 1.54 on.
 LARGEST_DEVIATION = 1.5
 
 
@@ -96,7 +97,9 @@ def _hard(cell: Cell, to_load: float, steepest: float) -> float:
     return min(0.5 * LARGE, turbulent, overflow)
 
 
-def _moves(supply: Supply, steps: Floats, deviations: Floats, decay: Floats, exponent: float) -> Floats:
+def _moves(
+    supply: Supply, steps: Floats, deviations: Floats, decay: Floats, exponent: float
+) -> Floats:
     """Return `BernoulliPlan.moves` from the weights (s, g) of free rise, chord deviation and decay."""
     middle, half = 0.5 * (supply.high + supply.low), 0.5 * (supply.high - supply.low)
     rows = [[middle * part, half * part] for part in (steps, exponent * steps, deviations)]
@@ -119,7 +122,8 @@ def _loaded(moves: Floats, path: Floats, offset: float) -> Floats:
 def _path(segments: tuple[Segment, ...]) -> Floats:
     """Return `BernoulliPlan.path`, in m.
 
-    A chord deviation is the mean above the line between the ends, here of the parabola through the middle.
+    A chord deviation is the mean above the line between the ends, here of the parabola through the
+    middle.
     """
     count = len(segments)
     path = np.zeros((3 * count + 1, segments[-1].nodes[-1] + 1))
@@ -131,7 +135,9 @@ def _path(segments: tuple[Segment, ...]) -> Floats:
     return path
 
 
-def _gauss_points(queue: Queue, segments: tuple[Segment, ...]) -> tuple[Floats, Floats, tuple[slice, ...]]:
+def _gauss_points(
+    queue: Queue, segments: tuple[Segment, ...]
+) -> tuple[Floats, Floats, tuple[slice, ...]]:
     """Return Gauss points of all steps: times and weights, s, and the slice of each step.
 
     The opening has a kink where the valve changes to the next command: a step with a kink has
@@ -145,7 +151,9 @@ def _gauss_points(queue: Queue, segments: tuple[Segment, ...]) -> tuple[Floats, 
         inner = (queue.cut,) if part.start < queue.cut * (1.0 - 1e-9) < end * (1.0 - 2e-9) else ()
         first = len(times)
         for a, b in pairwise((part.start, *inner, end)):
-            points = next(points for most, points in POINTS if b - a <= most * part.length * (1.0 + 1e-9))
+            points = next(
+                points for most, points in POINTS if b - a <= most * part.length * (1.0 + 1e-9)
+            )
             times += [a + node * (b - a) for node, _ in points]
             weights += [weight * (b - a) for _, weight in points]
         nodes.append(slice(first, len(times)))
@@ -158,8 +166,8 @@ def _mean_loss(pulp: Pulp, step: float, unit: float) -> Floats:
     loss[:-1] /= unit
     loss /= 1.0 - share
     both = np.tile([*loss[:-1], 0.0, 0.0, loss[-1]], (2, 1))
-    # A pulp that touches exactly at the start of a step, by the clock or the lattice, makes contact within
-    # it.
+    # A pulp that touches exactly at the start of a step, by the clock or the lattice, makes contact
+    # within it.
     both[:, -2] = TIE, 1.0
     return both
 
@@ -186,7 +194,9 @@ class BernoulliExponential(Alike):
         """Compute once what all periods share."""
         times, weights, nodes = _gauss_points(queue, segments)
         end = segments[-1].start + segments[-1].length
-        pulp, contact = (cell.touch.pulp, cell.touch.contact) if cell.touch else (Unrelaxed(), Contact())
+        pulp, contact = (
+            (cell.touch.pulp, cell.touch.contact) if cell.touch else (Unrelaxed(), Contact())
+        )
         to_decay = contact.share * contact.stiffness / cell.actuator.area
         m, supply = contact.exponent, cell.supply
         to_load, unit = to_decay / m, contact.stiffness / m
@@ -195,7 +205,9 @@ class BernoulliExponential(Alike):
         for s, part in enumerate(segments):
             points = nodes[s]
             steps[s, points] = weights[points] / cell.actuator.area
-            deviations[s, points] = steps[s, points] * (0.5 - (times[points] - part.start) / part.length)
+            deviations[s, points] = steps[s, points] * (
+                0.5 - (times[points] - part.start) / part.length
+            )
         widest = float(cell.flow.laminar_conductance(1.0))
         hard = _hard(cell, to_load, to_decay * widest * float(steps.sum(axis=1).max()))
         decay = to_decay * np.array(shares)[:, None] * steps
@@ -227,9 +239,9 @@ class BernoulliExponential(Alike):
 class StepWorkspace:
     """Movement of a block of cells, period by period: its rows, and working arrays.
 
-    The cells are those of one run, (n,), or of b runs, (n, b), with plans whose numbers and maps may
-    differ from run to run. A period overwrites the arrays. Linear maps are bound to the arrays of
-    their arguments and results. See `interfaces.Stepper.prepare`; k is short for `near` here.
+    The cells are those of one run, (n,), or of b runs, (n, b), with plans whose numbers and maps
+    may differ from run to run. A period overwrites the arrays. Linear maps are bound to the arrays
+    of their arguments and results. See `interfaces.Stepper.prepare`; k is short for `near` here.
     """
 
     def __init__(self, plan: BernoulliPlan, rows: Floats, near: int) -> None:
@@ -243,7 +255,10 @@ class StepWorkspace:
         self.plan, self.height, self.near = plan, rows[0], rows[0, :k]
         self.pulp, self.lag = rows[cell.pulp_rows, :k], rows[cell.lag_rows]
         openings = empty(len(plan.response), every)
-        self.opening, self.opening_after = openings[:gauss], openings[len(openings) - len(self.lag) :]
+        self.opening, self.opening_after = (
+            openings[:gauss],
+            openings[len(openings) - len(self.lag) :],
+        )
         self.open_valves = prepare_map(plan.response, rows[cell.lag_rows.start :], openings)
         # Conductances of the valves, the same with the signs of the openings, underside, and ones.
         inputs = empty(2 * gauss + instants + 1, every)
@@ -336,7 +351,9 @@ class StepWorkspace:
             self.deviation[:] = deviation
             beyond = guarded >= self.limits
             if any_true(beyond) and any_true(self._find_near_overflow(s, beyond)):
-                risen[:], end, mean[:] = self._move_near_overflow(s, beyond, exponent, deviation, idle)
+                risen[:], end, mean[:] = self._move_near_overflow(
+                    s, beyond, exponent, deviation, idle
+                )
                 _tension(end, zero, most, last)
                 rise += height
             else:

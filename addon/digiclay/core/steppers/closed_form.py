@@ -22,7 +22,8 @@ from ..base.arrays import Flags, Floats
 from ..model.contact import LARGEST_EXPONENT
 from ..model.physics import Cell
 
-#: Above this exponent, logarithms of sums are computed: `solve_carefully` instead of `solve_pressed`.
+#: Above this exponent, logarithms of sums are computed: `solve_carefully` instead of
+#: `solve_pressed`.
 LARGE = 300.0
 #: Replaces zero in 0/0 limits.
 TINY = 1e-200
@@ -38,9 +39,9 @@ _ALL_BUT_GONE = float(np.nextafter(-1.0, 0.0))
 def solve_pressed(grown: Floats, growth: Floats, decay: Floats) -> Floats:
     """Return the relief of cells that stay under load: ``e(1) - e(0) = growth - relief``.
 
-    It is ``log(1 + q)``, ``q = decay grown (exp(growth) - 1)/growth``, with `grown` = ``exp(e(0))``. The mean
-    of exp(e) is ``relief / decay``. Growth and decay must not be zero (use `TINY`), nor an exponent above
-    `LARGE`.
+    It is ``log(1 + q)``, ``q = decay grown (exp(growth) - 1)/growth``, with `grown` =
+    ``exp(e(0))``. The mean of exp(e) is ``relief / decay``. Growth and decay must not be zero (use
+    `TINY`), nor an exponent above `LARGE`.
     """
     q: Floats = np.expm1(growth)
     q /= growth
@@ -55,8 +56,8 @@ def solve_carefully(
 ) -> tuple[Floats, Floats]:
     """Return the change of e by the load, and the mean of exp(e), of cells that stay under load, of any size.
 
-    `decay` must be at least `TINY`, `growth` not zero (use `TINY`). The first, ``e(1) - e(0) - slip``, is at
-    most 0 if e(0) is above ``log(pulp)``.
+    `decay` must be at least `TINY`, `growth` not zero (use `TINY`). The first, ``e(1) - e(0) -
+    slip``, is at most 0 if e(0) is above ``log(pulp)``.
     """
     size = np.abs(growth)
     part, log_decay = np.log(-np.expm1(-size) / size), np.log(decay)
@@ -67,8 +68,11 @@ def solve_carefully(
     push, log_mean = decay * pulp - relief, log_grown + ratio
     vast = size > LARGE
     if np.count_nonzero(vast):
-        # The difference of such large relief and growth has lost its digits: e(1) is computed without them.
-        after = np.minimum(growth, 0.0) - np.logaddexp(-np.maximum(growth, 0.0), log_decay + exponent + part)
+        # The difference of such large relief and growth has lost its digits: e(1) is computed
+        # without them.
+        after = np.minimum(growth, 0.0) - np.logaddexp(
+            -np.maximum(growth, 0.0), log_decay + exponent + part
+        )
         np.putmask(push, vast, after - slip)
         lasting = vast & (log_q >= _ROUNDED_AWAY)
         np.putmask(log_mean, lasting, np.log(np.maximum(relief, TINY)) - log_decay)
@@ -80,9 +84,9 @@ def solve_crossing(
 ) -> tuple[Floats, Floats]:
     """Return ``e(1) - e(0) - slip`` and the mean of ``max(exp(e) - 1, 0)`` as contact begins or ends.
 
-    Contact begins at ``log(pulp)`` where the pin is `idle` at the start, and ends there where it is not; the
-    instant is exact on a straight path, and of second order on a curved one. `deviation`: chord deviation of
-    the path without load, its mean above the straight line between its ends.
+    Contact begins at ``log(pulp)`` where the pin is `idle` at the start, and ends there where it is
+    not; the instant is exact on a straight path, and of second order on a curved one. `deviation`:
+    chord deviation of the path without load, its mean above the straight line between its ends.
     """
     growth = replace_zeros(slip + decay * pulp)
     slip = np.where(np.abs(slip) < _STILL, _STILL, slip)
@@ -93,7 +97,9 @@ def solve_crossing(
     share = _loaded_share(threshold - exponent, slip, growth, idle)
     start = np.maximum(exponent, threshold)
     loaded_decay = np.maximum(share * decay, TINY)
-    push, mean = solve_carefully(start, replace_zeros(share * growth), share * slip, loaded_decay, pulp)
+    push, mean = solve_carefully(
+        start, replace_zeros(share * growth), share * slip, loaded_decay, pulp
+    )
     # Without load the exponent is linear, up to the threshold or down from it; below 0 is a gap.
     apart = np.maximum(np.abs((1.0 - share) * slip), TINY)
     closed = np.minimum(apart, np.maximum(threshold, 0.0))
@@ -104,7 +110,8 @@ def solve_crossing(
 def _loaded_share(gap: Floats, slip: Floats, growth: Floats, idle: Flags) -> Floats:
     """Return the share of the step in which a cell is loaded; `gap`: threshold less e(0).
 
-    An idle cell that touches at the start may have a gap below 0 by rounding: it meets the finger then.
+    An idle cell that touches at the start may have a gap below 0 by rounding: it meets the finger
+    then.
     """
     # At the end of contact u has grown from exp(-e(0)) to 1/pulp, by the linear equation.
     shrunk = np.expm1(np.minimum(gap, 0.0)) / slip
@@ -150,9 +157,10 @@ def find_loaded_path(
 ) -> tuple[Floats, Floats, Floats]:
     """Return the paths of cells over a step in which some of them are near overflow.
 
-    They are the rise of the pin, m, without its end stops; the exponent at the end; and the mean tension over
-    the step, in units of b/m. The contact's exponent m is in 1/m, the pressure `to_load` per unit of tension
-    in Pa; `share` of the tension pushes, and the rest is lost to relaxation within the step.
+    They are the rise of the pin, m, without its end stops; the exponent at the end; and the mean
+    tension over the step, in units of b/m. The contact's exponent m is in 1/m, the pressure
+    `to_load` per unit of tension in Pa; `share` of the tension pushes, and the rest is lost to
+    relaxation within the step.
     """
     decay, free = _mid_load(m, to_load * share, start)
     slip = m * free - start.lift
@@ -163,13 +171,18 @@ def find_loaded_path(
     mean -= 1.0
     crossing = (_exponential(exponent + slip + push) <= start.relaxed) != idle
     if crossing.any():
-        parts = (values[crossing] for values in (exponent, start.deviation, slip, decay, start.relaxed, idle))
+        parts = (
+            values[crossing]
+            for values in (exponent, start.deviation, slip, decay, start.relaxed, idle)
+        )
         push[crossing], mean[crossing] = solve_crossing(*parts)
     rise = _limit(m, to_load, start, free + push / m)
     return rise, exponent + (m * rise - start.lift), mean
 
 
-def _mid_load(m: Floats | float, to_load: Floats | float, start: StepStart) -> tuple[Floats, Floats]:
+def _mid_load(
+    m: Floats | float, to_load: Floats | float, start: StepStart
+) -> tuple[Floats, Floats]:
     """Return decay and free rise, m, by the chord of the flow from no load to that predicted in mid step."""
     grown = middle = _exponential(start.exponent)
     alone = start.rises(0.0)
@@ -194,8 +207,8 @@ def _press(exponent: Floats, slip: Floats, decay: Floats, relaxed: Floats) -> tu
 def _limit(m: Floats | float, to_load: Floats | float, start: StepStart, rise: Floats) -> Floats:
     """Return a rise, m, limited to the flow of the valve.
 
-    Upwards that is the flow without load, downwards the flow under the largest load; and no finger pushes a
-    pin below itself, apart from what the pin falls without load.
+    Upwards that is the flow without load, downwards the flow under the largest load; and no finger
+    pushes a pin below itself, apart from what the pin falls without load.
     """
     alone = start.rises(0.0)
     highest, fall = np.maximum(alone, 0.0).sum(axis=0), np.minimum(alone, 0.0).sum(axis=0)

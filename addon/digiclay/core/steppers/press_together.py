@@ -1,8 +1,9 @@
 """Cells that several fingertips press at once, by the closed form of their sum.
 
-With one exponent m the forces of several fingertips are that of one: ``Σ exp(m (H - U_f)) = exp(m (H - U))``
-with ``U = -(1/m) log Σ exp(-m U_f)``, less what each has lost to relaxation. A fingertip with another m is
-replaced by one with the m of the strongest, of equal force and stiffness at the start of a part of the step.
+With one exponent m the forces of several fingertips are that of one: ``Σ exp(m (H - U_f)) = exp(m
+(H - U))`` with ``U = -(1/m) log Σ exp(-m U_f)``, less what each has lost to relaxation. A fingertip
+with another m is replaced by one with the m of the strongest, of equal force and stiffness at the
+start of a part of the step.
 """
 
 from __future__ import annotations
@@ -51,7 +52,9 @@ class TogetherPlan:
             assert plan.cell.touch is not None
             law = plan.cell.touch.contact
             unit = law.share * law.stiffness / law.exponent
-            rows.append([law.exponent, law.exponent * law.offset, unit, plan.to_load, plan.limits[0]])
+            rows.append(
+                [law.exponent, law.exponent * law.offset, unit, plan.to_load, plan.limits[0]]
+            )
         return np.array(rows).T
 
     @cached_property
@@ -71,7 +74,8 @@ class TogetherPlan:
     ) -> tuple[Floats, Floats, Floats]:
         """Return heights (g,), filters (r, c, g), and forces (c, g), N, a control period later.
 
-        `valves` (l, g): openings and commands; `under` (p, c, g): undersides at the period's instants, m.
+        `valves` (l, g): openings and commands; `under` (p, c, g): undersides at the period's
+        instants, m.
         """
         plan, numbers = self.plans[0], self._numbers[:, fingers]
         cell, count = plan.cell, len(plan.segments)
@@ -81,11 +85,18 @@ class TogetherPlan:
         openings = plan.response[: len(plan.weights)].dot(valves)
         pressure = cell.supply.pressure(openings)
         size = cell.flow.conductance(openings, pressure)
-        free = plan.moves[count : 3 * count].dot(np.concatenate([size, np.copysign(size, openings)]))
-        openings, pressure = (rows[:, None].repeat(len(fingers) + 1, axis=1) for rows in (openings, pressure))
-        # A polynomial oscillates at a jump: a finger is limited to its undersides at the instants around.
+        free = plan.moves[count : 3 * count].dot(
+            np.concatenate([size, np.copysign(size, openings)])
+        )
+        openings, pressure = (
+            rows[:, None].repeat(len(fingers) + 1, axis=1) for rows in (openings, pressure)
+        )
+        # A polynomial oscillates at a jump: a finger is limited to its undersides at the instants
+        # around.
         ends = under[self.beside]
-        below = np.einsum("ip,pcg->icg", self.between, under).clip(ends.min(axis=0), ends.max(axis=0))
+        below = np.einsum("ip,pcg->icg", self.between, under).clip(
+            ends.min(axis=0), ends.max(axis=0)
+        )
         exponent, shift, unit, *_ = numbers
         work = np.zeros((len(filters) + 5, *fingers.shape))
         work[: len(filters)], work[-4] = filters, 1.0
@@ -103,17 +114,20 @@ class TogetherPlan:
             size_of = np.where(united, level[0] + np.log(unit * exponent), NONE)
             strongest = size_of.argmax(axis=0), np.arange(height.size)
             m, strongest_unit = exponent[strongest], unit[strongest]
-            # Exponentials in units of the strongest one, at start, middle and end of the fingers' paths.
+            # Exponentials in units of the strongest one, at start, middle and end of the fingers'
+            # paths.
             sizes = size_of - np.log(strongest_unit * m) - m * (underside - underside[0])
             whole = np.logaddexp.reduce(sizes, axis=1)
             share = np.exp(sizes - whole[:, None])
             ratio = unit / strongest_unit
-            # Force of a finger with another m, less that of the exponential with m of the same slope.
+            # Force of a finger with another m, less that of the exponential with m of the same
+            # slope.
             bounded = np.exp(np.minimum(sizes[0], LARGEST_EXPONENT))
             rest = np.where(exponent == m, -ratio, ratio * first - bounded)
             relaxed = np.maximum(np.where(united, lost * ratio - rest, 0.0).sum(axis=0), TINY)
-            # Rows of each finger alone, then of those that push at the start as one. That one lacks fingers
-            # that begin to push later, but no pin is higher under all fingers than under any of them.
+            # Rows of each finger alone, then of those that push at the start as one. That one lacks
+            # fingers that begin to push later, but no pin is higher under all fingers than under
+            # any of them.
             paths = _append(level, whole)
             bend, lift = (paths[0] - 2.0 * paths[1] + paths[2]) / 3.0, paths[0] - paths[2]
             rates, _, _, to_load, hard = _append(numbers, numbers[:, *strongest])
@@ -134,7 +148,9 @@ class TogetherPlan:
                 relaxed=_append(lost + 1.0, relaxed),
                 idle=_append(waits, idle),
             )
-            rises, _, means = find_loaded_path(rates, to_load, _append(shares, shares[strongest]), start)
+            rises, _, means = find_loaded_path(
+                rates, to_load, _append(shares, shares[strongest]), start
+            )
             rises[-1, idle] = np.inf
             rise = rises.min(axis=0)
             after = np.clip(height + rise, 0.0, cell.actuator.stroke)
@@ -161,7 +177,9 @@ def _tension(exponent: Floats) -> Floats:
     return np.expm1(np.clip(exponent, 0.0, LARGEST_EXPONENT))
 
 
-def plan_together(cells: Sequence[Cell], queue: Queue, segments: tuple[Segment, ...]) -> TogetherPlan:
+def plan_together(
+    cells: Sequence[Cell], queue: Queue, segments: tuple[Segment, ...]
+) -> TogetherPlan:
     """Compute once what all periods share, for the cells of all fingers."""
     count = segments[-1].nodes[-1] + 1
     parts: list[Segment] = []
@@ -182,9 +200,13 @@ def plan_together(cells: Sequence[Cell], queue: Queue, segments: tuple[Segment, 
                 before, after = math.floor(instant), math.ceil(instant)
                 beside.append((segment.nodes[before], segment.nodes[after]))
             length = segment.length / PARTS
-            parts.append(Segment(segment.start + part * length, length, (first, first + 1, first + 2)))
+            parts.append(
+                Segment(segment.start + part * length, length, (first, first + 1, first + 2))
+            )
     stepper = BernoulliExponential()
     plans: dict[int, BernoulliPlan] = {}
     for cell in cells:
         plans[id(cell)] = plans.get(id(cell)) or stepper.plan(cell, queue, tuple(parts))
-    return TogetherPlan(tuple(plans[id(cell)] for cell in cells), np.array(rows), np.array(beside).T)
+    return TogetherPlan(
+        tuple(plans[id(cell)] for cell in cells), np.array(rows), np.array(beside).T
+    )

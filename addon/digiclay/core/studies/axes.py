@@ -142,7 +142,9 @@ def refuse_twice(keys: Sequence[str], settings: Sequence[Setting]) -> None:
     """Refuse a parameter that is varied twice, or that another option changes too."""
     for key in keys:
         if keys.count(key) > 1:
-            raise ParameterError(f"--vary {key}", "", "must be given once", f"{keys.count(key)} times")
+            raise ParameterError(
+                f"--vary {key}", "", "must be given once", f"{keys.count(key)} times"
+            )
         for setting in settings:
             if setting.key == key:
                 rule = f"must not be given to {setting.option} as well"
@@ -185,7 +187,9 @@ def make_points(
         sound = {point.words[number] for point in points if point.scene}
         for word in axis.words:
             if word not in sound:
-                raise SceneError(next(point.error for point in points if point.words[number] == word))
+                raise SceneError(
+                    next(point.error for point in points if point.words[number] == word)
+                )
     return points
 
 
@@ -220,7 +224,9 @@ def make_columns(points: Sequence[Point], axes: Sequence[Axis]) -> list[Column]:
         scenes = {point.words[number]: point.scene for point in reversed(points) if point.scene}
         values = tuple(find_value(scenes[word], axis.key, word) for word in axis.words)
         declared = next((find_quantity(scene, axis.key) for scene in scenes.values()), None)
-        columns.append(Column(axis.key, declared.unit if declared else "", values, axis.logarithmic))
+        columns.append(
+            Column(axis.key, declared.unit if declared else "", values, axis.logarithmic)
+        )
     return columns
 
 
@@ -244,7 +250,9 @@ def find_numbers(scene: Scene, key: str) -> list[float]:
     """Return the different values of a parameter that are numbers: those of fingers may differ."""
     parts, name = _find_parts(scene, key)
     values = dict.fromkeys(getattr(part, name, None) for part in parts if name)
-    return [value for value in values if isinstance(value, (int, float)) and not isinstance(value, bool)]
+    return [
+        value for value in values if isinstance(value, (int, float)) and not isinstance(value, bool)
+    ]
 
 
 def find_value(scene: Scene, key: str, word: str) -> float | str:

@@ -20,12 +20,15 @@ from ..session.run_scene import Result, run
 from .axes import Measure, Point
 from .series import Results, describe_error
 
-#: Evaluation of bundles in any order, until all are done or a stop is requested. The record of a stopped
-#: point is None; a bundle during which its worker dies raises. OutputError when no worker is left.
+#: Evaluation of bundles in any order, until all are done or a stop is requested. The record of a
+#: stopped point is None; a bundle during which its worker dies raises. OutputError when no worker
+#: is left.
 Pool = Callable[[Sequence[Sequence[Point]]], Results[Sequence[Point], Sequence[Record | None]]]
 
 #: Metrics of a session.
-FIGURES = METRICS | {name: RUN[name] for name in ("simulated", "run_time", "real_time_factor")} | ERRORS
+FIGURES = (
+    METRICS | {name: RUN[name] for name in ("simulated", "run_time", "real_time_factor")} | ERRORS
+)
 #: Figures that differ in every run.
 TIMES = ("run_time", "real_time_factor")
 #: Short names of figures.
@@ -34,7 +37,8 @@ SHORT = {"lag": "lag_mean", "oscillation": "force_oscillation", "relief": "ridge
 LEAST = 4
 #: Twice this number of points makes two batches: a larger one gains little, and uses a single core.
 RUNS = 32
-#: Most bytes of a batch for the metrics of its runs, and bytes per row: the history of a run is not stored.
+#: Most bytes of a batch for the metrics of its runs, and bytes per row: the history of a run is not
+#: stored.
 BUDGET, BYTES_A_ROW = 2**30, 41
 #: Key in a record of the reason why its point ran alone although it belongs to a batch.
 ALONE = "alone"
@@ -106,7 +110,9 @@ def has_errors(record: Record) -> bool:
 
 def describe_effort(records: Mapping[int, Record]) -> str:
     """Return the run time of points and their largest estimated errors, with their points."""
-    figures = {index: record["figures"] for index, record in sorted(records.items()) if "figures" in record}
+    figures = {
+        index: record["figures"] for index, record in sorted(records.items()) if "figures" in record
+    }
     judged = {index: row for index, row in figures.items() if row.get("height_error") is not None}
     spent = sum(row.get("run_time") or 0.0 for row in figures.values())
     absent = (record["errors_absent"] for record in records.values() if record.get("errors_absent"))
@@ -122,8 +128,9 @@ def describe_effort(records: Mapping[int, Record]) -> str:
 def make_bundles(points: Sequence[Point]) -> Bundles:
     """Return all points of a sweep in bundles; the points of a batch have one structure.
 
-    The bundles do not depend on finished points or the number of workers, so that a sweep always has the same
-    results to the last bit. If errors are estimated, the references of a batch must have one structure too.
+    The bundles do not depend on finished points or the number of workers, so that a sweep always
+    has the same results to the last bit. If errors are estimated, the references of a batch must
+    have one structure too.
     """
     alike: dict[object, list[Point]] = {}
     alone: list[Point] = []
@@ -156,8 +163,12 @@ def make_bundles(points: Sequence[Point]) -> Bundles:
         reason = f"fewer than {LEAST} have the same bed, parts and steps"
         why[reason if few else "their histories are too long to keep several at once"] += len(group)
     alone.sort(key=lambda point: point.index)
-    doubts = Counter(describe_bends(point.scene) for point in points if point.errors and point.scene)
-    notes = tuple(f"{_count(doubts[text], 'point')} with larger errors: {text}" for text in doubts if text)
+    doubts = Counter(
+        describe_bends(point.scene) for point in points if point.errors and point.scene
+    )
+    notes = tuple(
+        f"{_count(doubts[text], 'point')} with larger errors: {text}" for text in doubts if text
+    )
     return Bundles(tuple(batches), tuple((point,) for point in alone), (*_explain(why), *notes))
 
 
@@ -165,7 +176,11 @@ def _find_reason(scene: Scene) -> str:
     """Return why a run cannot be in a batch, or ``""``."""
     if len(scene.fingers) != 1:
         return "they have several fingers"
-    return "" if find_method(scene.method).batched else f"a batch of {scene.method} would not be faster"
+    return (
+        ""
+        if find_method(scene.method).batched
+        else f"a batch of {scene.method} would not be faster"
+    )
 
 
 def _limit_runs(scene: Scene | None) -> int:
@@ -182,7 +197,9 @@ def _count(count: int, noun: str) -> str:
 
 def _explain(why: Mapping[str, int]) -> tuple[str, ...]:
     """Return a line per reason for points that run one at a time; `why` counts them."""
-    return tuple(f"{_count(count, 'point')} one at a time: {reason}" for reason, count in why.items())
+    return tuple(
+        f"{_count(count, 'point')} one at a time: {reason}" for reason, count in why.items()
+    )
 
 
 def explain_failed_batches(records: Mapping[int, Record]) -> tuple[str, ...]:
@@ -222,8 +239,8 @@ class BatchWarning(RuntimeWarning):
 def evaluate_bundle(bundle: Sequence[Point], stopped: Stopped = None) -> list[Record | None]:
     """Run a bundle, with all errors or none; return the records of its points, None for a stopped one.
 
-    When a batch fails as a whole, its points run one by one, and each record has the reason as ``alone``;
-    `BatchWarning` if it was neither lack of memory nor an error that a user can cause.
+    When a batch fails as a whole, its points run one by one, and each record has the reason as
+    ``alone``; `BatchWarning` if it was neither lack of memory nor an error that a user can cause.
     """
     scenes = [point.scene for point in bundle if point.scene]
     if not scenes:  # incompatible values are in no batch
@@ -242,7 +259,9 @@ def evaluate_bundle(bundle: Sequence[Point], stopped: Stopped = None) -> list[Re
         except Exception as error:  # the points then run one by one
             why = describe_error(error)
             if not isinstance(error, DigiclayError):
-                warnings.warn(f"A batch of {len(scenes)} runs failed: {why}", BatchWarning, stacklevel=2)
+                warnings.warn(
+                    f"A batch of {len(scenes)} runs failed: {why}", BatchWarning, stacklevel=2
+                )
         if why:
             records = [None] * len(scenes)
     for number, (point, scene) in enumerate(zip(bundle, scenes, strict=True)):

@@ -58,8 +58,13 @@ class Outputs:
 
     def format(self) -> str:
         """Return a job.toml that reads back as an equal value."""
-        lines = ["# What 'digiclay job' on this folder makes of the run of the scene.toml beside this file."]
-        lines += [f"export = {format_value(list(self.export))}", f"errors = {format_value(self.errors)}"]
+        lines = [
+            "# What 'digiclay job' on this folder makes of the run of the scene.toml beside this file."
+        ]
+        lines += [
+            f"export = {format_value(list(self.export))}",
+            f"errors = {format_value(self.errors)}",
+        ]
         for section in SECTIONS:
             part = getattr(self, section)
             if part is None:
@@ -76,7 +81,9 @@ def make_outputs(table: Table) -> Outputs:
     refuse_unknown("", table, KEYS)
     export = table.get("export", [])
     if not isinstance(export, list) or not all(isinstance(kind, str) for kind in export):
-        raise ParameterError("export", "", 'must be a list of formats such as ["stl"]', show_value(export))
+        raise ParameterError(
+            "export", "", 'must be a list of formats such as ["stl"]', show_value(export)
+        )
     if len(set(export)) < len(export):
         raise ParameterError("export", "", "must not name a format twice", show_value(export))
     errors = table.get("errors", True)
@@ -134,7 +141,11 @@ def read_jobs(path: Path, more: Sequence[str] = ()) -> JobSeries:
     try:
         refuse_unknown("", table, (*WHICH, *KEYS))
         outputs = make_outputs({key: table[key] for key in table if key not in WHICH})
-        words, methods, changes = _read_scenes(table), _read_methods(table, more), _read_settings(table)
+        words, methods, changes = (
+            _read_scenes(table),
+            _read_methods(table, more),
+            _read_settings(table),
+        )
         count = len(words) * len(methods) * len(changes)
         if count > MOST:
             raise ParameterError("scenes", "", f"must come to {MOST} jobs at most", f"{count} jobs")
@@ -168,9 +179,15 @@ def read_outputs(path: Path) -> Outputs:
 def _read_scenes(table: Table) -> list[str]:
     """Return the scenes of the file."""
     words = table.get("scenes")
-    if not isinstance(words, list) or not words or not all(isinstance(word, str) and word for word in words):
+    if (
+        not isinstance(words, list)
+        or not words
+        or not all(isinstance(word, str) and word for word in words)
+    ):
         value = "none" if words is None else show_value(words)
-        raise ParameterError("scenes", "", 'must be a list of scenes such as ["tap", "my.toml"]', value)
+        raise ParameterError(
+            "scenes", "", 'must be a list of scenes such as ["tap", "my.toml"]', value
+        )
     return words
 
 
@@ -180,7 +197,9 @@ def _read_methods(table: Table, more: Sequence[str]) -> list[str]:
         return list(more) or [""]
     methods = table["methods"]
     if not isinstance(methods, list) or not methods:
-        raise ParameterError("methods", "", 'must be a list such as ["virtual_master"]', show_value(methods))
+        raise ParameterError(
+            "methods", "", 'must be a list such as ["virtual_master"]', show_value(methods)
+        )
     for method in methods:
         find_method(method, "methods")
     return [*methods, *(name for name in more if name not in methods)]
@@ -200,9 +219,13 @@ def _read_settings(table: Table) -> dict[str, list[Setting]]:
             rule = "must be a table such as { control.force_gain = 2 }"
             raise ParameterError("settings", label, rule, show_value(changes))
         if not re.fullmatch(r"\w[\w.+-]*", label):
-            raise ParameterError("settings", "", "must have labels of letters, digits and . + -", repr(label))
+            raise ParameterError(
+                "settings", "", "must have labels of letters, digits and . + -", repr(label)
+            )
         option = f"settings.{label}"
-        settings[label] = [Setting(key, format_value(value), option) for key, value in _flatten(changes)]
+        settings[label] = [
+            Setting(key, format_value(value), option) for key, value in _flatten(changes)
+        ]
     return settings
 
 
@@ -242,4 +265,6 @@ def _refuse_twice(key: str, words: Sequence[str], meant: Sequence[str]) -> None:
     """Refuse a list in which two words mean the same, which would make the same jobs twice."""
     for number, meaning in enumerate(meant):
         if meaning in meant[:number]:
-            raise ParameterError(key, "", "must not name the same thing twice", f"{words[number]} twice")
+            raise ParameterError(
+                key, "", "must not name the same thing twice", f"{words[number]} twice"
+            )

@@ -1,10 +1,11 @@
 """Nominal relief of a session, and the deviation of the formed one.
 
-It is the relief that the method's blister, moved along the fingertip's path, leaves behind. For a boss,
-``H_j = H_rest + max_t p(d_j(t)) (z(t) + c - H_rest)``, with the minimum for a crease; p is the blister's
-profile, d_j the distance from cell j to the fingertip, z the height of the fingertip's lowest point, and c
-the indentation by the pins. The blister of Method II begins at the nearest cell under the fingertip: there
-d_j is less by the radius of a disc of as many cells as follow, less half a pitch.
+It is the relief that the method's blister, moved along the fingertip's path, leaves behind. For a
+boss, ``H_j = H_rest + max_t p(d_j(t)) (z(t) + c - H_rest)``, with the minimum for a crease; p is
+the blister's profile, d_j the distance from cell j to the fingertip, z the height of the
+fingertip's lowest point, and c the indentation by the pins. The blister of Method II begins at the
+nearest cell under the fingertip: there d_j is less by the radius of a disc of as many cells as
+follow, less half a pitch.
 """
 
 from collections.abc import Mapping
@@ -50,7 +51,9 @@ def find_nominal(
     return np.where(boss > 0.0, boss, crease)
 
 
-def measure_relief(scene: Scene, history: Mapping[str, Array], pressed: float | None) -> ReliefError:
+def measure_relief(
+    scene: Scene, history: Mapping[str, Array], pressed: float | None
+) -> ReliefError:
     """Return the deviation of the final heights from the nominal ones, of all fingers together."""
     if scene.blister is None or pressed is None:
         return ReliefError(None, None)

@@ -53,8 +53,8 @@ class Tried(NamedTuple):
     """Effect of an omission."""
 
     text: str
-    #: Largest difference of a height from the full scene, m; infinite for a trial that was aborted because it
-    #: exceeded the budget.
+    #: Largest difference of a height from the full scene, m; infinite for a trial that was aborted
+    #: because it exceeded the budget.
     departure: float
     #: Remaining shares of the full scene's work and of its measured time; NaN for an aborted trial.
     work: float
@@ -68,13 +68,13 @@ class Fitted:
     """Scene within a budget."""
 
     scene: Scene
-    #: Allowed error, m; largest difference of a height from the full scene in closed loop, m; and estimated
-    #: error of the integration, m. The sum of the last two is at most the first.
+    #: Allowed error, m; largest difference of a height from the full scene in closed loop, m; and
+    #: estimated error of the integration, m. The sum of the last two is at most the first.
     budget: float
     departure: float
     own_error: float
-    #: Remaining shares of the full scene's work, cells times steps times the parts of a cell, by which
-    #: omissions are chosen because it is the same in every run; and of its measured time.
+    #: Remaining shares of the full scene's work, cells times steps times the parts of a cell, by
+    #: which omissions are chosen because it is the same in every run; and of its measured time.
     work: float
     time: float
     tried: tuple[Tried, ...]
@@ -118,7 +118,9 @@ def find_omissions(
     error = _estimate_error(scene)
     if error > budget:
         hint = "Allow more, or take a shorter simulation.physics_step or the stepper 'richardson'."
-        rule = f"must be at least the error of the full scene's own integration, {error * 1e6:.2g} µm"
+        rule = (
+            f"must be at least the error of the full scene's own integration, {error * 1e6:.2g} µm"
+        )
         raise ParameterError("run", "budget", rule, f"{budget * 1e6:g} µm", hint)
     alone: list[tuple[Omission, Tried]] = []
     for omission in propose_omissions(scene, budget):
@@ -140,9 +142,13 @@ def find_omissions(
         error = _estimate_error(less)
         if departure + error <= budget:
             taken.append(omission)
-            best = replace(best, scene=less, departure=departure, own_error=error, work=work, time=time)
+            best = replace(
+                best, scene=less, departure=departure, own_error=error, work=work, time=time
+            )
     texts = {omission.text for omission in taken}
-    return replace(best, tried=tuple(trial._replace(kept=trial.text in texts) for trial in best.tried))
+    return replace(
+        best, tried=tuple(trial._replace(kept=trial.text in texts) for trial in best.tried)
+    )
 
 
 def _change(scene: Scene, section: str, **values: float) -> Scene:
@@ -173,7 +179,9 @@ def _measure(full: Scene, less: Scene, budget: float) -> tuple[float, float, flo
 
 def _weight(scene: Scene, system: System) -> int:
     """Return the work of a cell in a control period: steps times the number of state rows and other parts."""
-    rows: int = system.rows.driven.stop + sum(scene.section(part) is not None for part in WITHOUT_ROWS)
+    rows: int = system.rows.driven.stop + sum(
+        scene.section(part) is not None for part in WITHOUT_ROWS
+    )
     return rows * scene.simulation.steps
 
 

@@ -1,7 +1,7 @@
 """Series: pieces of work in one folder, such as a sweep's points or the jobs of a JOBS file.
 
-Its folder is made once, continued after a stop, and used by one process at a time. The result of each piece
-is stored at once.
+Its folder is made once, continued after a stop, and used by one process at a time. The result of
+each piece is stored at once.
 """
 
 import os
@@ -60,7 +60,9 @@ def open_series(
         yield
 
 
-def _make_folder(path: Path, kind: Kind, during_creation: ExitStack, until_the_end: ExitStack) -> None:
+def _make_folder(
+    path: Path, kind: Kind, during_creation: ExitStack, until_the_end: ExitStack
+) -> None:
     """Make the folder, if it does not exist, and lock it."""
     if path.exists() and not path.is_dir():
         raise OutputError(f"{path} is a file: choose another folder with --out.")
@@ -72,7 +74,9 @@ def _make_folder(path: Path, kind: Kind, during_creation: ExitStack, until_the_e
     if not (path / kind.mark).is_file() and not _is_bare(path, kind):
         what = f"contains something other than a {kind.name}"
         raise OutputError(f"{path} {what}: choose another folder with --out.")
-    until_the_end.enter_context(hold_lock(path / LOCK, run_folder.describe_claim(path, "being used")))
+    until_the_end.enter_context(
+        hold_lock(path / LOCK, run_folder.describe_claim(path, "being used"))
+    )
 
 
 def _is_bare(path: Path, kind: Kind) -> bool:

@@ -34,7 +34,9 @@ class Criterion(Parameters):
     """Criteria of tracking: no loss, contact in every row, small lag, small RFD."""
 
     lag: float = quantity(3e-3, "largest lag of the blister, a pitch", unit="m", above=0.0)
-    deviation: float = quantity(0.2, "largest RFD, half of Method I's set point", unit="N", above=0.0)
+    deviation: float = quantity(
+        0.2, "largest RFD, half of Method I's set point", unit="N", above=0.0
+    )
 
     def __str__(self) -> str:
         return (
@@ -149,13 +151,17 @@ def judge(done: Result, start: float, end: float, speed: float) -> Follows:
     behind = measure_lag(sums, part["fingertip"])
     wanted = find_set_point(done.scene.set_point, sums.following)
     deviates = compute_rfd(part["time"], total, wanted, np.ones(len(total), dtype=bool))
-    losses = int(np.sum((ends > start) & (ends <= end + REST)) + (total[0] <= 0.0))  # or lost before
+    losses = int(
+        np.sum((ends > start) & (ends <= end + REST)) + (total[0] <= 0.0)
+    )  # or lost before
     lag = float(behind.max()) if len(behind) else math.inf
     rfd = math.inf if deviates is None else deviates
     return Follows(speed, losses, float(np.mean(total <= 0.0)), lag, rfd)
 
 
-def bisect(holds: Callable[[float], bool], low: float, high: float, resolution: float) -> float | None:
+def bisect(
+    holds: Callable[[float], bool], low: float, high: float, resolution: float
+) -> float | None:
     """Return the largest value that holds, to within a resolution, by bisection; None: not even `low`."""
     if not holds(low):
         return None

@@ -43,7 +43,11 @@ class Folder:
         records = {}
         for path in self.path.glob(f"{POINTS}/*.json"):
             record = read_json(path)  # a point with an unreadable file is evaluated again
-            if not path.stem.isdecimal() or record is None or not record.keys() & {"figures", "error"}:
+            if (
+                not path.stem.isdecimal()
+                or record is None
+                or not record.keys() & {"figures", "error"}
+            ):
                 continue
             records[int(path.stem)] = record
         return records
@@ -51,7 +55,10 @@ class Folder:
     def keep(self, point: Point, keys: Sequence[str], record: Record) -> None:
         """Write the file of a finished point, complete or not at all. `keys`: the varied parameters."""
         values = dict(zip(keys, point.words, strict=True))
-        write_whole(self.path / POINTS / f"{point.index:06d}.json", format_json({"values": values, **record}))
+        write_whole(
+            self.path / POINTS / f"{point.index:06d}.json",
+            format_json({"values": values, **record}),
+        )
 
     def clear(self) -> None:
         """Remove the files of all points."""
@@ -66,7 +73,9 @@ def hash_points(points: Sequence[Point]) -> str:
         text = NOTE.sub("", format_scene(point.scene)) if point.scene else point.error
         scenes.update(text.encode())
         if point.scene is not None:
-            scenes.update(find_method(point.scene.method).digest.encode())  # empty for a built-in one
+            scenes.update(
+                find_method(point.scene.method).digest.encode()
+            )  # empty for a built-in one
     return scenes.hexdigest()
 
 
@@ -88,7 +97,9 @@ def open_points(
             content = describe(there)
         except (AttributeError, KeyError, TypeError):
             content = f"its {mark} cannot be read"
-        raise OutputError(f"{path} holds another {name} ({content}): choose another folder with --out.")
+        raise OutputError(
+            f"{path} holds another {name} ({content}): choose another folder with --out."
+        )
 
     with open_series(path, Kind(name, mark, (POINTS,)), description, refuse_another):
         yield folder
@@ -136,7 +147,9 @@ def _is_close(figure: float | None, other: float | None) -> bool:
     return math.isclose(figure, other, rel_tol=1e-6, abs_tol=1e-12)
 
 
-def make_grid(records: Mapping[int, Record], axes: Sequence[Axis], name: str) -> NDArray[np.float64]:
+def make_grid(
+    records: Mapping[int, Record], axes: Sequence[Axis], name: str
+) -> NDArray[np.float64]:
     """Return a figure of `evaluation.FIGURES` at all points, a dimension per axis; NaN: absent."""
     shape = [len(axis.words) for axis in axes]
     values = np.full(int(np.prod(shape)), np.nan)

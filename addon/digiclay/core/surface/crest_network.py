@@ -1,9 +1,9 @@
 """Network of a skeleton: branches between ends and junctions, and the crests they form.
 
-A branch that ends within the flank of the line it starts from is removed. At a junction, the two branches
-that continue each other most nearly straight become one line: a cross is two lines, and the third branch of
-a T ends at the other two. A short stretch that two lines share, as in an eight of two circles, belongs to
-both.
+A branch that ends within the flank of the line it starts from is removed. At a junction, the two
+branches that continue each other most nearly straight become one line: a cross is two lines, and
+the third branch of a T ends at the other two. A short stretch that two lines share, as in an eight
+of two circles, belongs to both.
 """
 
 from collections.abc import Callable, Iterable, Sequence
@@ -159,13 +159,14 @@ FLANK = 1.5
 SADDLE = 0.5
 #: Branches continue each other when the cosine of the angle between them is above this: 66 degrees.
 STRAIGHT = 0.4
-#: Longest stretch that two lines may share, in widths, and largest mean turn into it, rad: the lines of an
-#: X turn by 43 degrees, the uprights of an H by 70. Loops on both sides, as in an eight of two circles, may
-#: turn by 75.
+#: Longest stretch that two lines may share, in widths, and largest mean turn into it, rad: the
+#: lines of an X turn by 43 degrees, the uprights of an H by 70. Loops on both sides, as in an eight
+#: of two circles, may turn by 75.
 TOGETHER, TURN, TURN_OF_LOOPS = 4.0, np.radians(60.0), np.radians(75.0)
 #: Branches whose directions differ by more than this sine are joined by an arc.
 BENT = 0.35
-#: A line runs straight through a junction, from this many half widths before it to as many after it.
+#: A line runs straight through a junction, from this many half widths before it to as many after
+#: it.
 THROUGH = 1.5
 
 
@@ -196,7 +197,9 @@ def find_chains(
     _merge(network)
     _open_small_loops(network)
     _prune(network, pitch)
-    junctions = frozenset(node for node in range(len(network.position)) if len(network.ends(node)) > 2)
+    junctions = frozenset(
+        node for node in range(len(network.position)) if len(network.ends(node)) > 2
+    )
     return list(_assembled(network, _joints(network), junctions))
 
 
@@ -245,7 +248,9 @@ def _open_low_loops(network: Network, off: Callable[[Floats], Floats]) -> None:
             for node, part in zip(branch.nodes, parts, strict=True):
                 if len(part) > 1:
                     free = _add_node(network, part[-1:], [0.0])
-                    network.branches[max(network.branches, default=0) + 1] = Branch([node, free], part)
+                    network.branches[max(network.branches, default=0) + 1] = Branch(
+                        [node, free], part
+                    )
 
 
 def find_banks(height: Floats) -> Floats:
@@ -265,9 +270,13 @@ def _open_small_loops(network: Network) -> None:
     """Remove branches that close a loop smaller than its line is wide."""
     for number, branch in list(network.branches.items()):
         nodes = set(branch.nodes)
-        others = [b.length for k, b in network.branches.items() if k != number and set(b.nodes) == nodes]
+        others = [
+            b.length for k, b in network.branches.items() if k != number and set(b.nodes) == nodes
+        ]
         around = 2.0 * np.pi * network.widest(branch)
-        if any(length + branch.length < around for length in ([0.0] if len(nodes) == 1 else others)):
+        if any(
+            length + branch.length < around for length in ([0.0] if len(nodes) == 1 else others)
+        ):
             del network.branches[number]
 
 
@@ -364,15 +373,21 @@ def _share(network: Network, number: int, joints: Joints) -> None:
     if first == second or branch.length > TOGETHER * width:
         return
     sides = [[end for end in network.ends(node) if end[0] != number] for node in branch.nodes]
-    if [len(side) for side in sides] != [2, 2] or any(end in joints for side in sides for end in side):
+    if [len(side) for side in sides] != [2, 2] or any(
+        end in joints for side in sides for end in side
+    ):
         return
     paths = np.array([[network.path(end) for end in side] for side in sides])
     along = network.position[second] - network.position[first]
-    cosines_along = np.array([paths[0] @ -along, paths[1] @ along]) / max(float(np.hypot(*along)), 1e-12)
+    cosines_along = np.array([paths[0] @ -along, paths[1] @ along]) / max(
+        float(np.hypot(*along)), 1e-12
+    )
     most = TURN_OF_LOOPS if len({end[0] for side in sides for end in side}) == 2 else TURN
     if np.arccos(np.clip(cosines_along, -1.0, 1.0)).mean() > most:
         return
-    order = min(permutations((0, 1)), key=lambda pair: float(np.sum(paths[0] * paths[1][list(pair)])))
+    order = min(
+        permutations((0, 1)), key=lambda pair: float(np.sum(paths[0] * paths[1][list(pair)]))
+    )
     # A stretch that is shorter than wide is a crossing, which each line passes straight.
     shared = branch.points[:0] if branch.length <= width else branch.points
     for k in (0, 1):

@@ -1,8 +1,9 @@
 """Crests: lines along the top of a boss or the bottom of a crease, to a fraction of a pitch.
 
-The pins along the top give their number and their order (skeleton, crest_network). Each line is then drawn
-through the middle of the feature's sections, and ends where its spine does: half the width at half its height
-before the height has fallen to a half. A line shorter than the feature is wide is the top of a mound.
+The pins along the top give their number and their order (skeleton, crest_network). Each line is
+then drawn through the middle of the feature's sections, and ends where its spine does: half the
+width at half its height before the height has fallen to a half. A line shorter than the feature is
+wide is the top of a mound.
 """
 
 from dataclasses import dataclass, replace
@@ -42,14 +43,15 @@ ROUNDS_AT_END = 8
 WIDE = 1.5
 #: A section wider than the median by this factor crosses a junction, and does not show its middle.
 EVEN = 1.25
-#: A line that has fallen below this share of its height at its end, and rises again, has ended in between.
+#: A line that has fallen below this share of its height at its end, and rises again, has ended in
+#: between.
 FALLEN = 0.75
 #: Sections are taken at this share of the height.
 MIDDLE = 0.7
-#: A line may have a corner where it turns by more than `TURN` within `LEG` half widths to both sides. Its
-#: legs are straight from `CORNER` half widths on. It is a corner if the feature has at least the share
-#: `HIGH` of its height there, and less than half the loss of height that an arc between the legs would
-#: have.
+#: A line may have a corner where it turns by more than `TURN` within `LEG` half widths to both
+#: sides. Its legs are straight from `CORNER` half widths on. It is a corner if the feature has at
+#: least the share `HIGH` of its height there, and less than half the loss of height that an arc
+#: between the legs would have.
 CORNER, LEG, TURN, HIGH = 1.5, 2.5, np.radians(28.0), 0.7
 #: Shares of a smoothing step and of the step back.
 TO_AND_FRO = (0.5, -0.53)
@@ -91,7 +93,9 @@ class Field:
         angles = 2.0 * np.pi * np.arange(AROUND) / AROUND
         directions = np.tile(np.column_stack([np.cos(angles), np.sin(angles)]), (len(position), 1))
         level = np.repeat(0.5 * self.at(position), AROUND)
-        distance = self.falls(np.repeat(position, AROUND, axis=0), directions, level).reshape(-1, AROUND)
+        distance = self.falls(np.repeat(position, AROUND, axis=0), directions, level).reshape(
+            -1, AROUND
+        )
         return np.minimum(distance.min(axis=1), self.most)
 
     def line(self, chain: Chain) -> Floats | None:
@@ -228,7 +232,8 @@ class Field:
         """Return a line cut or extended at its last point, so that it ends where its spine ends."""
         pitch = self.bed.spacing
         run = measure_run(line)
-        # Its last pins may turn aside, at the edge of the bed more of them: the line goes straight on there.
+        # Its last pins may turn aside, at the edge of the bed more of them: the line goes straight
+        # on there.
         directions = np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])
         around = line[-1] + (half + pitch) * directions
         at_edge = bool(np.isnan(self.bed.at(self.off, around)).any())
@@ -317,8 +322,8 @@ def smooth(line: Floats, times: int, closed: bool) -> Floats:
     """Return a line without its staircase; ends stay."""
     if len(line) < 4:
         return line
-    # A step towards the mean of the neighbors and a little further back again, so that an arc does not
-    # shrink: G. Taubin, A signal processing approach to fair surface design, SIGGRAPH 1995.
+    # A step towards the mean of the neighbors and a little further back again, so that an arc does
+    # not shrink: G. Taubin, A signal processing approach to fair surface design, SIGGRAPH 1995.
     for share in TO_AND_FRO * times:
         pull = np.zeros_like(line)
         pull[1:-1] = 0.5 * (line[:-2] + line[2:]) - line[1:-1]
@@ -377,7 +382,9 @@ def find_ridges(bed: Formed, pins: Indices, off: Floats, least: float) -> tuple[
     position = bed.position[pins]
     field = Field(bed, of_feature, 2.0 * (measure_half_width(among, on_bed) + 2.0) * bed.spacing)
     half = field.half_widths(position[line])
-    chains = find_chains(among, line, position, half, bed.spacing, field.at) if len(line) > 1 else []
+    chains = (
+        find_chains(among, line, position, half, bed.spacing, field.at) if len(line) > 1 else []
+    )
     if not chains:  # a single pin, or a ring of three
         return (Ridge((), position[line], float(half.max())),)
     usual = float(np.median(half))
@@ -401,7 +408,10 @@ def find_ridges(bed: Formed, pins: Indices, off: Floats, least: float) -> tuple[
         every = [_crest(field, pieces[n], lines[n]) for n in numbers]
         crests = sorted(filter(None, every), key=lambda crest: -settle(crest.length))
         if crests:
-            core, half_width = np.concatenate([crest.points[:, :2] for crest in crests]), crests[0].half
+            core, half_width = (
+                np.concatenate([crest.points[:, :2] for crest in crests]),
+                crests[0].half,
+            )
         else:
             core = np.concatenate([pieces[n].points for n in numbers])
             top = core[[int(np.argmax(field.at(core)))]]
@@ -447,7 +457,9 @@ def _meet(pieces: list[Chain], lines: list[Floats | None], field: Field) -> None
                 continue
             met = [k for k, other in enumerate(pieces) if k != number and other.nodes & piece.nodes]
             others = [other for k in met if (other := lines[k]) is not None]
-            lines[number] = field.extend(line[::order], field.half_width(line, False), others)[::order]
+            lines[number] = field.extend(line[::order], field.half_width(line, False), others)[
+                ::order
+            ]
 
 
 def _crest(field: Field, chain: Chain, line: Floats | None) -> Crest | None:

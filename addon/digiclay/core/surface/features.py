@@ -14,7 +14,8 @@ from .crests import Crest, Ridge, find_ridges, measure_in_space
 from .regions import Region, cut, divide, label_components, list_edges
 from .skins import SurfaceGrid
 
-#: Least share of a crest that is near the straight line of its ridge, and largest share below the line.
+#: Least share of a crest that is near the straight line of its ridge, and largest share below the
+#: line.
 KEEPS, BELOW = 0.4, 0.1
 #: A point is below the line when it is lower by this share of the line's height.
 SLACK = 0.1
@@ -24,7 +25,8 @@ RISES = 0.3
 FOOT = 0.15
 #: A mound extends at most this many half widths of its ridge to each side of its top.
 COMPACT = 4.0
-#: A peak where two ridges cross is no mound if it extends at most this many half widths to each side.
+#: A peak where two ridges cross is no mound if it extends at most this many half widths to each
+#: side.
 CROSSING = 1.5
 #: Points of a crest from which the line of its ridge is found.
 POINTS = 40
@@ -145,8 +147,8 @@ FORMS = {"boss": ("ridge", "mound", "plateau"), "crease": ("valley", "hollow", "
 FLAT = 0.9
 #: Saddles and mounds below this many thresholds are ignored.
 DEEP = 2.0
-#: Gap between the bodies of two parts of a boss or crease and their common border, in pitches: with a common
-#: wall, a welded file would use its edges four times. Slicers close so narrow a gap.
+#: Gap between the bodies of two parts of a boss or crease and their common border, in pitches: with
+#: a common wall, a welded file would use its edges four times. Slicers close so narrow a gap.
 GAP = 0.005
 
 
@@ -218,8 +220,9 @@ class Feature:
 
 def find(grid: SurfaceGrid, finding: Finding | None = None) -> list[Feature]:
     """Return the features of a skin: bosses, then creases, the largest of each first."""
-    # Points are in one region if triangles of the skin join them: bosses that only touch at the threshold are
-    # two. The parts beside a saddle, and a mound on a ridge, are features of their own.
+    # Points are in one region if triangles of the skin join them: bosses that only touch at the
+    # threshold are two. The parts beside a saddle, and a mound on a ridge, are features of their
+    # own.
     finding, features = finding or Finding(), []
     list_steps(grid.formed.shift / grid.formed.pitch)  # refuses rows without neighbors
     for kind, sign in (("boss", 1.0), ("crease", -1.0)):
@@ -291,13 +294,23 @@ def _by_label(label: Faces) -> dict[int, Indices]:
     """Return the indices of each label from 0 on, ascending."""
     order = np.argsort(label, kind="stable")
     names, starts = np.unique(label[order], return_index=True)
-    groups = zip(names.tolist(), np.split(order, starts[1:]), strict=False)  # without labels, one empty group
+    groups = zip(
+        names.tolist(), np.split(order, starts[1:]), strict=False
+    )  # without labels, one empty group
     return {name: group for name, group in groups if name >= 0}
 
 
 def make_table(features: list[Feature]) -> list[tuple[str, ...]]:
     """Return a table to be read: a head, and a row of texts per feature, in mm."""
-    head = ("feature", "form", "pins", "area, mm²", "height or depth, mm", "crest, mm", "volume, mm³")
+    head = (
+        "feature",
+        "form",
+        "pins",
+        "area, mm²",
+        "height or depth, mm",
+        "crest, mm",
+        "volume, mm³",
+    )
     rows = [
         (
             feature.name,

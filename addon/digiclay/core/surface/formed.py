@@ -32,7 +32,8 @@ BASE_THICKNESS = 3e-3
 #: Two diagonals are equally long when their squares agree to this fraction: far above
 #: rounding, far below the smallest difference of an arrangement (staggered, 4/5).
 SAME_LENGTH = 1e-6
-#: Pins whose triangles are computed at once, so that a large bed takes little more memory than its result.
+#: Pins whose triangles are computed at once, so that a large bed takes little more memory than its
+#: result.
 BAND = 1 << 16
 
 
@@ -47,21 +48,30 @@ def make_skin(position: ArrayLike, height: ArrayLike, rows: int, columns: int) -
         faces_of_band = _triangles(position, top, index[row : row + band + 1])
         faces_of_band = faces_of_band[:, ::-1] if clockwise else faces_of_band
         if not np.all(measure_areas(position, faces_of_band) > 0.0):
-            raise ParameterError("Surface", "position", "must order the pins row by row", "pins out of order")
+            raise ParameterError(
+                "Surface", "position", "must order the pins row by row", "pins out of order"
+            )
         faces[row : row + band] = faces_of_band.reshape(-1, 2 * (columns - 1), 3)
     return faces.reshape(-1, 3)
 
 
 def _triangles(position: Floats, top: Floats, index: Faces) -> Faces:
     """Return the triangles between rows of pins, two for every four pins."""
-    # The corners of each cell, around it: a and c are the ends of one diagonal, b and d of the other.
+    # The corners of each cell, around it: a and c are the ends of one diagonal, b and d of the
+    # other.
     a, b, c, d = (part.ravel() for part in take_corners(index))
     along_ac = _cut_along_ac(position, top, a, b, c, d)
-    return np.column_stack([a, b, np.where(along_ac, c, d), np.where(along_ac, a, b), c, d]).reshape(-1, 3)
+    return np.column_stack(
+        [a, b, np.where(along_ac, c, d), np.where(along_ac, a, b), c, d]
+    ).reshape(-1, 3)
 
 
 def make_solid(
-    position: ArrayLike, height: ArrayLike, rows: int, columns: int, base_thickness: float = BASE_THICKNESS
+    position: ArrayLike,
+    height: ArrayLike,
+    rows: int,
+    columns: int,
+    base_thickness: float = BASE_THICKNESS,
 ) -> tuple[Floats, Faces]:
     """Return vertices (2 n, 3), m, tops first, and faces of the solid over a base: skin, base, walls."""
     position, top = check_heights(position, height, rows, columns)
@@ -100,7 +110,9 @@ def check_heights(
     position, top = read_places(position), np.asarray(height, dtype=np.float64)
     if top.shape != (rows * columns,) or len(position) != rows * columns:
         rule = f"must have one value for each of the {rows} x {columns} pins"
-        raise ParameterError("Surface", name, rule, f"{top.size} values at {len(position)} positions")
+        raise ParameterError(
+            "Surface", name, rule, f"{top.size} values at {len(position)} positions"
+        )
     if not np.all(np.isfinite(top)):
         raise ParameterError("Surface", name, "must be finite", name_first_bad(top))
     return position, top
@@ -136,8 +148,8 @@ def take_outline(table: Faces) -> Faces:
 class Formed:
     """All pins of a bed, row by row.
 
-    Raises ParameterError on fewer than 2 x 2 pins, arrays that do not fit, numbers that are not finite, or
-    pins out of order.
+    Raises ParameterError on fewer than 2 x 2 pins, arrays that do not fit, numbers that are not
+    finite, or pins out of order.
     """
 
     position: Floats
@@ -156,13 +168,22 @@ class Formed:
 
     @classmethod
     def of(
-        cls, position: ArrayLike, height: ArrayLike, former: ArrayLike, force: ArrayLike, mode: ArrayLike
+        cls,
+        position: ArrayLike,
+        height: ArrayLike,
+        former: ArrayLike,
+        force: ArrayLike,
+        mode: ArrayLike,
     ) -> Formed:
         """Check the arrays; one number will do for `former`, `force` and `mode`."""
         rows, columns = find_grid_shape(position)
         position, top = check_heights(position, height, rows, columns)
-        _, before = check_heights(position, np.broadcast_to(former, top.shape), rows, columns, "former")
-        _, pressed = check_heights(position, np.broadcast_to(force, top.shape), rows, columns, "force")
+        _, before = check_heights(
+            position, np.broadcast_to(former, top.shape), rows, columns, "former"
+        )
+        _, pressed = check_heights(
+            position, np.broadcast_to(force, top.shape), rows, columns, "force"
+        )
         codes = np.broadcast_to(np.asarray(mode, np.int64), top.shape)
         return cls(position, top, before, pressed, codes, rows, columns)
 
@@ -202,7 +223,9 @@ class Formed:
         row = np.rint((points[:, 1] - self.position[0, 1]) / self.across).clip(0, self.rows - 1)
         row = row.astype(np.int64)
         first = self.position[row * self.columns, 0]
-        column = np.rint((points[:, 0] - first) / self.along).clip(0, self.columns - 1).astype(np.int64)
+        column = (
+            np.rint((points[:, 0] - first) / self.along).clip(0, self.columns - 1).astype(np.int64)
+        )
         return np.asarray(row * self.columns + column)
 
     @property
@@ -247,11 +270,15 @@ def make_formed(history: Mapping[str, Array], row: int, former: int | float = 0)
     count = len(height)
     for name, number in (("row", row), ("former", former)):
         if isinstance(number, int) and not -count <= number < count:
-            raise OutputError(f"The history has {count} rows, 0 to {count - 1} (got {number} as {name}).")
+            raise OutputError(
+                f"The history has {count} rows, 0 to {count - 1} (got {number} as {name})."
+            )
     if isinstance(former, float) and not np.isfinite(former):
         raise ParameterError("Export", "former", "must be a finite height", f"{former} m")
     before = height[former] if isinstance(former, int) else former
-    return Formed.of(history["position"], height[row], before, history["force"][row], history["mode"][row])
+    return Formed.of(
+        history["position"], height[row], before, history["force"][row], history["mode"][row]
+    )
 
 
 #: Code of the mode at a vertex that belongs to no pin, such as one of the base.

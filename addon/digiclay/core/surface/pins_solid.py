@@ -1,9 +1,9 @@
 """Stepped bed as one printable body: a prism for every pin.
 
-The part of a pin is the area nearest to it: a square in an aligned bed, a hexagon in a shifted one. A wall
-stands between neighbors of different heights. Two squares that meet only at a corner, and are both higher
-than the other two there, would touch along a line without thickness, which no printer can make: a bridge of
-half the width `BRIDGE` joins them.
+The part of a pin is the area nearest to it: a square in an aligned bed, a hexagon in a shifted one.
+A wall stands between neighbors of different heights. Two squares that meet only at a corner, and
+are both higher than the other two there, would touch along a line without thickness, which no
+printer can make: a bridge of half the width `BRIDGE` joins them.
 """
 
 from dataclasses import dataclass, replace
@@ -16,8 +16,8 @@ from .formed import BASE_THICKNESS, Formed, find_base_level, take_corners
 
 #: Half the width of a bridge, in pitches along x and rows along y.
 BRIDGE = 0.05
-#: Heights above the base are rounded to multiples of this, m: a wall lower than float32 resolves would have
-#: no area in a file.
+#: Heights above the base are rounded to multiples of this, m: a wall lower than float32 resolves
+#: would have no area in a file.
 STEP = 1e-7
 
 
@@ -54,7 +54,9 @@ def make_parts(formed: Formed) -> Parts:
     return Parts(corner, start, end, pin, np.where(opposite, twin, -1))
 
 
-def make_pins_solid(formed: Formed, base_thickness: float = BASE_THICKNESS) -> tuple[Floats, Faces, Indices]:
+def make_pins_solid(
+    formed: Formed, base_thickness: float = BASE_THICKNESS
+) -> tuple[Floats, Faces, Indices]:
     """Return vertices (v, 3), m, first the middles of tops, faces (f, 3) and their pins."""
     level = find_base_level(formed.height, base_thickness)
     steps = np.maximum(np.rint((formed.height - level) / STEP), 1.0).astype(np.int64)
@@ -69,12 +71,20 @@ def make_pins_solid(formed: Formed, base_thickness: float = BASE_THICKNESS) -> t
     at, up = np.divmod(names, above)
     middle = np.column_stack([formed.position, height])
     below = np.column_stack([formed.position, np.full(n, level)])
-    vertices = np.concatenate([middle, below, np.column_stack([parts.corner[at], level + up * STEP])])
+    vertices = np.concatenate(
+        [middle, below, np.column_stack([parts.corner[at], level + up * STEP])]
+    )
     ends = starts[_following(parts.pin)]
     top = np.column_stack([parts.pin, starts, ends]).astype(np.int32)
-    bottom = np.column_stack([parts.pin + n, ground[parts.end], ground[parts.start]]).astype(np.int32)
+    bottom = np.column_stack([parts.pin + n, ground[parts.end], ground[parts.start]]).astype(
+        np.int32
+    )
     walls, whose = _walls(parts, steps, starts, ends, ground)
-    return vertices, np.concatenate([top, bottom, walls]), np.concatenate([parts.pin, parts.pin, whose])
+    return (
+        vertices,
+        np.concatenate([top, bottom, walls]),
+        np.concatenate([parts.pin, parts.pin, whose]),
+    )
 
 
 def _following(pin: Indices) -> Indices:
@@ -89,7 +99,8 @@ def _walls(
     parts: Parts, steps: Indices, starts: Indices, ends: Indices, ground: Indices
 ) -> tuple[Faces, Indices]:
     """Return the triangles of the walls of parts above their neighbors, and their pins."""
-    # The vertices of a corner are numbered in the order of their heights: a wall uses consecutive ones.
+    # The vertices of a corner are numbered in the order of their heights: a wall uses consecutive
+    # ones.
     other = np.where(parts.twin >= 0, steps[parts.pin[parts.twin]], 0)
     side = np.flatnonzero(steps[parts.pin] > other)
     twin = parts.twin[side]
@@ -99,7 +110,9 @@ def _walls(
     i, step = _counted(starts[side] - left)
     lower = np.column_stack([left[i] + step, right[i], left[i] + step + 1]).astype(np.int32)
     j, step = _counted(ends[side] - right)
-    upper = np.column_stack([right[j] + step, right[j] + step + 1, starts[side][j]]).astype(np.int32)
+    upper = np.column_stack([right[j] + step, right[j] + step + 1, starts[side][j]]).astype(
+        np.int32
+    )
     return np.concatenate([lower, upper]), parts.pin[side][np.concatenate([i, j])]
 
 
@@ -121,14 +134,16 @@ def _squares(formed: Formed) -> tuple[Floats, Indices]:
     a, b, c, d = take_corners(top)
     ac = np.minimum(a, c) > np.maximum(b, d)
     bd = np.minimum(b, d) > np.maximum(a, c)
-    # The lower corner is moved towards -y, and towards +x where a and c are joined, -x where b and d are.
+    # The lower corner is moved towards -y, and towards +x where a and c are joined, -x where b and
+    # d are.
     lean = np.pad(ac.astype(np.float64) - bd, 1)
     apart, joined_ac, joined_bd = lean != 0.0, lean > 0.0, lean < 0.0
     away = BRIDGE * np.stack([lean * step_x, -np.abs(lean) * step_y], axis=-1)
     lower = np.arange(apart.size).reshape(apart.shape)
     upper = np.where(apart, apart.size + np.cumsum(apart.ravel()).reshape(apart.shape) - 1, lower)
     corners = np.concatenate([(corner + away).reshape(-1, 2), (corner - away)[apart]])
-    # The two corners of a part where four meet, by its position among them, in the order of its loop.
+    # The two corners of a part where four meet, by its position among them, in the order of its
+    # loop.
     corners_at = (
         (upper, np.where(joined_ac, lower, upper)),
         (np.where(joined_bd, lower, upper), upper),
@@ -147,7 +162,8 @@ def _hexagons(formed: Formed) -> tuple[Floats, Indices]:
     near = (spacing**2 - pitch**2 / 4.0) / (2.0 * spacing)
     side = 1 if formed.shift > 0.0 else -1
     row, column = np.divmod(np.arange(rows * columns), columns)
-    # Corners between two rows stand half a pitch apart; those of a pin are numbers q - 1, q and q + 1.
+    # Corners between two rows stand half a pitch apart; those of a pin are numbers q - 1, q and q +
+    # 1.
     width = 2 * columns + 4
     q = 2 * column + (row % 2) * side + 2
     below, above = row * width + q, (row + 1) * width + q

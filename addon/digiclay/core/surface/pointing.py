@@ -19,8 +19,9 @@ PARALLEL = 1e-200
 def find_ray(lens: Floats, seen: Floats, screen: Floats) -> tuple[Floats, Floats]:
     """Return origin and unit direction (3,) of the ray through a point of a picture, `screen` (2,), -1 to 1.
 
-    `lens` (4, 4) maps the camera's space to the picture's; `seen` (4, 4) the space of the result to the
-    camera's, which looks along -z. Blender's own function has single precision: it is off by up to a pixel.
+    `lens` (4, 4) maps the camera's space to the picture's; `seen` (4, 4) the space of the result to
+    the camera's, which looks along -z. Blender's own function has single precision: it is off by up
+    to a pixel.
     """
     across = np.array([lens[0, 0], lens[1, 1]])
     if lens[3, 2]:
@@ -34,7 +35,9 @@ def find_ray(lens: Floats, seen: Floats, screen: Floats) -> tuple[Floats, Floats
     return inverse[:3, :3] @ eye + inverse[:3, 3], direction / np.linalg.norm(direction)
 
 
-def intersect_surface(grid: Grid, height: Floats, origin: Floats, direction: Floats) -> Floats | None:
+def intersect_surface(
+    grid: Grid, height: Floats, origin: Floats, direction: Floats
+) -> Floats | None:
     """Return where a ray meets flat tops (n,) without gaps, (3,), m: exactly on a top, or on a pin's side."""
     if not (np.isfinite(origin).all() and np.isfinite(direction).all() and direction.any()):
         return None
@@ -50,7 +53,9 @@ def intersect_surface(grid: Grid, height: Floats, origin: Floats, direction: Flo
     count = 2 + math.ceil(STEPS * length / min(plan.pitch, plan.row_spacing))
     times = np.linspace(first, last, count)
     points = origin + times[:, None] * direction
-    points[-1, 2] = max(points[-1, 2], low[2])  # rounding must not let the ray slip below the lowest top
+    points[-1, 2] = max(
+        points[-1, 2], low[2]
+    )  # rounding must not let the ray slip below the lowest top
     tops = height[grid.at(points[:, 0], points[:, 1])]
     met = np.flatnonzero(points[:, 2] <= tops + 1e-12)
     if not met.size:

@@ -7,8 +7,8 @@ import numpy as np
 from ..base.arrays import TINY, Faces, Floats
 from .formed import measure_areas
 
-#: Least distance of the contour from both ends of an edge, as a share of it, so that no triangle has no area.
-#: At a pitch of 3 mm it is 3 µm.
+#: Least distance of the contour from both ends of an edge, as a share of it, so that no triangle
+#: has no area. At a pitch of 3 mm it is 3 µm.
 MARGIN = 1e-3
 
 
@@ -66,7 +66,9 @@ def label_components(count: int, edges: Faces) -> Faces:
 
 def cut(position: Floats, former: Floats, off: Floats, faces: Faces, threshold: float) -> Region:
     """Return the part of triangles (f, 3) in which `off` is above the threshold."""
-    values, pieces, whole = _clipped(np.column_stack([position, former, off]), faces, off, threshold)
+    values, pieces, whole = _clipped(
+        np.column_stack([position, former, off]), faces, off, threshold
+    )
     values[whole:, 3] = threshold
     return Region(values[:, :2], values[:, 2], values[:, 3], pieces)
 
@@ -80,7 +82,9 @@ def divide(region: Region, nearer: Floats, gap: float = 0.0) -> tuple[Region | N
     for side in (nearer, -nearer):
         near = region.faces[(side > gap)[region.faces].any(axis=1)]
         points, pieces, _ = _clipped(values, near, side, gap)
-        parts.append(Region(points[:, :2], points[:, 2], points[:, 3], pieces) if len(near) else None)
+        parts.append(
+            Region(points[:, :2], points[:, 2], points[:, 3], pieces) if len(near) else None
+        )
     return parts[0], parts[1]
 
 
@@ -90,7 +94,8 @@ def _clipped(values: Floats, faces: Faces, by: Floats, level: float) -> tuple[Fl
     count = inside[faces].sum(axis=1)
     pieces = [faces[count == 3].astype(np.int64)]
     m = len(by)
-    # A corner is named by its number; a point of the contour, between i inside and j outside, by m + i m + j.
+    # A corner is named by its number; a point of the contour, between i inside and j outside, by m
+    # + i m + j.
     for wanted in (1, 2):
         corners = faces[count == wanted].astype(np.int64)
         # Turned so that the corner that differs from both others comes first.

@@ -1,12 +1,13 @@
 """Skeleton of a feature: the pins that remain when it is thinned from its lowest pin upwards.
 
-A pin is removed, the lowest first, if that neither divides the rest nor opens a hole in it; the end of a
-line stays. The skeleton is one pin wide, runs along the top, and is connected and closed as the feature is.
-A hollow that looks like the inside of a ring counts as a hole, even where its bottom belongs to the
-feature.
+A pin is removed, the lowest first, if that neither divides the rest nor opens a hole in it; the end
+of a line stays. The skeleton is one pin wide, runs along the top, and is connected and closed as
+the feature is. A hollow that looks like the inside of a ring counts as a hole, even where its
+bottom belongs to the feature.
 
-In all functions `beside` int (k, 8 or 6) has the neighbors of a feature's pins, numbered from 0, -1 for none;
-`on_bed` bool (k, 8 or 6) tells where the bed continues; `off` (k,) are heights over the ground, m.
+In all functions `beside` int (k, 8 or 6) has the neighbors of a feature's pins, numbered from 0, -1
+for none; `on_bed` bool (k, 8 or 6) tells where the bed continues; `off` (k,) are heights over the
+ground, m.
 """
 
 import heapq
@@ -112,7 +113,9 @@ def _thinned(beside: Indices, top: Floats, holes: list[int]) -> Indices:
         code = sum(1 << bit for bit, other in enumerate(around) if left[other])
         if not simple[code]:
             continue
-        high = ends[code] and height[pin] >= END * max(height[other] for other in around if left[other])
+        high = ends[code] and height[pin] >= END * max(
+            height[other] for other in around if left[other]
+        )
         if high and (ends[code] == 1 or _continues(neighbors, left, around, code)):
             continue
         left[pin] = False
@@ -134,7 +137,11 @@ def _continues(neighbors: list[list[int]], left: list[bool], around: list[int], 
             step = steps[bit] + steps[turn]
             beyond = abs(step) > 1e-9 and not any(other == around[k] for k in two)
             # Beside a line, what is beyond the two lies along it.
-            if beyond and left[other] and step.real * ahead.real + step.imag * ahead.imag < AHEAD * near:
+            if (
+                beyond
+                and left[other]
+                and step.real * ahead.real + step.imag * ahead.imag < AHEAD * near
+            ):
                 return False
     return True
 
@@ -151,12 +158,14 @@ def _is_simple(code: int, directions: int) -> bool:
 
 
 _SIMPLE = {
-    directions: [_is_simple(code, directions) for code in range(1 << directions)] for directions in (6, 8)
+    directions: [_is_simple(code, directions) for code in range(1 << directions)]
+    for directions in (6, 8)
 }
 #: Neighbors of a line's end by these bits: one, or two side by side; 0 where it is no end.
 _ENDS = {
     directions: [
-        code.bit_count() if simple and code.bit_count() < 3 else 0 for code, simple in enumerate(table)
+        code.bit_count() if simple and code.bit_count() < 3 else 0
+        for code, simple in enumerate(table)
     ]
     for directions, table in _SIMPLE.items()
 }

@@ -1,14 +1,14 @@
 """Skins over the pin tops: interpolation between them.
 
-A skin divides every pitch into the same number of parts, along the rows and across them; between two rows
-that are shifted against each other its points shift gradually. Every pin top is one of its points.
+A skin divides every pitch into the same number of parts, along the rows and across them; between
+two rows that are shifted against each other its points shift gradually. Every pin top is one of its
+points.
 
-*bilinear* is straight between pins: the bilinear patch over four pins of an aligned bed, the triangle
-over three of a staggered or hexagonal one.
-*smooth* is a monotone cubic spline along each row, then across the rows: through every pin, and nowhere
-above or below the pins around it.
-*membrane* is stretched over the flat ends of the pins: level over the ends and straight between them, along
-each row, then across the rows.
+*bilinear* is straight between pins: the bilinear patch over four pins of an aligned bed, the
+triangle over three of a staggered or hexagonal one. *smooth* is a monotone cubic spline along each
+row, then across the rows: through every pin, and nowhere above or below the pins around it.
+*membrane* is stretched over the flat ends of the pins: level over the ends and straight between
+them, along each row, then across the rows.
 """
 
 from collections.abc import Callable
@@ -101,7 +101,10 @@ def _straight(formed: Formed, pins: Floats, parts: int) -> Floats:
 
 
 def _join_rows(
-    formed: Formed, pins: Floats, parts: int, interpolate: Callable[[Floats, Floats, Floats], Floats]
+    formed: Formed,
+    pins: Floats,
+    parts: int,
+    interpolate: Callable[[Floats, Floats, Floats], Floats],
 ) -> Floats:
     """Return a skin interpolated along the rows of pins, then across them, shape of its points."""
     point = place_points(formed, parts)
@@ -130,8 +133,12 @@ def _bound(formed: Formed, pins: Floats, x: Floats, fine: Floats, parts: int) ->
         # The ends of the two rows beside a line, and the four pins of the last cell.
         ends = np.stack([along[row, end], along[row + 1, end]]) * direction
         ahead = x * direction
-        beyond = ahead < ends.max(axis=0)[:, None] if end == 0 else ahead > ends.min(axis=0)[:, None]
-        cell = np.stack([pins[row, end], pins[row, inner], pins[row + 1, end], pins[row + 1, inner]])
+        beyond = (
+            ahead < ends.max(axis=0)[:, None] if end == 0 else ahead > ends.min(axis=0)[:, None]
+        )
+        cell = np.stack(
+            [pins[row, end], pins[row, inner], pins[row + 1, end], pins[row + 1, inner]]
+        )
         bounded = np.clip(fine, cell.min(axis=0)[:, None], cell.max(axis=0)[:, None])
         fine = np.where(beyond, bounded, fine)
     return fine
@@ -183,7 +190,9 @@ class SurfaceGrid:
         """Return the same, followed by as many points of a base: without force, in the mode of no pin."""
         base = {"height": level, "force": 0.0, "mode": float(NO_PIN)}
         values = self.values()
-        return {name: np.append(values[name], np.full_like(values[name], base[name])) for name in base}
+        return {
+            name: np.append(values[name], np.full_like(values[name], base[name])) for name in base
+        }
 
 
 def fit_skin(formed: Formed, skin_name: str, parts: int, cap: float) -> SurfaceGrid:
