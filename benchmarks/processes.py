@@ -223,11 +223,9 @@ def _move(port: int, token: str, rate: int, fingers: int) -> tuple[list[float], 
     times = np.arange(0.0, scene.simulation.duration or scene.periods * 5e-3, 1.0 / rate)
     poses = sample_poses(scene.trajectories(), times)[:, 0]
     places = APART * (np.array([(k % 5, k // 5) for k in range(fingers)]) - (2.0, 0.5))
-    header, random, start = (
-        {"Authorization": f"Bearer {token}"},
-        np.random.default_rng(1),
-        time.perf_counter(),
-    )
+    header = {"Authorization": f"Bearer {token}"}
+    random = np.random.default_rng(1)
+    start = time.perf_counter()
     sent, answers, frames, answered, due = [start], list[float](), 0, 0, start
 
     def make_message(number: int) -> bytes | str:
@@ -245,10 +243,8 @@ def _move(port: int, token: str, rate: int, fingers: int) -> tuple[list[float], 
     ):
         while True:
             if due <= time.perf_counter():
-                message, due = (
-                    make_message(len(sent)),
-                    time.perf_counter() + random.uniform(0.5, 1.5) / CAMERA,
-                )
+                message = make_message(len(sent))
+                due = time.perf_counter() + random.uniform(0.5, 1.5) / CAMERA
                 sent.append(time.perf_counter())
                 client.send(message)
             with suppress(TimeoutError):

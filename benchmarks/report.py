@@ -66,9 +66,8 @@ class Curves:
             panel.set_axis_off()
         labels = dict.fromkeys(label for lines in self.panels.values() for label in lines)
         for panel, (title, lines) in zip(axes, self.panels.items(), strict=False):
-            for (
-                label
-            ) in labels:  # also those without points here: a label has one look in all panels
+            for label in labels:
+                # Also those without points here: a label has one look in all panels.
                 panel.plot(*np.reshape(lines.get(label, ()), (-1, 2)).T, label=label)
             panel.set(title=title, xlabel=self.x, ylabel=self.y, xscale="log", yscale=self.scale)
             if self.scale == "linear":

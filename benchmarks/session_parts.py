@@ -94,10 +94,8 @@ class Counted(np.ndarray[Any, Any]):
     def __array_ufunc__(
         self, ufunc: Any, method: str, *inputs: Any, out: Any = None, **named: Any
     ) -> Any:
-        name, named = (
-            ufunc.__name__ if method == "__call__" else f"{ufunc.__name__}.{method}",
-            _plain(named),
-        )
+        name = ufunc.__name__ if method == "__call__" else f"{ufunc.__name__}.{method}"
+        named = _plain(named)
         if out is not None:
             named["out"] = _plain(out)
         result = _call(name, getattr(ufunc, method), inputs, named)

@@ -122,10 +122,8 @@ def sections(session: Session) -> Iterator[Section]:
         if np.any(cells) and np.any(middle):
             sign = -1.0 if part == "valley" else 1.0
             high, wanted = (float(np.median(sign * heights[middle])) for heights in (formed, asked))
-            scale, rim = (
-                high / wanted if wanted else 1.0,
-                float((sign * formed)[cells].max()) - high,
-            )
+            scale = high / wanted if wanted else 1.0
+            rim = float((sign * formed)[cells].max()) - high
             drawn, pins = scale * asked[cells], float((sign * formed)[parts[part]].max()) - high
             yield Section(
                 name, part, where[cells], formed[cells], drawn, high - wanted, wanted, rim, pins

@@ -49,10 +49,8 @@ WINDOWS = {
 def measure_windows(done: Result) -> dict[str, dict[str, float | None]]:
     """Return RFD, N, and deviations of force, N, and height, m, while shaping, by the names of `WINDOWS`."""
     time, sums = done.history["time"], summary.sum_cells(done.history)
-    weight, wanted = (
-        summary.compute_weights(time),
-        find_set_point(done.scene.set_point, sums.following),
-    )
+    weight = summary.compute_weights(time)
+    wanted = find_set_point(done.scene.set_point, sums.following)
     above = np.full(len(time), np.nan)
     above[sums.touching] = summary.measure_surface_under(sums, done.history["fingertip"])
     windows = {}
@@ -106,10 +104,8 @@ def dragged(
     follows, done = speed_limits.track(scene, way, speed)
     _, start, end = way.path(speed, scene.actuator.rest_height)
     part = select_rows(done.history, start, end)
-    total, following = (
-        part["total_force"],
-        np.count_nonzero(part["mode"] == Mode.FORCE_FOLLOW, axis=1),
-    )
+    total = part["total_force"]
+    following = np.count_nonzero(part["mode"] == Mode.FORCE_FOLLOW, axis=1)
     # The cells in the fingertip's line, short of the place where it stops.
     place = part["position"]
     line = np.abs(place[:, 1]) < 0.5 * scene.layout.pitch
@@ -318,10 +314,8 @@ def _swing(
     case, quick = scenes.held(gain, position_gain, device, method)
     done = _run(case)
     end = float(done.history["time"][-1])
-    late, after = (
-        select_rows(done.history, end - WATCHED, end),
-        select_rows(done.history, quick, end),
-    )
+    late = select_rows(done.history, end - WATCHED, end)
+    after = select_rows(done.history, quick, end)
     wanted = find_set_point(
         case.set_point, np.count_nonzero(after["mode"] == Mode.FORCE_FOLLOW, axis=1)
     )

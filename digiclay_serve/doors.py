@@ -247,9 +247,8 @@ class Doors(AbstractContextManager["Doors"]):
     def _read_line(self, patience: float) -> Record:
         """Read a line of JSON; an empty answer when there is none in time, s."""
         line = b"\n"
-        while (
-            line == b"\n" and select.select([self._output], [], [], patience)[0]
-        ):  # bells before it
+        while line == b"\n" and select.select([self._output], [], [], patience)[0]:
+            # Bells before it.
             line = self._output.readline()
         return dict(json.loads(line)) if line.strip() else {}
 

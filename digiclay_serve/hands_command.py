@@ -87,15 +87,12 @@ def carry_out(arguments: Namespace) -> int:
     refuse_without("digiclay hands", "serve", "websockets", "pythonosc")
     from .tuio import Pad
 
-    logging.getLogger().addHandler(
-        logging.NullHandler()
-    )  # python-osc prints what hostile senders like
+    # Python-osc prints what hostile senders like.
+    logging.getLogger().addHandler(logging.NullHandler())
     if arguments.token is None and VARIABLE not in os.environ:
         raise OutputError(f"digiclay hands needs the token of the server: --token, or {VARIABLE}.")
-    token, pad = (
-        choose_token(arguments.token)[0],
-        (arguments.height, arguments.size, arguments.depth),
-    )
+    token = choose_token(arguments.token)[0]
+    pad = (arguments.height, arguments.size, arguments.depth)
     for name, length in zip(("--height", "--size", "--depth"), pad, strict=True):
         if not 0.0 < length <= 1.0:
             raise OutputError(f"{name} must be above 0 and at most 1000 mm (got {1e3 * length:g}).")

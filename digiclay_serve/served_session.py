@@ -150,11 +150,9 @@ def feel(session: Session, time: float) -> Felt:
     """Return what the fingertips feel, by the laws of the first, before a time, s."""
     state, system, poses = session.state, session.system, session.poses
     first, heights, force = session.scene.fingers[0], state.row(0), state.finger_forces()
-    law, tip, peak = (
-        first.contact or Contact(),
-        first.fingertip or Fingertip(),
-        float(heights.max()),
-    )
+    law = first.contact or Contact()
+    tip = first.fingertip or Fingertip()
+    peak = float(heights.max())
     # What grows is the tension: the force and what has relaxed of it meanwhile; none over the clay.
     tension = np.where(force > 0.0, force + session.relaxed @ _read_pulp(session.scene)[0], 0.0)
 
@@ -274,11 +272,9 @@ def make_frame(session: Session, flags: int = 0) -> Frame:
     if (largest := float(each.max())) > most:
         flags |= Flag.FORCE_LIMITED
         share = most / largest
-        forces, each, total = (
-            forces * share,
-            each * share,
-            total * share if system.fingers > 1 else most,
-        )
+        forces = forces * share
+        each = each * share
+        total = total * share if system.fingers > 1 else most
     pins = state.row(0).astype(np.float32), forces.astype(np.float32)
     time = state.period * system.period
     rows = session.tracks.identities.tolist(), each.tolist(), map(tuple, session.poses.tolist())

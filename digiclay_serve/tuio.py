@@ -45,14 +45,10 @@ class Pad:
 
     def fingers(self, now: float) -> dict[int, Floats]:
         """Return the lowest points (3,), m, of the fingers that are there at a time, s, by identity."""
-        corner, scale = (
-            (-0.5 * self.size, 0.5 * self.size, self.height),
-            (self.size, -self.size, -self.depth),
-        )
-        there, usual = (
-            self.contacts.items() if now - self.heard <= GONE else (),
-            not self.senses and USUAL,
-        )
+        corner = (-0.5 * self.size, 0.5 * self.size, self.height)
+        scale = (self.size, -self.size, -self.depth)
+        there = self.contacts.items() if now - self.heard <= GONE else ()
+        usual = not self.senses and USUAL
         return {
             identity: corner + np.add(touch, (0.0, 0.0, usual)) * scale
             for identity, touch in there

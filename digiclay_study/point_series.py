@@ -97,9 +97,8 @@ def fit_ranges(ranges: Sequence[Range], path: Path, settings: Sequence[Setting])
 def _fit(varied: Range, scene: Scene, path: Path, settings: Sequence[Setting]) -> Range:
     """Return a range as the scene's parameter has it."""
     declared = axes.find_quantity(scene, varied.key)
-    if (
-        declared is None or varied.words
-    ):  # an unknown key, or a word: the scene file's own rules tell
+    if declared is None or varied.words:
+        # An unknown key, or a word: the scene file's own rules tell.
         for word in varied.words or (varied.find_word(0.0),):
             load(path, [*settings, Setting(varied.key, word, "--vary")])
         return varied

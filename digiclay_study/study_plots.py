@@ -161,10 +161,8 @@ def draw_indices(keys: Sequence[str], outputs: Mapping[str, Indices | None], tit
             panel.grid(visible=False, axis="y")
             panel.axvline(0.0, color=INK, linewidth=0.8)
         ends = np.array([panel.get_xlim() for panel in axes])
-        low, high = (
-            max(min(ends.min(), -0.05), FARTHEST[0]),
-            min(max(ends.max(), 1.05), FARTHEST[1]),
-        )
+        low = max(min(ends.min(), -0.05), FARTHEST[0])
+        high = min(max(ends.max(), 1.05), FARTHEST[1])
         for panel in axes:
             panel.set_xlim(low, high)
         figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower right", ncols=2)

@@ -50,9 +50,8 @@ def go_on(session, ticks):
     now = session.clock.seen or 0.0
     for count in range(ticks):
         time = now + (count + 1) * TICK
-        if (
-            session.strokes and not session.paused
-        ):  # else the machine's speed would tell how far it comes
+        if session.strokes and not session.paused:
+            # Else the machine's speed would tell how far it comes.
             periods = round((time - now) / PERIOD) - round((time - TICK - now) / PERIOD)
             session = replace(
                 session, clock=replace(session.clock, seen=time), tick=session.tick + 1

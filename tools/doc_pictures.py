@@ -53,8 +53,7 @@ INSTANTS = {
 #: Area of a picture of 640 x 400 pixels beside its legend.
 BESIDE = (120, 10, 640, 400)
 #: Film of one of them: a series, and how long a frame is shown, ms.
-HAND_FILM, SHOWN_FOR = (
-    """\
+HAND_FILM = """\
 scenes = ["two_hands_bowl"]
 [film]
 width = 640
@@ -62,17 +61,14 @@ height = 400
 rate = 10
 speed = 3.0
 arrows = false
-""",
-    100,
-)
+"""
+SHOWN_FOR = 100
 #: Size of each of the four views, pixels; how much of the world one shows, mm.
 SIZE, SHOWN = (576, 395), 116.0
 #: Colors of solids, bosses and creases: told apart with any color vision.
-GRAY, ORANGES, BLUE = (
-    (0.55, 0.60, 0.65),
-    ((0.80, 0.36, 0.02), (1.0, 0.70, 0.20)),
-    (0.02, 0.32, 0.75),
-)
+GRAY = (0.55, 0.60, 0.65)
+ORANGES = ((0.80, 0.36, 0.02), (1.0, 0.70, 0.20))
+BLUE = (0.02, 0.32, 0.75)
 #: What is exported for each view.
 VIEWS = (
     ["--kind", "solid"],

@@ -42,11 +42,9 @@ def draw_curves(
     """Draw the curves of each law into its panel."""
     scene = digiclay.scene({"sensors": {"force_noise": STEP, "force_step": STEP}})
     system, limit = assemble(scene), {"color": "k", "linestyle": "--"}
-    law, high, sizes = (
-        scene.valve.flow_law(scene.fluid),
-        scene.supply.high,
-        np.array([1.0, 0.5, 0.25]),
-    )
+    law = scene.valve.flow_law(scene.fluid)
+    high = scene.supply.high
+    sizes = np.array([1.0, 0.5, 0.25])
     drops, knees = np.logspace(3, 7.5)[:, None], law.knee / sizes**2
     valve.loglog(
         drops / BAR, 1e9 * law.flow(sizes, drops), label=[f"h* = {size:g}" for size in sizes]
@@ -65,11 +63,9 @@ def draw_curves(
         MM * depths, cell.touch.contact.stiffness * depths, "k--", label="slope b at $x_0$ = 0"
     )
 
-    dead, end, times = (
-        scene.delay.dead_time,
-        scene.valve_lag.time_constant,
-        np.linspace(0.0, 12e-3, 241),
-    )
+    dead = scene.delay.dead_time
+    end = scene.valve_lag.time_constant
+    times = np.linspace(0.0, 12e-3, 241)
     lag.plot(
         MM * times,
         system.cell.lag.response(split_delay(scene.delay, 1.0), times)[:, -1],

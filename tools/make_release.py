@@ -164,10 +164,8 @@ def build_twice(scratch: Path, commit: str, instant: int) -> Path:
 def check_files(folder: Path, version: str) -> None:
     """Check names, versions and size of the three files, and how a package index would show them."""
     wheel, source = f"digiclay-{version}-py3-none-any.whl", f"digiclay-{version}.tar.gz"
-    wanted, names = (
-        {f"digiclay-{version}.zip", wheel, source},
-        {path.name for path in folder.iterdir()},
-    )
+    wanted = {f"digiclay-{version}.zip", wheel, source}
+    names = {path.name for path in folder.iterdir()}
     if names != wanted:
         raise ReleaseError(f"the files are {sorted(names)}, and {sorted(wanted)} was to be built.")
     size = (folder / f"digiclay-{version}.zip").stat().st_size

@@ -120,10 +120,8 @@ def move_fingertips(
         if number in every:
             parts.setdefault(every[number].parent, []).append((every[number], _place(at, finger)))
     for above, tips in parts.items():
-        role, stood = (
-            above and above.get(ROLE),
-            np.array(above.matrix_world if above else np.eye(4)),
-        )
+        role = above and above.get(ROLE)
+        stood = np.array(above.matrix_world if above else np.eye(4))
         if role == PALM and len(tips) == sum(tip.parent == above for tip in every.values()):
             ways = [whole @ pose @ np.linalg.pinv(tip.matrix_world) for tip, pose in tips]
             if np.ptp(ways, axis=0).max() < STRAY:
@@ -151,9 +149,8 @@ def resize_fingertip(tip: Object, finger: Fingertip) -> None:
     tip[AXES] = axes.tolist()
     tip.empty_display_size = 1.3 * float(axes.max()) * SCALE
     for ball in tip.children:
-        if (
-            ball.get(ROLE) == ELLIPSOID
-        ):  # other things may hang on the fingertip, and keep their size
+        if ball.get(ROLE) == ELLIPSOID:
+            # Other things may hang on the fingertip, and keep their size.
             ball.scale = axes * SCALE
 
 

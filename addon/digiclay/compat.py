@@ -96,9 +96,8 @@ def has_node_setting(modifier: Modifier, name: str) -> bool:
 def node_setting(modifier: Modifier, name: str) -> Any:
     """Return what a geometry nodes modifier sets an input of its tree to."""
     identifier = _identifier(modifier, name)
-    if hasattr(
-        modifier, "properties"
-    ):  # from 5.2 on; before that the modifier itself is the dictionary
+    if hasattr(modifier, "properties"):
+        # From 5.2 on; before that the modifier itself is the dictionary.
         return getattr(modifier.properties.inputs, identifier).value
     return modifier[identifier]
 
@@ -158,9 +157,8 @@ def own_curves(owner: ID) -> None:
     data = owner.animation_data
     if not data or data.action is None:
         return
-    slot = getattr(
-        data, "action_slot", None
-    )  # up to 4.3 an action has the same curves for all its users
+    # Up to 4.3 an action has the same curves for all its users.
+    slot = getattr(data, "action_slot", None)
     if (data.action.users if slot is None else len(slot.users())) < 2:
         return
     action = data.action.copy()

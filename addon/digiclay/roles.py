@@ -13,14 +13,12 @@ if TYPE_CHECKING:
 ROLE = "digiclay_role"
 #: A housing is an object of its own in older files only. A pin is whatever the bed's nodes draw,
 #: and a bake holds baked pins: both stand in no scene.
-BED, FINGERTIP, ELLIPSOID, HOUSING, PIN, BAKE = (
-    "bed",
-    "fingertip",
-    "ellipsoid",
-    "housing",
-    "pin",
-    "bake",
-)
+BED = "bed"
+FINGERTIP = "fingertip"
+ELLIPSOID = "ellipsoid"
+HOUSING = "housing"
+PIN = "pin"
+BAKE = "bake"
 #: The empty between a bed and the fingertips of a hand, which moves them as one.
 PALM = "palm"
 #: Properties by which a bed holds its fingertip, and that its ellipsoid: what is held is appended

@@ -155,10 +155,8 @@ class Law:
     def underside(self, time: float) -> Floats:
         """Return the fingertip's underside over the pins, (n,), m."""
         at_x, at_y, at_z = self.pose(time)
-        across, along = (
-            self.across - at_x / self.tip["length"],
-            self.along - at_y / self.tip["width"],
-        )
+        across = self.across - at_x / self.tip["length"]
+        along = self.along - at_y / self.tip["width"]
         inward = 1.0 - across * across - along * along
         inside = np.maximum(inward, 1.0 - JOIN)
         shape = np.sqrt(inside) + (inward - inside) * (0.5 / ROOT)

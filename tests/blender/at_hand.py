@@ -41,9 +41,8 @@ def read_picture(path):
 def film_strip(scene, path):
     """Put a film into the sequencer of a scene; return its strip and how many frames it has."""
     strip = strips(scene).new_movie("film", str(path), channel=1, frame_start=1)
-    return strip, int(
-        strip.duration if hasattr(strip, "duration") else strip.frame_final_duration
-    )  # 5.2 on
+    # 5.2 on.
+    return strip, int(strip.duration if hasattr(strip, "duration") else strip.frame_final_duration)
 
 
 def in_the_view():

@@ -121,10 +121,8 @@ def test_a_bed_has_the_plan_and_the_fingertip_of_its_kind(name):
     assert scene.actuator.bore <= scene.layout.pitch
     assert (scene.preset, scene.method) == (wanted.preset, wanted.method)
     bed.digiclay.chosen_method = "cell_states"  # another method's blister is in proportion too
-    other, usual = (
-        properties.scene_of(bed).blister,
-        resolve({"control": {"method": "cell_states"}}).blister,
-    )
+    other = properties.scene_of(bed).blister
+    usual = resolve({"control": {"method": "cell_states"}}).blister
     assert other.radius == pytest.approx(wanted.share * usual.radius, rel=1e-6)  # 32 bits
 
 

@@ -403,14 +403,10 @@ def move_one():
     bpy.ops.transform.translate(value=(0.01, 0.0, 0.0))
 
 
-LAYOUT, ROWS = (
-    "The pins differ from the parameters of Layout: press Rebuild",
-    "pins, in rows along x",
-)
-NOT_PINS, SOME = (
-    "mesh is no longer that of its pins: undo that",
-    "pins now instead of 25: undo that",
-)
+LAYOUT = "The pins differ from the parameters of Layout: press Rebuild"
+ROWS = "pins, in rows along x"
+NOT_PINS = "mesh is no longer that of its pins: undo that"
+SOME = "pins now instead of 25: undo that"
 #: What Blender's own verbs make of a bed, which are selected then, and what is said against a
 #: session and a bake of each bed, and against its export as it is drawn; nothing: they are right.
 VERBS = {

@@ -68,9 +68,8 @@ def test_every_part_of_a_scene_has_a_panel():
 
 def test_the_tab_shows_what_a_sculptor_needs_and_keeps_what_a_researcher_needs_closed():
     drawn = [kind for kind in panels.CLASSES if issubclass(kind, bpy.types.Panel)]
-    drawn = [
-        kind for kind in drawn if kind.bl_region_type != "HEADER"
-    ]  # opens from the header of the tool
+    # Opens from the header of the tool.
+    drawn = [kind for kind in drawn if kind.bl_region_type != "HEADER"]
     places = {(kind.bl_space_type, kind.bl_region_type, kind.bl_category) for kind in drawn}
     assert places == {("VIEW_3D", "UI", CATEGORY)}
     orders = [(kind.bl_parent_id, kind.bl_order) for kind in drawn]

@@ -77,10 +77,11 @@ def test_an_older_bed_is_colored_by_force_under_the_former_names():
 def test_the_take_replays_to_the_stored_heights():
     found = bed("Session")
     first, second = takes.list_takes(found)
+    # The second was recorded when it was saved.
     assert (first.name, second.name) == (
         "A press",
         "Take 2",
-    )  # the second was recorded when it was saved
+    )
     take = takes.read(found, first.number)
     system = assemble(take.scene)
     np.testing.assert_array_equal(snapshot.load(system, take.start).row(0), HEIGHTS["take_start"])

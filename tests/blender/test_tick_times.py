@@ -44,18 +44,16 @@ def test_the_finger_presses_while_ticks_are_timed(monkeypatch):
         return session
 
     monkeypatch.setattr(sculpting, "advance", watched)
-    monkeypatch.setattr(
-        live_session, "SHARE", 0.0
-    )  # a machine too slow for more than one period a tick
+    # A machine too slow for more than one period a tick.
+    monkeypatch.setattr(live_session, "SHARE", 0.0)
     draw_circles(*BED, ticks=6)
     assert live_session.SHARE == 0.0
     assert min(lowest[-6:]) < 40e-3 - DEPTH / 2
     assert periods[-1] > periods[-7]
 
 
-@pytest.mark.usefixtures(
-    "extension"
-)  # as where a user has enabled it: everything is registered already
+# As where a user has enabled it: everything is registered already.
+@pytest.mark.usefixtures("extension")
 def test_a_session_does_not_gather_memory_as_it_goes_on():
     # What fits into the rings of trace and gestures is kept, and filled arrays of known widths: up
     # to 77 kB in ten runs. A leak of a state a tick were 25 times 13 kB.
@@ -71,9 +69,8 @@ def test_the_commands_print_tables_write_figures_and_draw_the_histogram(
     monkeypatch.setattr(tick_times, "VIEWPORT", ((12, 12, 5e-3), (12, 14, 5e-3)))
     for name, count in (("WARM_UP", 5), ("QUICK", 5), ("FEW", 2)):
         monkeypatch.setattr(tick_times, name, count)
-    monkeypatch.setattr(
-        tick_times, "keep_to_one_core", lambda: None
-    )  # other tests go on in this process
+    # Other tests go on in this process.
+    monkeypatch.setattr(tick_times, "keep_to_one_core", lambda: None)
     for kind in ("ticks", "viewport"):
         assert main([kind, "--quick", "--quiet", "--out", str(tmp_path)]) == 0
     told = capsys.readouterr().out

@@ -58,9 +58,8 @@ def test_the_pins_stand_where_the_arrays_say_in_the_material_of_their_mode(bed, 
         tops, materials = drawn_pins(bed)
         wanted = np.column_stack([instant.position, instant.height])
         assert_near(tops, wanted, FLOAT32)
-        assert not view.wants_force(
-            bed
-        )  # an instant's forces are there though nothing drawn tells them
+        # An instant's forces are there though nothing drawn tells them.
+        assert not view.wants_force(bed)
         assert np.array_equal(
             bridge.read_cells(bed.data)["force"], instant.force.astype(np.float32)
         )
@@ -106,9 +105,8 @@ def test_every_rod_reaches_down_to_the_deck_of_the_housing(bed, formed):
     ]
     assert len(feet) == 48
     housing = bed.evaluated_get(bpy.context.evaluated_depsgraph_get())
-    deck = housing.data.vertices[
-        -1
-    ].co.z  # the housing is drawn from its underside to the deck inside
+    # The housing is drawn from its underside to the deck inside.
+    deck = housing.data.vertices[-1].co.z
     # float32 on lengths below one unit.
     assert_near(feet, deck, 1e-6)
     assert deck / bridge.SCALE < formed.height.min()

@@ -140,10 +140,8 @@ def test_a_broken_adapter_is_one_line_and_exit_code_2(word, tmp_path, monkeypatc
     monkeypatch.setattr(run, "NAMES", ())
     if BROKEN[word]:
         (tmp_path / "mine.py").write_text(BROKEN[word], encoding="utf-8")
-    code, told = (
-        main(["peers", "--quick", "--quiet", str(tmp_path / "mine.py")]),
-        capsys.readouterr(),
-    )
+    code = main(["peers", "--quick", "--quiet", str(tmp_path / "mine.py")])
+    told = capsys.readouterr()
     assert (code, told.out, told.err.count("\n"), word in told.err) == (2, "", 1, True)
 
 

@@ -117,8 +117,7 @@ def test_the_page_sets_method_three_beside_the_others(text, numbers):
     table = text.split("## Method III")[1]
     row = next(line for line in table.splitlines() if line.startswith("| RFD in the session (N)"))
     shown = [float(cell) for cell in row.strip("|").split("|")[1:]]
-    assert shown == pytest.approx(
-        [known[method]["rfd"] for method in COMPARED], rel=5e-3
-    )  # three digits
+    # Three digits.
+    assert shown == pytest.approx([known[method]["rfd"] for method in COMPARED], rel=5e-3)
     # The goal of Method III on the session: at most half of Method I's.
     assert shown[2] < 0.5 * shown[0]

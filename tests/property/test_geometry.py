@@ -55,9 +55,8 @@ def test_the_underside_is_where_a_vertical_ray_meets_the_ellipsoid(axes):
         for square in (0.0, 0.3, 0.8, 0.95):
             x, y = within(outline, square, RANDOM.uniform(0, 2 * np.pi, 3))
             rays = [cut(pose, axes, *point) for point in zip(x, y, strict=True)]
-            assert under(outline[None], x, y)[0] == pytest.approx(
-                rays, abs=1e-14
-            )  # rounding of 0.1 m
+            # Rounding of 0.1 m.
+            assert under(outline[None], x, y)[0] == pytest.approx(rays, abs=1e-14)
     # Opposite quaternions are the same finger.
     assert np.array_equal(finger.outline(poses), finger.outline(poses * [1, 1, 1, -1, -1, -1, -1]))
     assert np.isfinite(

@@ -57,9 +57,8 @@ who = st.lists(whole | st.just(-1), max_size=32)
 )
 def test_a_frame_is_read_as_it_was_written_in_all_formats(frame, errors):
     packed = protocol.pack_frame(frame)
-    older = protocol.unpack_frame(
-        packed[: -protocol.ERRORS.size]
-    )  # of a server that knew no errors
+    # Of a server that knew no errors.
+    older = protocol.unpack_frame(packed[: -protocol.ERRORS.size])
     assert (older.errors, older.fingers, older.time) == (None, frame.fingers, frame.time)
     frame = replace(frame, errors=errors)
     read = protocol.unpack_frame(protocol.pack_frame(frame))

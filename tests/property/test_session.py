@@ -212,10 +212,8 @@ WAYPOINTS = np.array(
 )  # fmt: skip
 MIDDLE = WAYPOINTS * [1, 0, 0, 1, 1, 0, 0, 0]
 #: What a mirror across x, or across y, makes of a waypoint.
-MIRRORED_X, MIRRORED_Y = (
-    np.array([1, -1, 1, 1, 1, 1, -1, -1]),
-    np.array([1, 1, -1, 1, 1, -1, 1, -1]),
-)
+MIRRORED_X = np.array([1, -1, 1, 1, 1, 1, -1, -1])
+MIRRORED_Y = np.array([1, 1, -1, 1, 1, -1, 1, -1])
 
 
 def turned(points):

@@ -322,11 +322,9 @@ def test_a_fingertip_that_hovers_exactly_on_a_pin_changes_nothing_of_what_anothe
 def test_a_level_picture_forms_a_level_bed_up_to_pins_midway_to_pixels_without_data(
     level, arrangement
 ):
-    grid, random, covered = (
-        make_grid(Layout(24, 24, 3e-3, arrangement)),
-        np.random.default_rng(0),
-        [],
-    )
+    grid = make_grid(Layout(24, 24, 3e-3, arrangement))
+    random = np.random.default_rng(0)
+    covered = []
     without = np.tile(np.arange(24) > 20, (24, 1))
     at_pins = Placement(3e-3, 3e-3, float(grid.x[0]), float(grid.y[0]) - 1.5e-3)
     for _ in range(4):

@@ -56,10 +56,8 @@ def test_an_elastic_bed_is_felt_as_a_spring():
 def test_a_plastic_bed_stays_at_the_deepest_press_and_as_it_is_under_a_shallower_one():
     again = (*PRESS[:4], (3.2, 0, 0, 40), (3.6, 0, 0, 35.3), (3.8, 0, 0, 70), (4.8, 0, 0, 70))
     result = run(scene("plastic", again))
-    deepest, before = (
-        heights(result)[: at(result, GONE)].min(axis=0),
-        heights(result)[at(result, 3.0)],
-    )
+    deepest = heights(result)[: at(result, GONE)].min(axis=0)
+    before = heights(result)[at(result, 3.0)]
     # The valve lags 3 ms: what a pin sinks in that time after its force fell below yield is no
     # press. At 12 mm/s that is 36 µm, and the dead band comes on top.
     assert np.abs(before - deepest).max() <= 46e-6

@@ -79,9 +79,8 @@ def test_a_sample_of_hands_loses_no_finger_and_forms_what_it_is_called(name, fin
         "five_fingers_mound": ((out > 6e-3) & (out < 16e-3), out > 34e-3),
     }[name]
     assert np.median(formed[high]) > 6e-3
-    assert (
-        formed[high].min() > 7e-3 or name != "two_hands_bowl"
-    )  # where the hands meet too; 7.5 mm measured
+    # Where the hands meet too; 7.5 mm measured.
+    assert formed[high].min() > 7e-3 or name != "two_hands_bowl"
     assert np.median(formed[low]) < np.median(formed[high]) - (
         0.5e-3 if name == "pinch_crease" else 8e-3
     )

@@ -275,9 +275,8 @@ def test_pins_that_a_display_raises_against_resting_fingers_press_each_as_alone(
     for finger in trace_fingers(two, poses):
         state = advance(two, state, finger)
         forces.append(state.finger_forces())
-        assert (
-            state.active.block[0].max() <= state.active.peak
-        )  # or pins that are touched may be left out
+        # Or pins that are touched may be left out.
+        assert state.active.block[0].max() <= state.active.peak
     alone = [follow(one, poses[:, :, [finger]])[1] for finger in range(2)]
     assert np.max(forces, axis=0).min() > 0.05
     assert_near(forces, np.hstack(alone), 1e-9)
@@ -323,9 +322,8 @@ def test_a_run_of_two_fingers_has_the_metrics_of_each_and_its_errors():
     assert result.metrics["rfd"] == max(first["rfd"], second["rfd"])
     assert result.metrics["losses"] is not None
     estimated = result.estimate_errors()
-    assert (
-        0.0 < estimated.metrics["height_error"] < 30e-6
-    )  # what one finger of the paper's session has: 15 µm
+    # What one finger of the paper's session has: 15 µm.
+    assert 0.0 < estimated.metrics["height_error"] < 30e-6
 
 
 def test_the_pulp_of_a_finger_that_went_forgets_while_another_one_hovers_where_it_pressed():

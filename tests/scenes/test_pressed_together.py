@@ -220,10 +220,8 @@ def test_a_pin_that_rises_into_several_fingertips_is_pressed_at_most_as_by_each_
 
 @pytest.mark.parametrize("count", [2, 3])
 def test_a_finger_that_comes_or_goes_within_a_step_takes_no_pin_lower_than_one_that_stays(count):
-    system, random = (
-        replaying((FINGER,) * count, np.zeros((1, 1)), layout=Layout(1, 1)),
-        np.random.default_rng(0),
-    )
+    system = replaying((FINGER,) * count, np.zeros((1, 1)), layout=Layout(1, 1))
+    random = np.random.default_rng(0)
     assert system.press_together is not None
     pins = 500
     fingers, heights = np.arange(count).repeat(pins).reshape(count, pins), np.full(pins, REST)

@@ -55,11 +55,9 @@ def test_at_the_end_there_are_a_ridge_a_mound_and_a_valley_along_the_ways_of_the
 
 
 def test_the_mound_stands_where_the_finger_was_lifted_and_the_ridge_is_as_high_as_before(session):
-    found, before, grown = (
-        features(session, 26.5),
-        features(session, 10.3),
-        features(session, 14.0, 10.3),
-    )
+    found = features(session, 26.5)
+    before = features(session, 10.3)
+    grown = features(session, 14.0, 10.3)
     assert (before.keys(), grown.keys()) == ({"ridge"}, {"mound"})
     for mound in (found["mound"], grown["mound"]):
         assert np.linalg.norm(mound.region.position.mean(axis=0) - (21e-3, -21e-3)) < 6e-3

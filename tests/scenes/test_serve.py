@@ -293,9 +293,8 @@ def test_a_flood_or_a_slow_reader_harms_nobody(server):
     with (
         server.connect("?format=binary&rate=200") as other,
         server.connect("?rate=0", close_timeout=0) as client,
-        server.connect(
-            "?rate=200", max_queue=1, close_timeout=0
-        ) as slow,  # reads nothing from here on
+        # Reads nothing from here on.
+        server.connect("?rate=200", max_queue=1, close_timeout=0) as slow,
     ):
         slow.recv(TIMEOUT)
         with suppress(OSError):  # a machine that takes them within a second closes the client
@@ -344,9 +343,8 @@ def test_a_thousand_silent_connections_shut_out_nobody_with_the_token(server):
         silent = [socket.create_connection(("127.0.0.1", server.port)) for _ in range(1000)]
         try:
             press(client, 20)
-            while (
-                server.count("connections beyond the limit") < 488
-            ):  # all but the newest 512 are cut
+            while server.count("connections beyond the limit") < 488:
+                # All but the newest 512 are cut.
                 press(client, 20)
         finally:
             for one in silent:
@@ -397,9 +395,8 @@ def is_well_by_osc(door, number):
     subscribe = message("/digiclay/subscribe", TOKEN, "state", 200.0)
     pose = message("/digiclay/pose", TOKEN, *PLACE, number)
     state = [0, 0]
-    while state[1] != number or state[4:7] != pytest.approx(
-        PLACE, abs=1e-8
-    ):  # python-osc sends 32 bits
+    while state[1] != number or state[4:7] != pytest.approx(PLACE, abs=1e-8):
+        # Python-osc sends 32 bits.
         state = received(door, "/digiclay/state", subscribe, pose)
     assert state[1] == number
 
@@ -462,9 +459,8 @@ def test_garbage_harms_nobody(door):
     for cut in range(0, len(good), 3):
         door.send(good[:cut])
     door.send(b"#bundle\0" + bytes(8) + b"\x7f\xff\xff\xff" + good)
-    for kind in range(
-        1, 1000
-    ):  # arguments of kinds that are none: nothing is printed, see `Server.stop`
+    for kind in range(1, 1000):
+        # Arguments of kinds that are none: nothing is printed, see `Server.stop`.
         door.send(b"/digiclay/pose\0\0," + bytes([1 + kind % 31, 1 + kind % 97, 0]) + bytes(16))
     is_well_by_osc(door, 4)
 

@@ -249,7 +249,8 @@ def test_finished_jobs_are_kept_also_from_elsewhere_and_changed_or_half_written_
     for folder in (
         far / "jobs/tap-quick",
         "two/jobs/tap-slow",
-    ):  # in this process: others take seconds
+    ):
+        # In this process: others take seconds.
         assert main(["job", str(folder), "--quiet"]) == 0
     shutil.copytree(far / "runs" / "tap-quick", "two/runs/tap-quick")
     shutil.rmtree("two/jobs")

@@ -80,11 +80,12 @@ def test_a_stroke_leaves_its_nominal_surface_and_presses_no_harder_than_a_finger
 @pytest.mark.parametrize(
     "tables, height, off",
     [
+        # Five standard deviations.
         (
             {"sensors": {"force_noise": "2 mN", "height_noise": "20 um"}},
             15.0,
             0.1,
-        ),  # five standard deviations
+        ),
         ({"actuator": {"stroke": "50 mm"}}, 10.0, 0.01),  # as far as the pins go
     ],
 )

@@ -31,10 +31,8 @@ BALANCE = 0.5e5 * math.pi * 1e-6
 
 def test_pressure_is_force_and_speed_flow_over_area_and_reservoirs_move_pins_their_way_alone():
     assert Actuator().pressure(np.array([BALANCE])) == pytest.approx(0.5e5, rel=1e-15)
-    flow, height = (
-        np.array([1, 1, -1, -1, 1]) * math.pi * 1e-8,
-        np.array([50e-3, 100e-3, 0.0, 100e-3, 0.0]),
-    )
+    flow = np.array([1, 1, -1, -1, 1]) * math.pi * 1e-8
+    height = np.array([50e-3, 100e-3, 0.0, 100e-3, 0.0])
     assert Actuator().rate(flow, height) == pytest.approx(
         [10e-3, 0.0, 0.0, -10e-3, 10e-3], rel=1e-14
     )
@@ -46,12 +44,13 @@ def test_pressure_is_force_and_speed_flow_over_area_and_reservoirs_move_pins_the
     "parts, rise, fall, digits",
     [
         ({}, 24e-3, -24e-3, 0.01),  # as printed
+        # The fast preset; to one digit.
         (
             {"valve": Valve(orifice_diameter=0.6e-3)},
             50e-3,
             -50e-3,
             0.05,
-        ),  # the fast preset; to one digit
+        ),
         ({"fluid": Fluid(viscosity=1.6e-9)}, 0.0, 0.0, math.inf),  # turbulent
         ({"supply": Supply(0.8e5, -0.2e5)}, 38.4e-3, -9.6e-3, 0.01),  # as the drops
     ],
@@ -244,10 +243,8 @@ def test_the_cells_together_carry_what_a_flat_plate_does(arrangement, share):
     # The share f_d was fitted for this: 0.34 on the square grid, 0.29 on the hexagonal one. One
     # constant cannot match all depths: a quarter from 1 to 2.4 mm, averaged over where the finger
     # stands.
-    contact, bed = (
-        Contact(share=share),
-        make_grid(Layout(rows=15, columns=15, arrangement=arrangement)),
-    )
+    contact = Contact(share=share)
+    bed = make_grid(Layout(rows=15, columns=15, arrangement=arrangement))
     offsets = np.stack(np.meshgrid(np.arange(6), np.arange(6)), axis=-1).reshape(-1, 2) * 0.5e-3
     for depth in (1e-3, 1.5e-3, 2e-3, 2.4e-3):
         poses = np.array([[x, y, -depth, *LEVEL] for x, y in offsets])
@@ -286,9 +283,8 @@ def filtered(own, first, last, step):
 
 def test_relaxation_is_the_sum_of_equation_12_and_what_relaxes_quicker_than_the_step_a_share():
     times = np.array([0.0, 1e-3, 5e-3, 0.1, 1.0, 100.0])
-    assert Relaxation().reduced(times) == pytest.approx(
-        [reduced(t) for t in times], rel=1e-14
-    )  # rounding
+    # Rounding.
+    assert Relaxation().reduced(times) == pytest.approx([reduced(t) for t in times], rel=1e-14)
     assert Relaxation().reduced(times[[0, -1]]) == pytest.approx([1.0, 0.08], abs=1e-15)
     # The slowest of 1 ns filters in a step of 5 ms: all but 2 in 5e6 of the tension is lost at
     # once.

@@ -86,10 +86,8 @@ def calls(count):
     scenes = [point.scene for point in some(f"control.force_gain=1:6:{count}", settings=[])]
     systems = [assemble(scene) for scene in scenes if scene]
     stack = make_batch(systems)
-    state, ways = (
-        begin(stack),
-        [scene.section("trajectory").trajectory() for scene in scenes if scene],
-    )
+    state = begin(stack)
+    ways = [scene.section("trajectory").trajectory() for scene in scenes if scene]
     made, counted = [0], []
 
     def count_one(frame, event, argument):

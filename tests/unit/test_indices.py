@@ -134,12 +134,13 @@ RUNS = [
     "name, usual, values, counts",
     [
         ("rfd", 0.0, [0.2, 0.5, 0.5, 0.5, 0.5], (2, 1)),
+        # What the unchanged scene loses is no loss.
         (
             "rfd",
             0.26,
             [0.2, 0.5, 0.5, 0.5, 0.01],
             (2, 0),
-        ),  # what the unchanged scene loses is no loss
+        ),
         ("contact_loss_share", 0.0, [0.0, 0.04, 0.3, 0.3, 0.3], (2, 0)),  # the loss keeps its value
         ("contact_share", 0.0, [1.0, 0.96, 0.7, 0.7, 0.7], (2, 0)),  # of which less is worse
     ],

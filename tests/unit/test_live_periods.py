@@ -199,9 +199,8 @@ def test_a_trace_has_no_more_than_its_rows_goes_back_with_time_and_has_each_cell
     assert np.isnan(recent_trace.sample(SYSTEM, state, None, ())[2])
     assert np.isnan(recent_trace.sample(SYSTEM, state, asked, ())[2])
     held.mode[:3] = Mode.FORCE_FOLLOW
-    assert recent_trace.sample(SYSTEM, state, asked, ())[2] == pytest.approx(
-        0.12, rel=1e-12
-    )  # rounding
+    # Rounding.
+    assert recent_trace.sample(SYSTEM, state, asked, ())[2] == pytest.approx(0.12, rel=1e-12)
 
 
 def test_a_trace_knows_force_set_point_and_heights_of_picked_pins_one_that_stays_picked_its_past():

@@ -85,9 +85,8 @@ def test_a_folder_that_is_being_written_is_refused_at_once_by_every_command(refu
 )
 def test_a_second_series_in_one_folder_is_refused_at_once(line, refused):
     write_jobs()
-    finished = (
-        f"{line} --prepare" if line.startswith("batch") else line
-    )  # nothing is to be simulated
+    # Nothing is to be simulated.
+    finished = f"{line} --prepare" if line.startswith("batch") else line
     assert call(f"{finished} --out o --quiet") == 0
     with hold_lock(Path("o/.lock"), "no"):
         refused(f"{line} --out o --quiet", REFUSED.format("used"))
@@ -237,9 +236,8 @@ def test_a_process_is_known_by_the_time_it_was_started():
         assert not may_have_made(process.pid, since - 3600.0)
     finally:
         process.kill()
-        wait_until(
-            lambda: find_start(process.pid) is None
-        )  # although nobody has asked how it ended
+        # Although nobody has asked how it ended.
+        wait_until(lambda: find_start(process.pid) is None)
         finish(process)
     assert not may_have_made(process.pid, time.time())
 

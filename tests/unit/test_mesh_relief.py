@@ -197,16 +197,18 @@ def turned(share):
 @pytest.mark.parametrize(
     "mesh, bare",
     [
+        # More than a twentieth of the pins.
         (
             scan((0.0, 0.0, 12.0)),
             lambda x, y: np.hypot(x, y) < 11.0,
-        ),  # more than a twentieth of the pins
+        ),
         (trimesh.creation.annulus(3.0, 30.0, 10.0), lambda x, y: np.hypot(x, y) < 2.5),
         (scan((-20.0, 0.0, 4.0), size=21.0), lambda x, y: np.abs(x) > 22.0),  # beside a scan
+        # A bay to the rim of the bed.
         (
             scan((-36.0, 0.0, 4.0)),
             lambda x, y: np.hypot(x + 36.0, y) < 2.0,
-        ),  # a bay to the rim of the bed
+        ),
         (turned(1.0), lambda x, y: x > 99.0),
         (turned(0.85), lambda x, y: x > 99.0),
     ],

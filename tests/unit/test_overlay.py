@@ -56,9 +56,8 @@ def said(picture):
 
 @given(COLOR, st.one_of(st.none(), COLOR))
 def test_letters_and_curves_stand_out_from_any_theme(back, ink):
-    chosen = choose_colors(
-        back, ink or back
-    )  # letters of the color of the ground: the worst there is
+    # Letters of the color of the ground: the worst there is.
+    chosen = choose_colors(back, ink or back)
     # The guidelines' contrasts, as near as steps of a fortieth of the way to black or white come.
     assert min(contrast(ink, back) for ink in (chosen.ink, chosen.faint)) >= LETTERS - 0.01
     assert (

@@ -62,10 +62,8 @@ def find_stated(scene, system):
     """Return what the method of a scene states for strokes from a bed at rest."""
     tracking = find_tracking(scene, system)
     assert tracking is not None  # the methods here form a blister
-    drag, push = (
-        tracking.limit_drag(RIDGE, pressed=False),
-        tracking.limit_drag(-VALLEY, pressed=True),
-    )
+    drag = tracking.limit_drag(RIDGE, pressed=False)
+    push = tracking.limit_drag(-VALLEY, pressed=True)
     return replace(tracking, drag=drag, push=push)
 
 
@@ -155,9 +153,8 @@ def test_a_pace_that_is_too_fast_is_seen_to_fail(raised, height):
 def test_what_is_made_for_hands_is_led_at_100_mm_a_second_and_a_method_of_one_s_own_carefully():
     tracking = find_tracking(DESIGN, assemble(DESIGN))
     assert min(tracking.drag, tracking.push) >= 0.1
-    assert (
-        tracking.limit_drag(50e-3, pressed=False) == tracking.drag
-    )  # the skirt is there at any height
+    # The skirt is there at any height.
+    assert tracking.limit_drag(50e-3, pressed=False) == tracking.drag
     assert ControlParameters().pace == Pace()
     assert Pace().press == 20e-3
 

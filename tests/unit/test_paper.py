@@ -81,10 +81,11 @@ def test_a_fingertip_that_a_method_loses_is_named_with_the_method():
 
 def test_the_oscillation_is_all_of_the_papers_only_at_the_gain_of_its_session():
     swings = results(*CALM_THEN_WILD)
+    # Between the last calm gain and the first that swings.
     assert swings.onset(500.0) == (
         5.0,
         50.0,
-    )  # between the last calm gain and the first that swings
+    )
     assert results(*CALM_THEN_WILD[:2]).onset(500.0) == (5.0, None)
     assert results(*CALM_THEN_WILD[2:]).onset(500.0) == (None, 50.0)
     assert not Swing(2.0, 500.0, 0.5, None, None).sustained  # a slow drift
@@ -276,9 +277,8 @@ def test_a_search_radius_lowers_the_scatter_of_noisy_sensors_and_thresholds_do_a
 @pytest.mark.parametrize("variant", [STAGGERED, GAUSSIAN])
 def test_a_variant_holds_where_it_is_followed_as_the_scene_is(variant):
     same = {"it_I": EASY, "it_II": BAD, f"{variant}_I": EASY, f"{variant}_II": BAD}
-    assert (
-        varied(variant, drags(**same)).verdict == "holds"
-    )  # what fails anyway says nothing of the variant
+    # What fails anyway says nothing of the variant.
+    assert varied(variant, drags(**same)).verdict == "holds"
     worse = varied(variant, drags(**same | {"it_II": EASY}))
     assert worse.verdict == "holds in part"
     assert "Not so: Method II, in the surface." in worse.why

@@ -158,9 +158,8 @@ def test_the_relief_is_in_the_middle_of_its_room_and_as_large(rows, columns, sha
     seen = relief.figure.transFigure.inverted().transform(relief.transData.transform(flat))
     below, above = np.reshape(ROOM, (2, 2)) - [seen.min(axis=0), seen.max(axis=0)]
     assert_near(below, -above, 1e-9)
-    assert above.min() == pytest.approx(
-        0.0, abs=1e-3
-    )  # a size is that of another zoom, but for rounding
+    # A size is that of another zoom, but for rounding.
+    assert above.min() == pytest.approx(0.0, abs=1e-3)
 
 
 def test_both_pictures_are_written_at_their_size(tmp_path, session):

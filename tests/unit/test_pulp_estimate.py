@@ -95,9 +95,8 @@ UNDER = 40e-3 + DISTANCE**2 / 16e-3
 )
 def test_the_forces_at_the_top_add_up_to_what_is_wanted(wanted, guess, low, high, force, top):
     ends = np.array([np.full(9, low), np.full(9, high)])
-    reach = Reach(
-        40e-3, True, np.ones(9), np.full(9, np.inf), ends
-    )  # of cells of one part, on a bed at 40 mm
+    # Of cells of one part, on a bed at 40 mm.
+    reach = Reach(40e-3, True, np.ones(9), np.full(9, np.inf), ends)
     ((height, total),) = find_tops([wanted], [guess], reach, UNDER, np.zeros(9), PULP)
     assert top is None or height == top
     assert force is None or PULP.predict_force(height - UNDER, np.zeros(9)).sum() == force
@@ -110,12 +109,10 @@ def test_several_fingertips_have_the_tops_that_each_has_alone():
     part, under = random.uniform(0.3, 1.0, cells), random.uniform(38e-3, 40e-3, cells)
     drop, lost = random.uniform(0.0, 5e-3, cells), random.uniform(0.0, 0.02, cells)
     ends = np.sort(random.uniform(39e-3, 43e-3, (2, cells)), axis=0)
-    wanted, guesses, edges, raised = (
-        [0.4, 0.05, 0.8],
-        [40e-3, 41e-3, 42e-3],
-        [39e-3, 40e-3, 43e-3],
-        [True, True, False],
-    )
+    wanted = [0.4, 0.05, 0.8]
+    guesses = [40e-3, 41e-3, 42e-3]
+    edges = [39e-3, 40e-3, 43e-3]
+    raised = [True, True, False]
     many = Reach(sections.spread(edges), sections.spread(raised), part, drop, ends)
     found = find_tops(wanted, guesses, many, under, lost, PULP, sections)
     for i, own in enumerate(sections.parts):

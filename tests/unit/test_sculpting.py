@@ -93,9 +93,8 @@ def test_changed_parts_keep_the_heights_and_say_so_and_a_changed_gain_takes_effe
 def test_a_session_takes_no_more_memory_the_longer_it_lasts():
     hand, session = Hand(), started()
     circle = [(5.0 * np.cos(turn), 38.0) for turn in np.linspace(0.0, 6.0, 30)]
-    session = hand.move(
-        session, [*circle * 11]
-    )  # longer than the trace's ten seconds, so that it is full
+    # Longer than the trace's ten seconds, so that it is full.
+    session = hand.move(session, [*circle * 11])
     assert 0.0 < session.errors.height < 1e-4
     tracemalloc.start()
     try:
@@ -105,9 +104,8 @@ def test_a_session_takes_no_more_memory_the_longer_it_lasts():
             for place in circle:
                 session = hand.move(session, [place])
                 held.append(tracemalloc.get_traced_memory()[0])
-            floors.append(
-                min(held)
-            )  # what a tick works with comes and goes; what a leak holds never goes
+            # What a tick works with comes and goes; what a leak holds never goes.
+            floors.append(min(held))
     finally:
         tracemalloc.stop()
     # A state kept for a gesture more or less, of at most 20: 25 kB each.
@@ -147,9 +145,8 @@ def test_a_recording_gives_the_session_again_bit_for_bit_and_undo_shortens_it():
     assert plays(session)
     session = hand.press(restore(session, kept, at, moment), 3.0)
     assert plays(session)
-    session = hand.press(
-        rewind(hand.press(session)), 6.0
-    )  # a gesture taken back is gone from it too
+    # A gesture taken back is gone from it too.
+    session = hand.press(rewind(hand.press(session)), 6.0)
     assert plays(session)
 
 

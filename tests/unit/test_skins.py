@@ -264,10 +264,8 @@ def test_a_spline_may_have_its_knots_anywhere(falling, count):
     random = np.random.default_rng(5)
     knot = np.sort(random.uniform(0.0, 1.0, count))[:: -1 if falling else 1]
     # Some run level for a while, some rise and fall.
-    value, at = (
-        random.integers(-2, 3, size=(count, 30)) * 1.0,
-        np.linspace(knot.min(), knot.max(), 101),
-    )
+    value = random.integers(-2, 3, size=(count, 30)) * 1.0
+    at = np.linspace(knot.min(), knot.max(), 101)
     order = np.argsort(knot)
     known = PchipInterpolator(knot[order], value[order])(at)
     assert_near(interpolate_monotone(knot, value, at), known, 1e-12)

@@ -196,9 +196,8 @@ def test_pins_at_their_ends_are_taken_up_and_a_memory_of_no_number_of_the_world_
     assert set(State._fields) == {"period", "rows", "modes", "aged", "peak", "active", "memory"}
     system = system_of("hybrid")
     state = run(system, begin(system), 70)
-    state.active.block[
-        system.rows.controlled, 1
-    ] = -1e91  # pulp of Method III: the logarithm is NaN
+    # Pulp of Method III: the logarithm is NaN.
+    state.active.block[system.rows.controlled, 1] = -1e91
     with pytest.raises(StateError, match="no state can have"):
         load(system, dump(system, state))
 

@@ -48,9 +48,8 @@ def test_every_sample_shape_fits_a_bed_without_clipping_and_every_mesh_is_closed
 def test_a_mesh_is_the_same_shape_in_every_format(tmp_path, kind):
     solid = trimesh.creation.icosphere(subdivisions=3, radius=10.0)
     path = tmp_path / f"Ein Körper mit Blank.{kind}"
-    unit = (
-        1e-3 if kind == "glb" else 1.0
-    )  # a GLB is in meters, y up; an OBJ that says nothing is y up
+    # A GLB is in meters, y up; an OBJ that says nothing is y up.
+    unit = 1e-3 if kind == "glb" else 1.0
     turned = solid.vertices[:, [0, 2, 1]] * [1, 1, -1] if kind in ("glb", "obj") else solid.vertices
     if kind == "3mf":
         mesh_writer.write(

@@ -219,7 +219,6 @@ def test_richardsons_extrapolation_keeps_to_where_a_pin_can_be(coarse, fine, per
     fines, coarses = (np.full((CELL.rows + 1, 1, 1), value) for value in (fine, coarse))
     extrapolate(CELL, fines, coarses, reach)
     assert fines[0, 0, 0] == pytest.approx(height, rel=1e-12)
-    assert (
-        fines[CELL.pulp_rows] == max(fine + (fine - coarse) / 3.0, 0.0)
-    ).all()  # no filter pulls
+    # No filter pulls.
+    assert (fines[CELL.pulp_rows] == max(fine + (fine - coarse) / 3.0, 0.0)).all()
     assert fines[CELL.rows] == fine  # commands on their way are not extrapolated

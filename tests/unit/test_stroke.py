@@ -121,10 +121,8 @@ def test_the_finger_goes_along_the_whole_path_however_quick_the_hand(moves):
 def test_the_way_follows_from_the_path_alone_and_is_never_ahead_of_the_hand(
     away, fingers, chunk, shown
 ):
-    whole, at = (
-        release(line(images=make_images("X", center=(-away, 0.0)))),
-        waiting(fingers),
-    )
+    whole = release(line(images=make_images("X", center=(-away, 0.0))))
+    at = waiting(fingers)
     part = begin(replace(whole, samples=whole.samples[:shown], held=True))
     part, first = lead(part, at, chunk)
     assert not part.done
@@ -235,9 +233,8 @@ def test_the_finger_goes_along_the_path_and_along_each_of_its_images(name):
 
 
 def test_a_finger_slows_down_above_the_highest_pin_below_it():
-    beside = np.where(
-        CELLS.x > 5e-3, 0.050, 0.040
-    )  # 1 mm beyond where the surface below the finger counts
+    # 1 mm beyond where the surface below the finger counts.
+    beside = np.where(CELLS.x > 5e-3, 0.050, 0.040)
     _, poses = path(release(start(1, 0.0, 0.0, 4e-3)), bed=beside)
     z = poses[:, 2]
     cells = np.hypot(CELLS.x, CELLS.y) < 8e-3

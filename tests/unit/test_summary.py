@@ -475,19 +475,21 @@ def of_two(places, force, own):
     "places, force, own, lags",
     [
         ((-6e-3, 6e-3), {0: 0.3, 4: 0.1}, (0.3, 0.1), (0.0, 0.0)),  # apart
+        # The middle pin is of both.
         (
             (-3e-3, 3e-3),
             {1: 0.2, 2: 0.2, 3: 0.2},
             (0.3, 0.3),
             (1.5e-3, 1.5e-3),
-        ),  # the middle pin is of both
+        ),
         ((0.0, 0.0), {2: 0.6}, (0.4, 0.2), (0.0, 0.0)),  # in one place
+        # All that one presses is nearer to the other.
         (
             (3e-3, 4e-3),
             {3: 0.3},
             (0.2, 0.1),
             (0.0, 1e-3),
-        ),  # all that one presses is nearer to the other
+        ),
         ((3e-3, 4e-3), {3: 0.3}, (0.3, 0.0), (0.0, None)),  # and it presses nothing
         ((-6e-3, 6e-3), {}, (0.0, 0.0), (None, None)),  # none does
     ],

@@ -237,12 +237,13 @@ def test_a_sweep_estimates_errors_at_the_ends_of_what_varies_and_says_where(caps
     assert main(sweep) == 0
     said = capsys.readouterr().out
     found = rows("grid")
+    # Corners.
     assert [index for index, line in enumerate(found) if line["height_error (m)"]] == [
         0,
         2,
         6,
         8,
-    ]  # corners
+    ]
     assert all(float(line["run_time (s)"]) > 0.0 for line in found)
     worst = max(float(line["height_error (m)"]) for line in found if line["height_error (m)"])
     assert f"height error about {worst * 1e6:.2g} µm" in said

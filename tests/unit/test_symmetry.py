@@ -241,17 +241,13 @@ def test_images_begin_no_error_estimate_of_their_own():
 
 def test_no_fingertip_lifts_again_for_another_one_that_is_down():
     images = make_images("RADIAL", 12, (1.1e-3, -0.7e-3), 0.4)
-    session, pressing, lifted = (
-        queue(begin(), line(3.7, 0.9, 11.6, 5.4), images, RAISE),
-        set[int](),
-        0,
-    )
+    session = queue(begin(), line(3.7, 0.9, 11.6, 5.4), images, RAISE)
+    pressing = set[int]()
+    lifted = 0
     while session.strokes:
         session = follow_finger(session, session.poses, 1)
-        parts, forces = (
-            session.strokes[0].parts if session.strokes else (),
-            session.state.finger_forces(),
-        )
+        parts = session.strokes[0].parts if session.strokes else ()
+        forces = session.state.finger_forces()
         lifted += sum(part.image in pressing for part in parts if part.phase == YIELDING)
         pressing = {
             part.image for part in parts if part.phase == PRESSING and forces[part.image] > 0.0

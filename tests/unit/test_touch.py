@@ -20,10 +20,8 @@ def test_a_finger_that_does_not_turn_is_that_of_the_same_poses_among_turned_ones
     for other in (tip, Fingertip(), tip):  # each keeps its own
         assert (other.outline(poses) == other.outline(among)[:-1]).all()
     parts = np.linspace(0.0, 1.0, 4)
-    together, alone = (
-        interpolate_poses(among[:, None], parts),
-        interpolate_poses(poses[:, None], parts),
-    )
+    together = interpolate_poses(among[:, None], parts)
+    alone = interpolate_poses(poses[:, None], parts)
     assert (together[:5] == alone).all()
 
 

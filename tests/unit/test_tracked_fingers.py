@@ -72,9 +72,8 @@ def test_exchanged_identities_do_not_move_a_fingertip_through_the_clay(before, a
     tracks = replace(tracks, there=np.ones(len(start), bool))
     tracks, targets = advance(name_fingers(tracks, at(*now)), Tracking(), felt(poses), 5e-3)
     assert tuple(tracks.identities.tolist()) == held
-    assert (
-        np.linalg.norm(targets[:, :3] - poses[:, :3], axis=1).max() < 0.011
-    )  # of what each has moved
+    # Of what each has moved.
+    assert np.linalg.norm(targets[:, :3] - poses[:, :3], axis=1).max() < 0.011
 
 
 #: Fingers before and after a time, s, by identity: x and, where it is not that of all, z, mm; who
@@ -113,9 +112,8 @@ def test_a_finger_that_goes_on_under_another_identity_keeps_its_fingertip(
     tracks = replace(tracks, there=tracks.identities >= 0, unnamed=np.full(3, time))
     tracks = name_fingers(tracks, tell(after.items()))
     assert tuple(tracks.identities.tolist()) == held
-    assert tracks.there.tolist() == [
-        row < len(before) for row in range(3)
-    ]  # another one has to land
+    # Another one has to land.
+    assert tracks.there.tolist() == [row < len(before) for row in range(3)]
 
 
 @pytest.mark.parametrize("far", [0.02, 1e300])

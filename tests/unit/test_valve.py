@@ -41,9 +41,8 @@ def test_the_branches_meet_at_the_critical_drop(valve, fluid):
     assert law.laminar * OPENINGS**2 * drop == meeting
     assert law.turbulent * OPENINGS * np.sqrt(drop) == meeting
     assert law.knee == pytest.approx(critical(valve, fluid, 1.0), rel=ROUNDING)
-    assert (law.knee > 1e5) == (
-        valve == Valve()
-    )  # the default one stays laminar between the reservoirs
+    # The default one stays laminar between the reservoirs.
+    assert (law.knee > 1e5) == (valve == Valve())
     # Below, the flow is proportional to the drop; above it grows with its root.
     for one, other in ((0.9, 0.3), (18.0, 2.0)):
         share = law.flow(OPENINGS, one * drop) / law.flow(OPENINGS, other * drop)
@@ -97,9 +96,8 @@ def test_the_drops_of_valve_and_conduit_add_up(gap, power):
     turbulent = flow >= 4e4 * THIN.viscosity * 30e-6 * (MESH if power == 1 else 1.0)
     laminar = flow / (law.valve.laminar * MESH**power)
     ours = np.where(turbulent, (flow / (law.valve.turbulent * MESH)) ** 2, laminar)
-    assert ours + law.resistance * flow == pytest.approx(
-        DROPS, rel=1e-12
-    )  # solved without cancellation
+    # Solved without cancellation.
+    assert ours + law.resistance * flow == pytest.approx(DROPS, rel=1e-12)
     assert 5 < turbulent.sum() < turbulent.size - 5
     assert (law.resistance * flow / DROPS).max() > 0.3, "the conduit hardly counts"
     assert np.all(flow < law.valve.flow(MESH, DROPS))
@@ -116,9 +114,8 @@ def test_the_resistance_is_that_of_a_parabolic_profile_and_behind_a_wide_valve_i
     assert conduit.resistance(fluid) == pytest.approx(1e5 / quad(ring, 0.0, edge)[0], rel=1e-12)
     valve = make_orifice(WIDE, THIN)
     without = OrificeAndConduit(valve, 0.0)
-    assert without.flow(MESH, DROPS) == pytest.approx(
-        valve.flow(MESH, DROPS), rel=1e-14
-    )  # rounding
+    # Rounding.
+    assert without.flow(MESH, DROPS) == pytest.approx(valve.flow(MESH, DROPS), rel=1e-14)
     wide = OrificeAndConduit(
         make_orifice(Valve(orifice_diameter=0.2), Fluid()), Conduit().resistance(Fluid())
     )

@@ -363,9 +363,8 @@ def main():
     played = importlib.util.module_from_spec(found)
     found.loader.exec_module(played)
     if "error" not in SEEN and not getattr(played, "FINE_PINS", False):
-        part(
-            "device.parts"
-        ).MANY = 0  # the vertices of rounder pins cost software GL most of a frame
+        # The vertices of rounder pins cost software GL most of a frame.
+        part("device.parts").MANY = 0
         for area in (
             area for screen in bpy.data.screens for area in screen.areas if area.type == "VIEW_3D"
         ):

@@ -93,10 +93,8 @@ def center(blender, settings):
     yield from reset(blender)
     note(blender, "flat")
     yield from blender.settle()
-    start, end = (
-        on_the_screen(blender, *CENTER),
-        on_the_screen(blender, CENTER[0] + 15.0, CENTER[1] + 15.0),
-    )
+    start = on_the_screen(blender, *CENTER)
+    end = on_the_screen(blender, CENTER[0] + 15.0, CENTER[1] + 15.0)
     area, region = blender.view()
     with bpy.context.temp_override(window=blender.window(), area=area, region=region):
         bpy.ops.digiclay.press_center("INVOKE_DEFAULT")

@@ -68,10 +68,8 @@ def play(scene, strokes):
     for after in play_strokes(session, strokes):
         # A trace has the total of the fingertips; what each of several feels is seen at the end of
         # a tick.
-        one, since = (
-            len(session.poses) == len(after.poses) == 1,
-            after.state.period - session.state.period,
-        )
+        one = len(session.poses) == len(after.poses) == 1
+        since = after.state.period - session.state.period
         felt = after.trace.force[-since:] if one and since else after.state.finger_forces()
         session, force = after, max(force, float(felt.max(initial=0.0)))
     time = session.state.period * session.system.period

@@ -150,9 +150,8 @@ def views(blender):
     yield from tapped(blender, blender.pixel(blender.world(-15.0, 9.0)), "orthographic")
     blender.shot("play_orthographic")
     areas = len(blender.window().screen.areas)
-    blender.call(
-        bpy.ops.screen.screen_full_area
-    )  # a quarter of a small view has no room for the overlay
+    # A quarter of a small view has no room for the overlay.
+    blender.call(bpy.ops.screen.screen_full_area)
     yield from blender.until(lambda: len(blender.window().screen.areas) < areas)
     blender.part("operators.pin_view").pick_pins(blender.beds()[0], [312])
     blender.call(bpy.ops.screen.region_quadview)

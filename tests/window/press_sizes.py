@@ -42,9 +42,8 @@ def script(blender):
     yield from act(blender, to(on_the_screen(blender, -24.0, -24.0)), "click 1")
     yield from sizes(blender)
     yield from reset(blender)
-    bpy.ops.ed.undo_push(
-        message="Reset"
-    )  # what Ctrl-Z goes back to: a reset has no step of its own
+    # What Ctrl-Z goes back to: a reset has no step of its own.
+    bpy.ops.ed.undo_push(message="Reset")
     yield from symmetric(blender)
     yield from shapes(blender)
 
@@ -132,9 +131,8 @@ def shapes(blender):
 
 
 def put(blender):
-    bpy.ops.wm.redraw_timer(
-        type="DRAW_WIN_SWAP", iterations=1
-    )  # a view that has changed knows so when drawn
+    # A view that has changed knows so when drawn.
+    bpy.ops.wm.redraw_timer(type="DRAW_WIN_SWAP", iterations=1)
     area, _ = blender.view()
     looking = area.spaces.active.region_3d
     place = blender.world(*COVERED)

@@ -26,11 +26,9 @@ ACROSS = ((-27.0, -9.0), (27.0, 12.0))
 ALONG = ((0.0, -24.0), (0.0, 24.0))
 #: Strokes that are timed on the bed "design": symmetry, images, ends, mm; apart, 1 mm beside an
 #: axis, a ray.
-FAR, BESIDE, RAY = (
-    ((20.0, 8.5), (40.0, 12.0)),
-    ((1.0, -10.0), (1.0, 10.0)),
-    ((2.0, 1.0), (20.0, 9.5)),
-)
+FAR = ((20.0, 8.5), (40.0, 12.0))
+BESIDE = ((1.0, -10.0), (1.0, 10.0))
+RAY = ((2.0, 1.0), (20.0, 9.5))
 TIMED = {
     "1": ("NONE", 2, FAR), "2": ("X", 2, FAR), "6": ("RADIAL", 6, FAR), "12": ("RADIAL", 12, FAR),
     "1 beside": ("NONE", 2, BESIDE), "2 beside": ("X", 2, BESIDE),

@@ -208,9 +208,8 @@ def levels_of_detail(blender):
         # Between the limits: 9 pixels a pitch.
         looking.view_distance = distance * (times or pitch_in_pixels(blender, distance) / 9.0)
         area.tag_redraw()
-        yield from blender.rounds(
-            20
-        )  # the pitch is measured in a drawing, and acted upon by a timer
+        # The pitch is measured in a drawing, and acted upon by a timer.
+        yield from blender.rounds(20)
         note(blender, name)
     looking.view_distance = distance
 

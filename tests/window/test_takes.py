@@ -57,9 +57,8 @@ def test_a_baked_take_plays_without_a_session_and_esc_and_free_give_bed_and_fram
         seen["replayed"]["bed"]
     ] * 2
     assert not seen["session on a bake"]
-    assert (
-        np.ptp(seen["played"]) > 10e-3
-    )  # the fingertip goes down by a centimeter of the device: 0.1
+    # The fingertip goes down by a centimeter of the device: 0.1.
+    assert np.ptp(seen["played"]) > 10e-3
 
 
 def test_a_file_left_in_mid_recording_has_the_take(seen):

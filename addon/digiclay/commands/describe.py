@@ -140,10 +140,8 @@ def description(scene: Scene, system: System) -> Iterator[str]:
         path, points = finger.trajectory, finger.trajectory.waypoints
         yield f"  {len(points)} waypoints, {path.interpolation}, the last at {points[-1].time:g} s"
     sizes = scene.cells, scene.periods, count_busy_cells(scene)
-    needed, free = (
-        count_bytes_needed(scene.recorder, system.rows, *sizes),
-        measure_available_memory(),
-    )
+    needed = count_bytes_needed(scene.recorder, system.rows, *sizes)
+    free = measure_available_memory()
     extent = (
         f"{scene.recorder.rows(scene.periods)} rows kept" if scene.recorder else "no history kept"
     )

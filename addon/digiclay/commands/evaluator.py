@@ -88,7 +88,8 @@ class Evaluator(Process):
             OSError,
             ValueError,
             pickle.UnpicklingError,
-        ):  # it died, or was stopped, in the middle
+        ):
+            # It died, or was stopped, in the middle.
             raise EOFError from None
         return records
 

@@ -41,9 +41,8 @@ class Line:
         self._drawn = time.monotonic()
         if self._quiet or not self._stream.isatty():
             return
-        width = (
-            shutil.get_terminal_size().columns - 1
-        )  # a longer one is wrapped, and would stay there
+        # A longer one is wrapped, and would stay there.
+        width = shutil.get_terminal_size().columns - 1
         self._stream.write(f"\r{text[:width]}\033[K")
         self._stream.flush()
         self._shown = True

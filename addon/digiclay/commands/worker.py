@@ -48,9 +48,8 @@ def find_program(module: str = "") -> tuple[list[str], dict[str, str]]:
         return start_blender(bpy.app.binary_path), {}
     folders = [str(Path(__file__).resolve().parents[2]), os.environ.get("PYTHONPATH", "")]
     bundled = importlib.util.find_spec("trimesh") if PACKAGE.startswith("bl_ext.") else None
-    if (
-        bundled is not None and bundled.origin is not None
-    ):  # what an extension brings along is elsewhere
+    if bundled is not None and bundled.origin is not None:
+        # What an extension brings along is elsewhere.
         folders.append(str(Path(bundled.origin).parents[1]))
     environment = {"PYTHONPATH": os.pathsep.join(filter(None, folders))}
     return [

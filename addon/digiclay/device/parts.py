@@ -38,14 +38,12 @@ TOO_MANY = "A bed has at most {} fingertips (got {})."
 PALM_SIZE = 9e-3
 #: Attributes of the meshes: neighbors for the slope, neighbors for the sum, and what is stored on
 #: the way.
-PREVIOUS, FOLLOWING, LOW, HIGH, VALUE, PAIR = (
-    "previous",
-    "following",
-    "low",
-    "high",
-    "value",
-    "pair",
-)
+PREVIOUS = "previous"
+FOLLOWING = "following"
+LOW = "low"
+HIGH = "high"
+VALUE = "value"
+PAIR = "pair"
 #: Attribute of the faces of the skin: the nearest pin.
 NEAREST = "pin"
 #: Attributes of the weights: their first half; the other is the name of the skin.

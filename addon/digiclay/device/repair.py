@@ -69,9 +69,8 @@ def mark_parts() -> frozenset[int]:
         ball = ellipsoid(tip)
         if ball is not None and tip.get(BALL) != ball:
             tip[BALL] = ball
-        if ball is not None and not any(
-            ball.lock_location
-        ):  # an older file: it could not be clicked on
+        if ball is not None and not any(ball.lock_location):
+            # An older file: it could not be clicked on.
             parts.lock_in_place(ball)
         cases = [child for child in bed.children if child.get(ROLE) == HOUSING]
         for part in filter(None, (tip, ball, *cases)):
@@ -86,10 +85,8 @@ def find_faults(known: frozenset[int], mended: frozenset[int] = frozenset()) -> 
     tips = _standing(FINGERTIP)
     bare += [tip for tip in tips if _lacks_part(tip, BALL, known, mended)]
     beds = _standing(BED)
-    held, tips_of_beds = (
-        {bed.get(name) for bed in beds for name in FINGERS},
-        {tip for _, _, tip in _tips()},
-    )
+    held = {bed.get(name) for bed in beds for name in FINGERS}
+    tips_of_beds = {tip for _, _, tip in _tips()}
     # Held, but by another bed: it was given to this one.
     come = [tip for tip in tips if (tip in held) == (tip.session_uid in known - mended)]
     loose = [
@@ -259,9 +256,8 @@ def _complete(owner: Object) -> None:
     except DigiclayError:  # settings that do not go together: a session will say so
         scene = resolve({})
     give_fingertip(bed, scene)
-    if (
-        view.is_drawn(bed) and view.housing_of(bed) is None
-    ):  # of an older file, where it is an object
+    if view.is_drawn(bed) and view.housing_of(bed) is None:
+        # Of an older file, where it is an object.
         view.add_modifier(
             bed, Instant.at_rest(scene.layout, scene.actuator, find_ellipsoids(scene)[:1])
         )
@@ -312,9 +308,8 @@ def _duplicate(thing: Object, parent: Object, owner: Object) -> Object:
     copy = thing.copy()
     own_curves(copy)
     copy.parent = parent
-    if (
-        thing.parent is None or ROLE not in thing.parent
-    ):  # it stands on its bed as the other one on its own
+    if thing.parent is None or ROLE not in thing.parent:
+        # It stands on its bed as the other one on its own.
         copy.matrix_parent_inverse.identity()
         home = owner_of(thing) or parent
         copy.matrix_basis = home.matrix_world.inverted() @ thing.matrix_world

@@ -122,12 +122,10 @@ def active_session(context: Context) -> tuple[Object, Running] | None:
 #: The state by `core.session.snapshot`, poses and numbers of the fingertips at it, the last tick;
 #: and in JSON the tick in which the stroke began that is being formed, or 0, those of the gestures
 #: before, and the strokes that are to be formed from that state, by `strokes.drawn`.
-STATE, POSE, NUMBERS, TICK = (
-    "digiclay_state",
-    "digiclay_pose",
-    "digiclay_fingers",
-    "digiclay_moment",
-)
+STATE = "digiclay_state"
+POSE = "digiclay_pose"
+NUMBERS = "digiclay_fingers"
+TICK = "digiclay_moment"
 QUEUE = "digiclay_strokes"
 
 

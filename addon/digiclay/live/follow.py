@@ -166,9 +166,8 @@ def follow(uid: int, now: float) -> tuple[Floats | None, str]:
     if following is None:
         return None, ""
     if now - following.asked >= RENEW:
-        with suppress(
-            OSError
-        ):  # the port is closed now, or the network is busy: it is repeated soon
+        with suppress(OSError):
+            # The port is closed now, or the network is busy: it is repeated soon.
             following.door.send(pack_subscription(following.token, RATE))
         following = replace(following, asked=now)
     (pose, fingers, closed), words = _receive(following), ""

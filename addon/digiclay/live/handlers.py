@@ -55,9 +55,8 @@ def clear_recovery(path: str = "", *_: object) -> None:
         if not number:
             continue
         bed = find_bed(session.uid, session.name)
-        if bed is not None and number in [
-            entry.number for entry in takes.list_takes(bed)
-        ]:  # not undone
+        if bed is not None and number in [entry.number for entry in takes.list_takes(bed)]:
+            # Not undone.
             takes.remove(bed, number)
             # A copy saved elsewhere is not the file Blender asks about before it closes it.
             if session.recording and path and path == bpy.data.filepath:

@@ -86,9 +86,8 @@ def stop(uid: int) -> str:
     """End a session: its bed keeps the state, and a take of the recording; return words about the take."""
     ended = running.TABLE.sessions.get(uid)
     bed = find_bed(uid, ended.name) if ended else None
-    if (
-        ended is not None and bed is not None and ended.stroke_start
-    ):  # so that what is drawn is complete
+    if ended is not None and bed is not None and ended.stroke_start:
+        # So that what is drawn is complete.
         back = sculpting.restore(ended, ended.standing.snapshot, ended.standing.poses)
         show(bed, replace(back, strokes=ended.strokes, stroke_start=None))
     running.drop(uid)

@@ -220,9 +220,8 @@ def rebuild(bed: Object) -> Scene:
     instant = Instant.at_rest(scene.layout, scene.actuator, find_ellipsoids(scene))
     mesh, drawing = bed.data, view.find_modifier(bed)
     bed.data = view.make_cells(instant)
-    if (
-        drawing is not None
-    ):  # it stays, and with it how the bed is colored; only what it draws is another
+    if drawing is not None:
+        # It stays, and with it how the bed is colored; only what it draws is another.
         tree = drawing.node_group
         view.add_modifier(bed, instant)
         _discard(tree)

@@ -72,10 +72,8 @@ def frame(context: Context, bed: Object) -> None:
         looking.view_perspective = "PERSP"
         looking.update()
     context.view_layer.update()
-    axes, parallel = (
-        np.array(looking.view_rotation.to_matrix()),
-        looking.view_perspective == "ORTHO",
-    )
+    axes = np.array(looking.view_rotation.to_matrix())
+    parallel = looking.view_perspective == "ORTHO"
     lens = np.diag(np.array(looking.window_matrix))[:2]
     balls = [(tip[BALL], tip[BALL]) for tip in fingertips_of(bed).values() if tip.get(BALL)]
     corners = _list_corners([(view.housing_of(bed), bed), (bed, bed), *balls])

@@ -196,10 +196,8 @@ def _draw() -> None:
     picture = Picture()
     if context.region_data == context.space_data.region_3d:
         content = FULL if bed.digiclay_display.overlay_full else COMPACT
-        room, corner = (
-            find_free_room(context.area, context.region),
-            preferences.get(context).overlay_corner,
-        )
+        room = find_free_room(context.area, context.region)
+        corner = preferences.get(context).overlay_corner
         picture = lay_out(read_session(bed, session, colors), chosen, room, scale, content, corner)
     _mark(context, bed, session, chosen, picture, scale)
     draw(picture, context.region.width, context.region.height)

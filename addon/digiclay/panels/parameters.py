@@ -26,9 +26,8 @@ def start(sidebar: Sidebar, context: Context) -> None:
     column.label(text="Select a bed or its fingertip,")
     column.label(text="or add a new device:")
     column.operator("mesh.digital_clay_add", text="Add Digital Clay", icon="MESH_GRID")
-    draw_lines(
-        sidebar.layout, running.last_message(), "INFO"
-    )  # a session may have ended with its file
+    # A session may have ended with its file.
+    draw_lines(sidebar.layout, running.last_message(), "INFO")
 
 
 @menu("DIGICLAY_MT_presets", "Presets")

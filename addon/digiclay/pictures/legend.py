@@ -184,12 +184,10 @@ SHARE, LETTERS = 0.20, 0.30
 MOST = 600
 #: sRGB: the whole session's force, what of it has been, the set point, and what lies behind; behind
 #: several.
-TO_COME, BEEN, ASKED, PAPER = (
-    (0.52, 0.57, 0.64),
-    (0.00, 0.45, 0.70),
-    (0.84, 0.37, 0.00),
-    (0.93, 0.94, 0.95),
-)
+TO_COME = (0.52, 0.57, 0.64)
+BEEN = (0.00, 0.45, 0.70)
+ASKED = (0.84, 0.37, 0.00)
+PAPER = (0.93, 0.94, 0.95)
 DARK = (0.20, 0.22, 0.25)
 #: Least force the strip's height stands for, N.
 LEAST = 0.05

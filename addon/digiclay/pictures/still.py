@@ -83,9 +83,8 @@ def add_picture_scene(name: str, looks: Picture) -> Scene:
         _cycles(scene.cycles, looks.samples)
     else:
         _workbench(scene.display)
-    if isinstance(
-        looks, Moving
-    ):  # shadows are two thirds of a frame, and the samples are hardly seen
+    if isinstance(looks, Moving):
+        # Shadows are two thirds of a frame, and the samples are hardly seen.
         scene.display.shading.show_shadows = False
         scene.display.render_aa = "8"
     return scene

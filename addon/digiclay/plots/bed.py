@@ -64,9 +64,8 @@ def draw_map(axes: Any, history: History, title: str) -> None:
         faces = make_skin(pins, top, rows, columns)
         picture = axes.tripcolor(*pins.T * MM, faces, top * MM, shading="gouraud", **scale)
     size, middle = np.ptp(pins, axis=0) * MM, 0.5 * (pins.min(axis=0) + pins.max(axis=0)) * MM
-    half = 0.5 * np.maximum(
-        size, max(0.75 * size.max(), 1.0)
-    )  # a narrow bed gets room for its labels
+    # A narrow bed gets room for its labels.
+    half = 0.5 * np.maximum(size, max(0.75 * size.max(), 1.0))
     (left, bottom), (right, upper) = middle - half, middle + half
     axes.set(xlim=(left, right), ylim=(bottom, upper), aspect="equal")
     axes.set(xlabel="x (mm)", ylabel="y (mm)", title=title)
@@ -88,10 +87,8 @@ def draw_path(axes: Axes, history: History) -> None:
         "linestyle": (0, (0.1, 2.2)),
         "dash_capstyle": "round",
     }
-    dark, pale = (
-        withStroke(linewidth=3.6, foreground=INK),
-        withStroke(linewidth=4.2, foreground="white"),
-    )
+    dark = withStroke(linewidth=3.6, foreground=INK)
+    pale = withStroke(linewidth=4.2, foreground="white")
     for number, one_finger in enumerate(split_fingers(history)):
         touching = find_contact_rows(one_finger["total_force"])[:, None]
         finger = np.asarray(one_finger["fingertip"])[:, :2] * MM

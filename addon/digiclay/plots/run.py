@@ -80,10 +80,8 @@ def session_figure(history: History, set_point: SetPoint | None) -> Figure:
     time, height = array(history, "time"), array(history, "height")
     with canvas(12.5, 6.3) as (figure, place):
         heights, plan = place("heights", 0.8, 2.95, 6.95, 3.0), place("map", 8.62, 3.1, 3.12, 2.85)
-        force, figures = (
-            place("force", 0.8, 0.65, 6.95, 1.7),
-            place("figures", 8.62, 0.65, 3.78, 1.7),
-        )
+        force = place("force", 0.8, 0.65, 6.95, 1.7)
+        figures = place("figures", 8.62, 0.65, 3.78, 1.7)
         draw_map(plan, history, "Where the cells are")
         for name, color, cell in zip(letters, LINES, session_cells(history), strict=False):
             heights.plot(time, height[:, cell] * MM, color=color, label=name)
@@ -108,9 +106,8 @@ def session_figure(history: History, set_point: SetPoint | None) -> Figure:
             fingers = [
                 set_point.total(sum_cells(finger).following) for finger in split_fingers(history)
             ]
-            wanted = np.fmax.reduce(
-                fingers
-            )  # the same of all fingers, where it does not depend on cells
+            # The same of all fingers, where it does not depend on cells.
+            wanted = np.fmax.reduce(fingers)
             label = f"set point {set_point.force:g} N{' per cell' if set_point.per_cell else ''}"
         draw_force(force, history, wanted, label)
         force.set(xlabel="time (s)", ylabel="force (N)", ylim=(0.0, None), xlim=ends(time, 0.1))

@@ -236,10 +236,9 @@ class OwnRow(Method):
 
     def build(self, parameters: Any, device: Any) -> Guarded:
         """Return its controller for a device, guarded; MethodError when that cannot be built."""
-        source, info = (
-            self.source,
-            copy.deepcopy(device),
-        )  # whatever it does to it, the bed's is another
+        # Whatever it does to it, the bed's is another.
+        source = self.source
+        info = copy.deepcopy(device)
         return guard(lambda: parameters.build(info), source.label, source.file, info.period)
 
 

@@ -281,10 +281,8 @@ def find_free_place(context: Context, bed: Object) -> tuple[Floats, str]:
     hides = hider(cursor, there)
     if hides is None:
         return cursor, ""
-    first, last = (
-        np.min([row[2] for row in there], axis=0),
-        np.max([row[3] for row in there], axis=0),
-    )
+    first = np.min([row[2] for row in there], axis=0)
+    last = np.max([row[3] for row in there], axis=0)
     middle, gap = (first + last) / 2.0, SPACE * (high - low)
     places = [] if is_bed(hides) else [(np.array([*middle[:2], last[2]]), ON_TOP)]
     for axis in (0, 1):

@@ -140,9 +140,8 @@ def apply(
     source = _make_source(moments)
     modifier.node_group = playback_nodes(source, count)
     sources = view.sources_of(bed)
-    if (
-        sources is not None
-    ):  # as `view.hold_parts` has it: appended, the bed leaves it out of the scene
+    if sources is not None:
+        # As `view.hold_parts` has it: appended, the bed leaves it out of the scene.
         sources.objects.link(source)
     bed.modifiers.move(len(bed.modifiers) - 1, 0)
     modifier = bed.modifiers[0]

@@ -153,12 +153,10 @@ def advance(
 
 def _work_off(running: Running, now: float, spare: float) -> Running:
     """Simulate strokes for a wall time, s, until one is finished or waits for the hand."""
-    finished, first, started, spent = (
-        running.finished_strokes,
-        running.state.period,
-        time.perf_counter(),
-        0.0,
-    )
+    finished = running.finished_strokes
+    first = running.state.period
+    started = time.perf_counter()
+    spent = 0.0
     while running.finished_strokes == finished:
         cost = running.clock.cost
         count = int((spare - spent) / cost) if cost > 0.0 else 1
@@ -205,9 +203,8 @@ def _end_stroke(running: Running, stroke: Stroke) -> Running:
     """Note where a stroke has ended, so that redo brings it back as it stands."""
     running, start = _pack(replace(running, stroke_start=None)), running.stroke_start
     *earlier, last = running.gestures or (None,)
-    if (
-        last is None or start is None or last.snapshot is not start.snapshot
-    ):  # it has touched nothing
+    if last is None or start is None or last.snapshot is not start.snapshot:
+        # It has touched nothing.
         return running
     return replace(
         running, gestures=(*earlier, replace(last, stroke=drawn.dump(stroke), end=running.standing))
@@ -291,10 +288,8 @@ def _count_gesture(running: Running, *, ordered: bool) -> Running:
     touched = ordered or recent_trace.measure_total_force(running.system, running.state) > 0.0
     if running.next_gesture is None or not touched:
         return running
-    begun, room = (
-        running.next_gesture,
-        max(1, min(GESTURES, GESTURE_BYTES // len(running.snapshot))),
-    )
+    begun = running.next_gesture
+    room = max(1, min(GESTURES, GESTURE_BYTES // len(running.snapshot)))
     gesture = Gesture(begun.period, begun.snapshot, begun.poses, begun.tick)
     return replace(
         running, gestures=(*running.gestures, gesture)[-room:], undone=(), next_gesture=None
@@ -313,9 +308,8 @@ def restore(
     `was`: numbers of the fingertips of the snapshot, unless they are those of the session.
     """
     poses = poses.reshape(-1, 7)
-    if len(running.poses) > len(
-        running.numbers
-    ):  # a stroke that is taken back takes its fingertips along
+    if len(running.poses) > len(running.numbers):
+        # A stroke that is taken back takes its fingertips along.
         system = assemble(running.scene)
         monitor = running.monitor and accuracy.start(running.scene)
         session_poses = running.poses[: len(running.numbers)]
@@ -536,12 +530,10 @@ def find_device(running: Running) -> Device:
 
 def _advance(running: Running, stroke: Stroke, count: int) -> tuple[Stroke, Floats, Orders | None]:
     """Advance fingertips along a stroke; return it, the paths (k + 1, 7) or (k + 1, m, 7), and the orders."""
-    state, pose, period, device = (
-        running.state,
-        running.pose,
-        running.system.period,
-        find_device(running),
-    )
+    state = running.state
+    pose = running.pose
+    period = running.system.period
+    device = find_device(running)
     if stroke.brush in WHOLE:
         return order_all(stroke, pose)
     arrived = stroke.phase == FINISHING and live_session.has_arrived(state)

@@ -54,7 +54,8 @@ def load(folder: str) -> None:
             ValueError,
             RuntimeError,
             OverflowError,
-        ) as error:  # what Blender cannot hold
+        ) as error:
+            # What Blender cannot hold.
             remove_method(name)
             refused.append(
                 f"{name}: Blender must be able to hold its parameters (got {one_line(error)})."

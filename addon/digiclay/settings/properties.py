@@ -87,10 +87,8 @@ def scene_of(bed: Object) -> Scene:
     reason = find_layout_mismatch(bed, scene.layout)
     if reason:
         plan = scene.layout
-        rule, remedy = (
-            "must be that of the bed's pins",
-            f"{reason}: press Rebuild in Laboratory > Device.",
-        )
+        rule = "must be that of the bed's pins"
+        remedy = f"{reason}: press Rebuild in Laboratory > Device."
         raise ParameterError(
             "Layout", "", rule, f"{plan.rows} x {plan.columns}, {plan.arrangement}", remedy
         )
@@ -129,10 +127,8 @@ def table_of(bed: Object) -> Record:
             elif NEEDS.get(section) and not getattr(settings, f"use_{NEEDS[section]}"):
                 continue
             elif section != "blister" or formed:
-                kind, notes = (
-                    import_parameters(section, method),
-                    _notes(holder).get(_key(section, method), {}),
-                )
+                kind = import_parameters(section, method)
+                notes = _notes(holder).get(_key(section, method), {})
                 values = read(part_group(holder, section), kind, notes, owner)
                 part[section] = {key: _path(value) for key, value in values.items()}
     if settings.use_control:

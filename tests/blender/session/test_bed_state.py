@@ -23,9 +23,8 @@ def test_undo_takes_back_one_gesture_exactly_and_the_session_goes_on(bed, clock)
     undone(clock)
     session = running.find(only_bed())
     assert snapshot.dump(session.system, session.state) == first
-    assert session.pose[0] == pytest.approx(
-        -6e-3, abs=FLOAT32
-    )  # the finger has not come from elsewhere
+    # The finger has not come from elsewhere.
+    assert session.pose[0] == pytest.approx(-6e-3, abs=FLOAT32)
     assert_near(shown(only_bed()), exact(only_bed()), FLOAT32)
     undone(clock)
     assert (exact(only_bed()) == 40e-3).all()

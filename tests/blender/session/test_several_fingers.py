@@ -243,9 +243,8 @@ def test_fingertips_keep_their_numbers_where_one_between_is_deleted_or_comes_aft
     press(pair, clock, 3)
     tick.stop(pair.session_uid)
     select(pair)
-    bpy.ops.digiclay.take_export(
-        filepath=str(tmp_path / "take.toml")
-    )  # a scene file counts from 1 on
+    # A scene file counts from 1 on.
+    bpy.ops.digiclay.take_export(filepath=str(tmp_path / "take.toml"))
     assert load(tmp_path / "take.toml").description.endswith(": 1 = 1, 2 = 3")
     third = fingertips_of(pair)[3]
     assert third.name.endswith("Fingertip 3")
@@ -328,9 +327,8 @@ def test_animated_fingertips_are_baked_and_takes_of_several_replayed_and_exporte
     np.testing.assert_array_equal(exact(pair), formed)
     bpy.ops.digiclay.take_export(filepath=str(tmp_path / "pair.toml"))
     assert len(load(tmp_path / "pair.toml").fingers) == 2
-    fingertips_of(pair)[2].constraints.new(
-        "COPY_LOCATION"
-    ).target = pair  # that leads it elsewhere now
+    # That leads it elsewhere now.
+    fingertips_of(pair)[2].constraints.new("COPY_LOCATION").target = pair
     assert bpy.ops.digiclay.bake(source="TAKE") == {"FINISHED"}
     take = takes.read(pair)
     bpy.context.scene.frame_set(20)

@@ -318,10 +318,8 @@ def make_shape_display(parameters: ShapeDisplay, device: DeviceInfo) -> ShapeDis
             raise ParameterError(
                 "control", "amplitude", rule, f"heights from {low:.6g} m to {high:.6g} m"
             )
-    drive, moves = (
-        make_drive(parameters, device.cell, device.period),
-        parameters.moves(grid.layout.rows),
-    )
+    drive = make_drive(parameters, device.cell, device.period)
+    moves = parameters.moves(grid.layout.rows)
     patience = math.ceil(parameters.patience / device.period)
     whole = 0.0, 0.0, float(np.hypot(grid.x, grid.y).max())
     return ShapeDisplayControl(parameters, grid, actuator, drive, heights, moves, patience, whole)

@@ -275,9 +275,8 @@ def invert_six(matrix: Floats) -> Floats:
             rows[step], rows[pivot] = rows[pivot], rows[step]
             swaps.append((step, pivot))
         first, a, b, c, d, e = rows[step]
-        scale = 1.0 / (
-            first or math.nan
-        )  # singular is only a crafted snapshot: no fit comes of NaN
+        # Singular is only a crafted snapshot: no fit comes of NaN.
+        scale = 1.0 / (first or math.nan)
         head = a, b, c, d, e, _ = a * scale, b * scale, c * scale, d * scale, e * scale, scale
         # The first column is eliminated; that of the inverse comes in as the last one.
         rows = [

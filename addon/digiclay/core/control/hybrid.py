@@ -383,14 +383,12 @@ class HybridControl:
         if not memory.alone:
             top, coming = solved or (felt, 0.0)
             goes, beyond = self._leaves(memory)
-            carried = (
-                trim != 0.0
-            )  # a fingertip that has just landed does not leave, whatever its estimate
+            # A fingertip that has just landed does not leave, whatever its estimate.
+            carried = trim != 0.0
             if carried and (goes or beyond) and top > (along := self._move_top(memory)):
-                top, coming = (
-                    along,
-                    -1.0,
-                )  # fewer cells carry the fingertip, and none must rise for it
+                # Fewer cells carry the fingertip, and none must rise for it.
+                top = along
+                coming = -1.0
             top = min(max(top, 0.0), self.device.cell.actuator.stroke)
             # The trim belongs to a force that pins reach.
             coming -= trim * (coming == asked + trim)
@@ -458,10 +456,8 @@ class HybridControl:
         raised = [region.raised[i] for i in fingers]
         solved = [memories[i] for i in fingers]
         forces = [self.parameters.force_setpoint + memory.trim for memory in solved]
-        guesses, estimates = (
-            list(map(self._move_top, solved)),
-            [memory.estimate for memory in solved],
-        )
+        guesses = list(map(self._move_top, solved))
+        estimates = [memory.estimate for memory in solved]
         at, rows = self._at, seen.own.take(near, 1)
         under = self.finger.find_underside(
             aims, estimates, seen.quadratic_basis.take(near, 1), picked

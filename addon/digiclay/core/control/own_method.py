@@ -315,9 +315,8 @@ class Guarded:
             yield
         except (MethodError, MemoryError, KeyboardInterrupt):
             raise
-        except (
-            BaseException
-        ) as error:  # also SystemExit, which would end the program without a word
+        except BaseException as error:
+            # Also SystemExit, which would end the program without a word.
             raise MethodError(
                 f"{self.origin}: {function} {describe_failure(error, self.file)}."
             ) from error

@@ -367,10 +367,8 @@ class PredictedDivision(PinDivision):
         under = self.find_undersides(memory, basis, height)
         owner = find_lowest(under)
         shares, _ = self.divide_force(owner, under, seen, shared)
-        lowest, second = (
-            under.min(axis=0),
-            np.where(owner == self.fingers, np.inf, under).min(axis=0),
-        )
+        lowest = under.min(axis=0)
+        second = np.where(owner == self.fingers, np.inf, under).min(axis=0)
         blisters = self.find_blisters(memory)
         square = measure_square(blisters.x, blisters.y, basis)
         inside = square <= (blisters.radius * np.abs(blisters.radius))[:, None]

@@ -202,9 +202,8 @@ def find_tops(
     np.minimum(depths, most, out=depths)
     depths -= under
     forces = sections.reduce(np.add, pulp.predict_force(depths, lost))
-    tried = sections.reduce(
-        np.maximum, tops
-    )  # those of each finger, all of whose cells have the same
+    # Those of each finger, all of whose cells have the same.
+    tried = sections.reduce(np.maximum, tops)
     results = []
     for force, sums, heights in zip(wanted, forces.T, tried.T, strict=True):
         weakest, *_, strongest = sums.tolist()

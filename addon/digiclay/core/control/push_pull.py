@@ -100,10 +100,8 @@ class PushPullControl:
         memory = memory._replace(period=memory.period + 1, radius=-1.0)
         if not touched.height.size:
             return memory, None
-        low, high = (
-            touched.quadratic_basis[1:3].min(axis=1),
-            touched.quadratic_basis[1:3].max(axis=1),
-        )
+        low = touched.quadratic_basis[1:3].min(axis=1)
+        high = touched.quadratic_basis[1:3].max(axis=1)
         x, y = ((low + high) / 2).tolist()
         radius = float(np.hypot(*(high - low))) / 2 + self.margin
         return memory._replace(x=x, y=y, radius=radius), (x, y, radius)

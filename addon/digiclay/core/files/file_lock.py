@@ -58,9 +58,8 @@ def _find_start_in_linux(pid: int) -> float | None:
         )
     except OSError:
         return None
-    state, *fields = status.rpartition(")")[
-        2
-    ].split()  # the command's name may have blanks and brackets
+    # The command's name may have blanks and brackets.
+    state, *fields = status.rpartition(")")[2].split()
     if state in "ZX":  # it has ended, and its parent has not read its status
         return None
     return int(booted[1]) + int(fields[18]) / os.sysconf("SC_CLK_TCK") if booted else 0.0
@@ -89,9 +88,8 @@ def _find_start_in_windows(pid: int) -> float | None:
     try:
         owned, code = system.c_void_p(handle), system.c_ulong()
         times = [system.c_ulonglong() for _ in range(4)]
-        if (
-            kernel.GetExitCodeProcess(owned, system.byref(code)) and code.value != 259
-        ):  # STILL_ACTIVE
+        if kernel.GetExitCodeProcess(owned, system.byref(code)) and code.value != 259:
+            # STILL_ACTIVE.
             return None
         if not kernel.GetProcessTimes(owned, *map(system.byref, times)):
             return 0.0
@@ -133,9 +131,8 @@ def hold_lock(path: Path, refusal: str, patience: float = 0.0) -> Iterator[None]
     try:
         yield
     finally:
-        if (
-            os.name == "nt"
-        ):  # which cannot remove an open file; one that another process waits for remains
+        if os.name == "nt":
+            # Which cannot remove an open file; one that another process waits for remains.
             os.close(taken)
         with suppress(OSError):
             path.unlink()
@@ -173,9 +170,8 @@ def _take(path: Path) -> int | None:
         except BaseException:
             os.close(file)
             raise
-        os.close(
-            file
-        )  # it was removed between opening and locking: the next attempt makes another file
+        # It was removed between opening and locking: the next attempt makes another file.
+        os.close(file)
 
 
 def _lock(file: int) -> bool:

@@ -247,9 +247,8 @@ def claim_folder(
         with explain_os_error(f"{out} cannot be made"):
             until_the_end.enter_context(lock_name(out, patience))
         remove_abandoned(target.parent, target.name)
-        check_folder(
-            out, overwrite=overwrite, content=content
-        )  # another process may just have ended
+        # Another process may just have ended.
+        check_folder(out, overwrite=overwrite, content=content)
         yield Claim(out, overwrite)
 
 

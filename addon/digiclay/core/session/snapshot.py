@@ -129,9 +129,8 @@ def dump(system: System, state: State) -> bytes:
     thin = []
     for number, name in enumerate(ARRAYS):
         if name in THIN and system.fingers > 1:
-            filled = (
-                body[number].view("<i8").reshape(-1) != 0
-            )  # by their bits, as -0.0 is to be restored
+            # By their bits, as -0.0 is to be restored.
+            filled = body[number].view("<i8").reshape(-1) != 0
             body[number] = body[number].reshape(-1)[filled]
             thin.append(body[number].size)
             arrays.append(np.packbits(filled))

@@ -79,10 +79,8 @@ class Take:
             )
         if self.orders is None:
             return
-        pins, stroke = (
-            self.scene.layout.rows * self.scene.layout.columns,
-            self.scene.actuator.stroke,
-        )
+        pins = self.scene.layout.rows * self.scene.layout.columns
+        stroke = self.scene.actuator.stroke
         fault = find_fault(self.orders, self.periods, pins, stroke)
         if fault:
             rule = (

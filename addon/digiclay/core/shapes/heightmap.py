@@ -224,7 +224,8 @@ def _read_by_pillow(path: Path, tags: Mapping[int, Any]) -> Pixels:
     for order, raw in (
         (b"II", "F;64F"),
         (b"MM", "F;64BF"),
-    ):  # Pillow can unpack them, but does not list them
+    ):
+        # Pillow can unpack them, but does not list them.
         tiff.OPEN_INFO[order, 1, (3,), 1, (64,), ()] = "F", raw
     several = tags.get(PLANES) == 2 and tags.get(CHANNELS, 1) > 1
     if tags.get(BITS, 8) > 8 and (several or tags.get(PHOTOMETRIC) == 0):
@@ -298,9 +299,8 @@ def _find_brightness(levels: Pixels) -> Pixels:
         return levels
     bright = np.empty(levels.shape[:2], np.float32)
     full = np.float32(1.0 if levels.dtype.kind == "f" else np.iinfo(levels.dtype).max)
-    for row, line in zip(
-        levels, bright, strict=True
-    ):  # all at once would take many times the memory
+    for row, line in zip(levels, bright, strict=True):
+        # All at once would take many times the memory.
         line[:] = row[:, :3] @ BRIGHTNESS if row.shape[1] > 2 else row[:, 0]
         if row.shape[1] in (2, 4):
             line *= row[:, -1] / full

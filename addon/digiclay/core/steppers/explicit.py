@@ -60,10 +60,8 @@ class Explicit(Alike):
         height, thrown = y[0], np.zeros(y.shape[1:], np.bool_)
         with np.errstate(over="ignore", invalid="ignore"):
             for part in plan.segments:
-                command, instants = (
-                    commands[plan.queue.seen(part.start)],
-                    under.take(part.nodes, axis=0),
-                )
+                command = commands[plan.queue.seen(part.start)]
+                instants = under.take(part.nodes, axis=0)
 
                 def rates_at(
                     rows: Floats, node: int, command: Floats = command, instants: Floats = instants

@@ -141,11 +141,9 @@ def read_jobs(path: Path, more: Sequence[str] = ()) -> JobSeries:
     try:
         refuse_unknown("", table, (*WHICH, *KEYS))
         outputs = make_outputs({key: table[key] for key in table if key not in WHICH})
-        words, methods, changes = (
-            _read_scenes(table),
-            _read_methods(table, more),
-            _read_settings(table),
-        )
+        words = _read_scenes(table)
+        methods = _read_methods(table, more)
+        changes = _read_settings(table)
         count = len(words) * len(methods) * len(changes)
         if count > MOST:
             raise ParameterError("scenes", "", f"must come to {MOST} jobs at most", f"{count} jobs")

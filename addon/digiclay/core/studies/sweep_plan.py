@@ -73,9 +73,8 @@ def hash_points(points: Sequence[Point]) -> str:
         text = NOTE.sub("", format_scene(point.scene)) if point.scene else point.error
         scenes.update(text.encode())
         if point.scene is not None:
-            scenes.update(
-                find_method(point.scene.method).digest.encode()
-            )  # empty for a built-in one
+            # Empty for a built-in one.
+            scenes.update(find_method(point.scene.method).digest.encode())
     return scenes.hexdigest()
 
 

@@ -408,10 +408,8 @@ def find_ridges(bed: Formed, pins: Indices, off: Floats, least: float) -> tuple[
         every = [_crest(field, pieces[n], lines[n]) for n in numbers]
         crests = sorted(filter(None, every), key=lambda crest: -settle(crest.length))
         if crests:
-            core, half_width = (
-                np.concatenate([crest.points[:, :2] for crest in crests]),
-                crests[0].half,
-            )
+            core = np.concatenate([crest.points[:, :2] for crest in crests])
+            half_width = crests[0].half
         else:
             core = np.concatenate([pieces[n].points for n in numbers])
             top = core[[int(np.argmax(field.at(core)))]]
