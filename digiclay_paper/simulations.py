@@ -9,7 +9,7 @@ import numpy as np
 from digiclay.core.base.modes import Mode
 from digiclay.core.control.virtual_master import Master, Phase, VirtualMaster
 from digiclay.core.engine.simulation import begin, periods
-from digiclay.core.metrics import summary
+from digiclay.core.metrics import signals, summary
 from digiclay.core.model.control_interface import find_set_point
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.recorder import Recorder
@@ -49,7 +49,7 @@ WINDOWS = {
 def measure_windows(done: Result) -> dict[str, dict[str, float | None]]:
     """Return RFD, N, and deviations of force, N, and height, m, while shaping, by the names of `WINDOWS`."""
     time, sums = done.history["time"], summary.sum_cells(done.history)
-    weight = summary.compute_weights(time)
+    weight = signals.compute_weights(time)
     wanted = find_set_point(done.scene.set_point, sums.following)
     above = np.full(len(time), np.nan)
     above[sums.touching] = summary.measure_surface_under(sums, done.history["fingertip"])
@@ -60,8 +60,8 @@ def measure_windows(done: Result) -> dict[str, dict[str, float | None]]:
         )
         windows[name] = {
             "rfd": summary.compute_rfd(time, sums.total, wanted, rows),
-            "force_deviation": summary.compute_deviation(sums.total[rows], weight[rows]),
-            "height_deviation": summary.compute_deviation(above[rows], weight[rows]),
+            "force_deviation": signals.compute_deviation(sums.total[rows], weight[rows]),
+            "height_deviation": signals.compute_deviation(above[rows], weight[rows]),
         }
     return windows
 
@@ -319,12 +319,12 @@ def _swing(
     wanted = find_set_point(
         case.set_point, np.count_nonzero(after["mode"] == Mode.FORCE_FOLLOW, axis=1)
     )
-    settled = summary.measure_settling_time(after["time"], after["total_force"] / wanted, 1.0, 0.1)
+    settled = signals.measure_settling_time(after["time"], after["total_force"] / wanted, 1.0, 0.1)
     swing = Swing(
         gain,
         position_gain,
-        summary.measure_amplitude(late["total_force"]),
-        summary.measure_frequency(late["time"], late["total_force"]),
+        signals.measure_amplitude(late["total_force"]),
+        signals.measure_frequency(late["time"], late["total_force"]),
         settled,
     )
     return swing._replace(settling=None) if swing.sustained else swing, done, quick

@@ -248,7 +248,7 @@ class Doors(AbstractContextManager["Doors"]):
         """Read a line of JSON; an empty answer when there is none in time, s."""
         line = b"\n"
         while line == b"\n" and select.select([self._output], [], [], patience)[0]:
-            # Bells before it.
+            # Bells come before it.
             line = self._output.readline()
         return dict(json.loads(line)) if line.strip() else {}
 

@@ -89,3 +89,29 @@ def refused(capsys):
         assert (code, out, err.count("\n"), said in err) == (2, "", 1, True), err
 
     return check
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """Work in an empty folder, with a blank and an umlaut in its path."""
+    folder = tmp_path / "schöne Tasten"
+    folder.mkdir()
+    monkeypatch.chdir(folder)
+    return folder
+
+
+@pytest.fixture
+def no_methods():
+    """Make methods that a test adds unknown again at its end."""
+    from tests.own_methods import forgotten
+
+    with forgotten():
+        yield
+
+
+@pytest.fixture(scope="module")
+def tap():
+    """Return the first 0.3 s of the sample *tap*."""
+    import digiclay
+
+    return digiclay.scene("tap", {"simulation.duration": 0.3})

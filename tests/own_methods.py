@@ -93,3 +93,27 @@ def refused(capsys, *arguments):
     said = capsys.readouterr().err
     assert said.count("\n") == 1, said
     return said
+
+
+def bad(body, fields=""):
+    inner = "\n".join(f"    {line}" for line in (*fields.splitlines(), *body.splitlines()))
+    return f"{HEAD}\n@dataclass(frozen=True)\nclass Bad(OwnMethod):\n{inner}\n"
+
+
+def commanding(line):
+    return bad(f"def command(self, memory, cells, device):\n    {line}")
+
+
+def ordering(orders):
+    return commanding(f"return memory, {orders}")
+
+
+def building(line):
+    return bad(f"def build(self, device):\n    {line}")
+
+
+def keeping(first, later):
+    return bad(
+        f"def begin(self, device):\n    return {first}\n"
+        f"def command(self, memory, cells, device):\n    return {later}, Orders()"
+    )

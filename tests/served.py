@@ -14,6 +14,7 @@ from pathlib import Path
 
 from websockets.sync.client import connect
 
+from digiclay_serve.protocol import Pose, pack_pose, unpack_frame
 from tests.timeouts import TIMEOUT
 
 ROOT = Path(__file__).parents[1]
@@ -115,3 +116,34 @@ def serve(folder, *options, rate=200):
     finally:
         process.kill()
         process.communicate()
+
+
+PRESS = (0.0, 0.0, 0.038, 1.0, 0.0, 0.0, 0.0)
+
+
+def frames(client):
+    while True:
+        message = client.recv(TIMEOUT)
+        if isinstance(message, bytes):
+            yield unpack_frame(message)
+
+
+def press(client, number):
+    """Send a pose until a frame has it and its force; return that frame.
+
+    A pose that is sent once may be too old when a busy machine comes to it.
+    """
+    while True:
+        client.send(pack_pose(Pose(PRESS, number)))
+        frame = next(frames(client))
+        if (
+            frame.number == number
+            and frame.pose.tolist() == list(PRESS)
+            and frame.total_force > 0.0
+        ):
+            return frame
+
+
+def is_well(server, number):
+    with server.connect("?format=binary&rate=200") as client:
+        press(client, number)

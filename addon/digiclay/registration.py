@@ -4,7 +4,7 @@ import sys
 from types import ModuleType
 
 from . import command_line, manual_map, operators, panels, preferences, translations
-from .device import detail, repair
+from .device import detail, part_watch
 from .exchange import image_reader
 from .live import handlers
 from .press import brush, ghost, tool
@@ -23,7 +23,7 @@ MODULES: tuple[ModuleType, ...] = (
     translations,  # of all that is registered before
     command_line,
     manual_map,
-    repair,
+    part_watch,
     detail,
     handlers,  # the last to come and the first to go: it ends what runs
 )

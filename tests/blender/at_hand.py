@@ -6,7 +6,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 from digiclay.compat import strips
-from digiclay.device import repair
+from digiclay.device import part_watch
 from digiclay.roles import BALL, FINGER, HOUSING, OWNED, ROLE, fingertip_of, is_bed
 
 #: Files with a bed each, by how it was added.
@@ -41,7 +41,7 @@ def read_picture(path):
 def film_strip(scene, path):
     """Put a film into the sequencer of a scene; return its strip and how many frames it has."""
     strip = strips(scene).new_movie("film", str(path), channel=1, frame_start=1)
-    # 5.2 on.
+    # From 5.2 on.
     return strip, int(strip.duration if hasattr(strip, "duration") else strip.frame_final_duration)
 
 
@@ -61,7 +61,7 @@ def done(step):
 
 def looked():
     bpy.context.view_layer.update()
-    repair.settle()
+    part_watch.settle()
     bpy.context.view_layer.update()
 
 

@@ -7,7 +7,7 @@ import pytest
 from digiclay.core.base.modes import Mode
 from digiclay.core.model.layout import Layout, make_grid
 from digiclay.core.session import live_session
-from digiclay.device import repair
+from digiclay.device import part_watch
 from digiclay.device.instant import Instant
 from digiclay.live import handlers
 from digiclay.sessions import running
@@ -76,9 +76,9 @@ def formed():
 @pytest.fixture
 def watched(extension):
     """Look after beds as in a window, in an empty scene; take all back."""
-    repair.watch()
+    part_watch.watch()
     bpy.ops.object.select_all(action="SELECT")
     bpy.ops.object.delete()
     done("Empty")
     yield
-    repair.unregister()
+    part_watch.unregister()

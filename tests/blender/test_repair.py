@@ -137,7 +137,7 @@ def test_a_bed_joined_into_another_object_takes_its_fingertips_along_and_undo_br
 def test_a_click_on_the_ball_takes_hold_of_its_fingertip_alone():
     bed, other = added(), added(1.0)
     tip = fingertip_of(bed)
-    # As in older files.
+    # Older files have it so.
     tip[BALL].hide_select, tip[BALL].lock_location = (
         True,
         (False, False, False),
@@ -184,7 +184,7 @@ def test_a_copy_of_a_bed_has_a_fingertip_of_its_own(linked, along):
 def test_what_is_done_right_after_undo_is_not_undone_with_it():
     duplicate(added())
     bpy.ops.ed.undo()  # to the copy as Blender made it, without a fingertip
-    # Listed, with an undo step.
+    # The operator is listed, with an undo step.
     bpy.ops.transform.translate("EXEC_DEFAULT", True, value=(1.0, 0.0, 0.0))
     looked()
     assert (sorted(bed.location.x for bed in beds()), whole(*beds())) == ([0.0, 1.0], True)

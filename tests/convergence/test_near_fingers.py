@@ -52,7 +52,7 @@ def test_no_finger_is_stolen_by_another_one_that_comes_near(method, case, turn, 
 @pytest.mark.parametrize("turn", [TURN, 1.1, 2.0])
 @pytest.mark.parametrize("pitch", [3e-3, 4.5e-3, 6e-3])
 def test_on_a_bed_of_a_few_pins_a_force_comes_to_rest_after_a_tremor(pitch, turn):
-    # S, mm.
+    # Seconds, mm.
     heights = {
         0.0: 43.0,
         0.5: 38.5,

@@ -70,7 +70,7 @@ LEVELS = (
 )
 #: Blender's own modules, which the core never imports, not even inside a function.
 BLENDER = {"bpy", "bmesh", "bpy_extras", "gpu", "mathutils"}
-MAX_LINES = 560
+MAX_LINES = 500
 
 # Written with commas, because this file is searched as well.
 HOSTS = "pypi,org pythonhosted,org conda,anaconda,org download,blender,org debian,org ubuntu,com"

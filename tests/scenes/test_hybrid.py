@@ -6,7 +6,7 @@ from functools import cache
 import numpy as np
 import pytest
 from digiclay.core.base.modes import Mode
-from digiclay.core.control.hybrid import Hybrid
+from digiclay.core.control.hybrid_parameters import Hybrid
 from digiclay.core.control.virtual_master import Phase
 from digiclay.core.metrics.summary import compute_rfd
 from digiclay.core.model.control_interface import find_set_point

@@ -25,15 +25,14 @@ from pythonosc.osc_message_builder import OscMessageBuilder
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from digiclay_serve.hands_command import read_packets
-from digiclay_serve.protocol import Flag, Pose, pack_pose, unpack_frame
+from digiclay_serve.protocol import Flag, Pose, pack_pose
 from tests.other_process import PACKAGES
-from tests.served import TOKEN, frame_message, load_example, serve
+from tests.served import PRESS, TOKEN, frame_message, frames, is_well, load_example, press, serve
 from tests.timeouts import TIMEOUT, wait_until
 
 pytestmark = pytest.mark.skipif(
     "sys.platform == 'win32'", reason="the server runs on Linux and macOS"
 )
-PRESS = (0.0, 0.0, 0.038, 1.0, 0.0, 0.0, 0.0)
 
 
 @pytest.fixture(scope="module")
@@ -50,34 +49,6 @@ def server(tmp_path_factory):
             f"take_{1 + index:03}.npz" for index in range(len(takes))
         ]
         assert sum(take.periods for take in takes) + report["left_out"] == report["periods"]
-
-
-def frames(client):
-    while True:
-        message = client.recv(TIMEOUT)
-        if isinstance(message, bytes):
-            yield unpack_frame(message)
-
-
-def press(client, number):
-    """Send a pose until a frame has it and its force; return that frame.
-
-    A pose that is sent once may be too old when a busy machine comes to it.
-    """
-    while True:
-        client.send(pack_pose(Pose(PRESS, number)))
-        frame = next(frames(client))
-        if (
-            frame.number == number
-            and frame.pose.tolist() == list(PRESS)
-            and frame.total_force > 0.0
-        ):
-            return frame
-
-
-def is_well(server, number):
-    with server.connect("?format=binary&rate=200") as client:
-        press(client, number)
 
 
 def refused(server, *, token="", wishes=""):

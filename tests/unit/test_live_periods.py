@@ -30,6 +30,7 @@ from digiclay.core.session.live_session import (
 )
 from digiclay.core.session.recent_trace import ROWS
 from digiclay.sessions import sculpting
+from digiclay.sessions.running import last_place
 from digiclay.sessions.sculpting import change_stroke, queue_stroke
 from digiclay.strokes.stroke import draw, start
 
@@ -373,7 +374,7 @@ def test_a_tick_ends_with_a_stroke_since_each_has_an_undo_step():
         finished.append(session.finished_strokes)
         assert session.snapshot == snapshot.dump(session.system, session.state)
     assert finished == [1, 2]
-    assert (len(session.gestures), sculpting.last_place(session)) == (2, (9e-3, 0.0))
+    assert (len(session.gestures), last_place(session)) == (2, (9e-3, 0.0))
 
 
 @pytest.mark.usefixtures("quick_machine")

@@ -13,18 +13,7 @@ from tests.other_process import finish, start
 from tests.own_methods import PAD, Mine, forgotten, write_method
 from tests.scene_files import read_text
 
-pytestmark = pytest.mark.usefixtures("here")
-
-
-@pytest.fixture(autouse=True)
-def no_methods():
-    with forgotten():
-        yield
-
-
-@pytest.fixture(scope="module")
-def tap():
-    return digiclay.scene("tap", {"simulation.duration": 0.3})
+pytestmark = pytest.mark.usefixtures("here", "no_methods")
 
 
 def make_again():

@@ -11,11 +11,6 @@ from digiclay.core.scene.toml_table import tabulate
 from tests.assemble import refused_in_a_line
 
 
-@pytest.fixture(scope="module")
-def tap():
-    return digiclay.scene("tap", {"simulation.duration": 0.3})
-
-
 def test_a_held_bed_has_the_law_of_the_contact():
     scene = digiclay.scene("tap", {"relaxation": "absent"})
     law = scene.section("contact")

@@ -16,7 +16,8 @@ from digiclay.press.pointer import (
     read_event,
 )
 from digiclay.sessions import sculpting
-from digiclay.sessions.sculpting import drop_strokes, find_stroke, queue_stroke
+from digiclay.sessions.running import find_stroke
+from digiclay.sessions.sculpting import drop_strokes, queue_stroke
 from digiclay.strokes import motion
 from digiclay.strokes.nominal import Device
 from digiclay.strokes.pose import lean_finger, turn_image, turn_toward

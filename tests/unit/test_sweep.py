@@ -237,7 +237,7 @@ def test_a_sweep_estimates_errors_at_the_ends_of_what_varies_and_says_where(caps
     assert main(sweep) == 0
     said = capsys.readouterr().out
     found = rows("grid")
-    # Corners.
+    # These are the corners.
     assert [index for index, line in enumerate(found) if line["height_error (m)"]] == [
         0,
         2,

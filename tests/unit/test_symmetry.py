@@ -10,6 +10,7 @@ from digiclay.core.model.fingertip import LEVEL
 from digiclay.core.model.layout import Layout
 from digiclay.core.session import snapshot
 from digiclay.core.session.take import from_bytes, make_take, play, to_bytes
+from digiclay.sessions.running import list_pressing
 from digiclay.sessions.sculpting import (
     begin_session,
     change_scene,
@@ -17,7 +18,6 @@ from digiclay.sessions.sculpting import (
     drop_strokes,
     find_device,
     follow_finger,
-    list_pressing,
     queue_stroke,
     restore,
     rewind,

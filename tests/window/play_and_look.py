@@ -296,7 +296,7 @@ def counted(blender, name):
 
 
 def looked(blender, name):
-    watch = blender.part("device.repair")
+    watch = blender.part("device.part_watch")
     yield 1.0
     yield from blender.until(lambda: not bpy.app.timers.is_registered(watch._repair_when_idle))
     if blender.sessions():

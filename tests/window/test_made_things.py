@@ -10,7 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from digiclay.recorded.pointer_strokes import PointerStroke
-from digiclay.sessions.sculpting import change_stroke, find_stroke, follow_finger, queue_stroke
+from digiclay.sessions.running import find_stroke
+from digiclay.sessions.sculpting import change_stroke, follow_finger, queue_stroke
 from digiclay.strokes.stroke import draw, lay_ring, start
 
 from tests.window.intended import THINGS, find_distance

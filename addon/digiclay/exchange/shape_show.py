@@ -85,7 +85,7 @@ def _show(bed: Object, scene: Scene, shape: Shape, laid: Fitted) -> tuple[Fitted
     off = float(np.abs(state.row(0) - display.heights).max())
     poses, grid = bridge.poses(bed), make_grid(scene.layout)
     for pose, finger in zip(poses, find_ellipsoids(scene), strict=True):
-        # Above the shape where it is higher.
+        # The fingertip rises where the shape is higher.
         touch = find_touch_height(grid, state.row(0), finger, float(pose[0]), float(pose[1]))
         pose[2] = max(pose[2], touch + CLEARANCE)
     # All that can fail is done: from here on the bed changes.

@@ -56,7 +56,7 @@ def clear_recovery(path: str = "", *_: object) -> None:
             continue
         bed = find_bed(session.uid, session.name)
         if bed is not None and number in [entry.number for entry in takes.list_takes(bed)]:
-            # Not undone.
+            # Undo does not bring the take back.
             takes.remove(bed, number)
             # A copy saved elsewhere is not the file Blender asks about before it closes it.
             if session.recording and path and path == bpy.data.filepath:

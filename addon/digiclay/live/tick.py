@@ -87,7 +87,7 @@ def stop(uid: int) -> str:
     ended = running.TABLE.sessions.get(uid)
     bed = find_bed(uid, ended.name) if ended else None
     if ended is not None and bed is not None and ended.stroke_start:
-        # So that what is drawn is complete.
+        # The stroke is then kept whole, from its beginning.
         back = sculpting.restore(ended, ended.standing.snapshot, ended.standing.poses)
         show(bed, replace(back, strokes=ended.strokes, stroke_start=None))
     running.drop(uid)

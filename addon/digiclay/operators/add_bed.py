@@ -221,7 +221,7 @@ def rebuild(bed: Object) -> Scene:
     mesh, drawing = bed.data, view.find_modifier(bed)
     bed.data = view.make_cells(instant)
     if drawing is not None:
-        # It stays, and with it how the bed is colored; only what it draws is another.
+        # The modifier stays, and with it the bed's colors; only its node tree is another.
         tree = drawing.node_group
         view.add_modifier(bed, instant)
         _discard(tree)

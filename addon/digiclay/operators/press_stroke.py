@@ -14,7 +14,8 @@ from ..live import beds, loop, tick
 from ..press import aim, brush, ghost, pointer, tool
 from ..press.pointer import begin_button, read_event
 from ..sessions import running, sculpting
-from ..sessions.sculpting import change_stroke, find_stroke, last_place, queue_stroke
+from ..sessions.running import find_stroke, last_place
+from ..sessions.sculpting import change_stroke, queue_stroke
 from ..settings.declared import choice, flag, integer, number, text, title
 from ..strokes.stroke import (
     DEEPEST,

@@ -106,7 +106,7 @@ def session_figure(history: History, set_point: SetPoint | None) -> Figure:
             fingers = [
                 set_point.total(sum_cells(finger).following) for finger in split_fingers(history)
             ]
-            # The same of all fingers, where it does not depend on cells.
+            # All fingers have the same set point where it does not depend on cells.
             wanted = np.fmax.reduce(fingers)
             label = f"set point {set_point.force:g} N{' per cell' if set_point.per_cell else ''}"
         draw_force(force, history, wanted, label)

@@ -21,7 +21,7 @@ from ..overlay.sections import LETTERS, place_label
 from ..overlay.views import find_free_room
 from ..roles import fingertip_of
 from ..sessions import running
-from ..sessions.sculpting import list_pressing
+from ..sessions.running import list_pressing
 from ..settings import devices
 from ..strokes.nominal import find_radius
 from ..strokes.stroke import LOCKS, STAMPS, Brush, Place, lay_ring, lay_square

@@ -18,8 +18,8 @@ from ..core.model.fingertip import Fingertip
 from ..core.scene.scene_source import read_table
 from ..core.scene.schema import Scene
 from ..device.instant import find_ellipsoid
-from ..sessions.running import Running
-from ..sessions.sculpting import change_scene, find_stroke, follow_finger, queue_stroke
+from ..sessions.running import Running, find_stroke
+from ..sessions.sculpting import change_scene, follow_finger, queue_stroke
 from ..settings.devices import BEDS, change_finger
 from ..strokes.stamps import load_stamp
 from ..strokes.stroke import (

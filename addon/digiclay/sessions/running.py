@@ -153,3 +153,21 @@ def last_message(bed: Object | None = None) -> str:
     """Return the last message; for a bed's panel, unless it is about others."""
     of_bed = bed is None or not TABLE.subjects or bed.session_uid in TABLE.subjects
     return TABLE.message if of_bed else ""
+
+
+def find_stroke(running: Running, number: int) -> Stroke | None:
+    """Return the stroke of a number, or None when it is finished or was taken back."""
+    return next((stroke for stroke in running.strokes if stroke.number == number), None)
+
+
+def last_place(running: Running) -> Place | None:
+    """Return where the last stroke ends, x and y, m; None before the first."""
+    if not running.strokes:
+        return running.last_place
+    end = running.strokes[-1].samples[-1]
+    return end.x, end.y
+
+
+def list_pressing(running: Running) -> list[int]:
+    """Return the places of the fingertips of strokes: the first one's, and those of further images."""
+    return [0, *range(len(running.numbers), len(running.poses))]

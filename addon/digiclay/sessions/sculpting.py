@@ -8,12 +8,9 @@ from typing import Any
 import numpy as np
 
 from ..core.base.arrays import Floats
-from ..core.base.errors import StateError
 from ..core.base.modes import Mode
 from ..core.control.orders import Orders
-from ..core.engine.simulation import begin
 from ..core.engine.state import State
-from ..core.engine.system import System
 from ..core.model.fingers import MOST_FINGERS
 from ..core.scene.assembly import assemble
 from ..core.scene.schema import Scene
@@ -24,16 +21,14 @@ from ..strokes.motion import begin as begin_stroke
 from ..strokes.motion import follow, follow_images
 from ..strokes.nominal import Device
 from ..strokes.pose import turn_image
-from ..strokes.stroke import FINISHING, Place, Stroke
+from ..strokes.stroke import FINISHING, Stroke
 from ..strokes.sweep import SWEEPS, WHOLE, finish, order_all, sweep
 from ..strokes.tracking import find_blister, find_tracking
-from ..ui_text import localize
-from .running import Gesture, Running, match_poses, name_fingers
+from .restored_states import Numbers, change_fingers, load_state
+from .running import Gesture, Running, find_stroke, list_pressing, match_poses, name_fingers
 
 #: How many gestures can be taken back, and the most memory their states may take, bytes.
 GESTURES, GESTURE_BYTES = 20, 200_000_000
-#: Message when the state of other parts is taken up.
-CHANGED = "Only the heights were kept: the bed's parts or its method have changed"
 #: A fingertip that moves on after resting so long makes another gesture, s.
 REST = 0.5
 #: Control periods of a queue that are simulated at a time, and between two estimates of the error:
@@ -41,8 +36,6 @@ REST = 0.5
 CHUNK, PAUSE = 16, 10 * accuracy.PAUSE
 #: Time between two ticks, s, unless told.
 INTERVAL = 1.0 / 30.0
-#: Numbers of fingertips.
-Numbers = tuple[int, ...]
 #: A finger that is read this near to where it was has not moved, m and parts of a quaternion: one
 #: that is put to a pose comes back from Blender's 32 bits, on a bed 100 units from the origin, by
 #: 1e-6 m beside it.
@@ -68,9 +61,7 @@ def begin_session(
     numbers = numbers or tuple(range(1, fingers + 1))
     whole = scene.with_fingers(len(numbers))
     system = assemble(whole)
-    state, lost = _load_state(
-        system, _change_fingers(scene, system, stored, was or numbers, numbers)
-    )
+    state, lost = load_state(system, change_fingers(scene, system, stored, was or numbers, numbers))
     poses = live_session.clamp_pose(pose.reshape(-1, 7), system.cell.actuator.stroke)
     now = snapshot.dump(system, state)
     running = Running(
@@ -89,35 +80,6 @@ def begin_session(
         next_gesture=live_session.Moment(state.period, now, poses, tick),
     )
     return running, lost
-
-
-def _load_state(system: System, stored: bytes | None) -> tuple[State, str]:
-    """Return the state to continue from, and what could not be taken up."""
-    if stored is None:
-        return begin(system), ""
-    # The state of other parts has heights at least; what has none is of no use.
-    refused = ""
-    for read, words in ((snapshot.load, ""), (snapshot.transfer_heights, CHANGED)):
-        try:
-            return read(system, stored), words and localize(words)
-        except StateError as error:
-            refused = localize("The bed begins at rest. {}", error)
-    return begin(system), refused
-
-
-def _change_fingers(
-    scene: Scene, system: System, stored: bytes | None, was: Numbers, numbers: Numbers
-) -> bytes | None:
-    """Return a snapshot with the state of each fingertip moved to the place of its number in a system."""
-    if stored is None or was == numbers:
-        return stored
-    former = assemble(replace(scene, fingers=scene.fingers[:1] * len(was)))
-    try:
-        state = snapshot.load(former, stored)
-    except StateError:  # what is wrong with it will be said
-        return stored
-    places = [was.index(number) if number in was else None for number in numbers]
-    return snapshot.dump(system, snapshot.change_fingers(former, system, state, places))
 
 
 def advance(
@@ -209,11 +171,6 @@ def _end_stroke(running: Running, stroke: Stroke) -> Running:
     return replace(
         running, gestures=(*earlier, replace(last, stroke=drawn.dump(stroke), end=running.standing))
     )
-
-
-def list_pressing(running: Running) -> list[int]:
-    """Return the places of the fingertips of strokes: the first one's, and those of further images."""
-    return [0, *range(len(running.numbers), len(running.poses))]
 
 
 def _give_fingers(running: Running, count: int) -> Running:
@@ -316,9 +273,9 @@ def restore(
         running = replace(running, system=system, monitor=monitor, poses=session_poses)
     was = was or name_fingers(running.numbers, len(poses))
     if was != running.numbers:
-        stored = _change_fingers(running.scene, running.system, stored, was, running.numbers)
+        stored = change_fingers(running.scene, running.system, stored, was, running.numbers)
         poses = match_poses(poses, was, running.poses, running.numbers)
-    state, _ = _load_state(running.system, stored)
+    state, _ = load_state(running.system, stored)
     now = snapshot.dump(running.system, state)
     keep = running.recording
     if keep is not None:
@@ -367,7 +324,7 @@ def change_scene(
 
     def change(moment: Any) -> Any:
         had = name_fingers(was, len(moment.poses))
-        stored = _change_fingers(scene, plain, moment.snapshot, had, numbers)
+        stored = change_fingers(scene, plain, moment.snapshot, had, numbers)
         assert stored is not None
         return replace(
             moment, snapshot=stored, poses=match_poses(moment.poses, had, others, numbers)
@@ -459,19 +416,6 @@ def queue_stroke(running: Running, stroke: Stroke) -> tuple[Running, int]:
     number = running.begun_strokes + 1
     strokes = (*running.strokes, replace(stroke, number=number))
     return replace(running, strokes=strokes, begun_strokes=number), number
-
-
-def find_stroke(running: Running, number: int) -> Stroke | None:
-    """Return the stroke of a number, or None when it is finished or was taken back."""
-    return next((stroke for stroke in running.strokes if stroke.number == number), None)
-
-
-def last_place(running: Running) -> Place | None:
-    """Return where the last stroke ends, x and y, m; None before the first."""
-    if not running.strokes:
-        return running.last_place
-    end = running.strokes[-1].samples[-1]
-    return end.x, end.y
 
 
 def change_stroke(running: Running, number: int, change: Callable[[Stroke], Stroke]) -> Running:

@@ -5,8 +5,9 @@ from dataclasses import replace
 from ..core.base.arrays import Floats
 from ..core.session.live_session import Moment
 from ..strokes import drawn
+from .restored_states import Numbers
 from .running import Gesture, Running, name_fingers
-from .sculpting import Numbers, drop_strokes, queue_stroke, restore
+from .sculpting import drop_strokes, queue_stroke, restore
 
 
 def take_up(

@@ -55,7 +55,7 @@ def load(folder: str) -> None:
             RuntimeError,
             OverflowError,
         ) as error:
-            # What Blender cannot hold.
+            # Blender cannot hold one of its parameters.
             remove_method(name)
             refused.append(
                 f"{name}: Blender must be able to hold its parameters (got {one_line(error)})."

@@ -18,14 +18,13 @@ then goes along at its height, up and down over what is formed.
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
 
 from ..core.base.arrays import TIE, Floats
-from ..core.model.fingertip import Fingertip
-from .nominal import LIMITS, Device, find_nominal, find_undersides, returns
+from .nominal import LIMITS, Device, find_nominal, returns
 from .pose import lean_finger, turn_image, turn_toward
 from .stroke import (
     ABOVE,
@@ -42,6 +41,7 @@ from .stroke import (
     alter,
 )
 from .tracking import SUDDEN, Tracking
+from .workspace import Workspace
 
 #: Lowest point of the fingertip, m.
 Point = tuple[float, float, float]
@@ -54,8 +54,6 @@ CROSS, DESCEND, OUTRUN = 1.0, 0.4, 5.0
 APPROACH, CLEARANCE = 0.1, 4e-3
 #: How far the fingertip may be off its height while it goes on along the path, m.
 SLACK = 0.5e-3
-#: How much wider than it is the fingertip is taken to be beside pins that are locked.
-WIDER = 1.2
 #: How fast the fingertip turns while it touches, rad/s: as fast as a hand turns a pen, so that tilt
 #: read in coarse steps does not jerk it.
 TURN = 3.0
@@ -79,57 +77,6 @@ APART, MERGED, SAME = 1.0, 0.6, 0.5
 BOTH_WAYS = (Brush.LOWER, Brush.RAISE)
 #: Phases in which it touches, or is about to.
 DOWN = (PRESSING, RISING, DRAGGING, LEAVING)
-
-
-@dataclass(frozen=True, eq=False)
-class Workspace:
-    """Device, control period, s, and height above all pins, m, for a fingertip on its path."""
-
-    device: Device
-    period: float
-    safe: float
-
-    def find_touch(self, stroke: Stroke, x: float, y: float) -> float:
-        """Return how high a fingertip is that descends at a place and first touches a pin, m."""
-        # On a slope it touches the pins beside it first, several millimeters above the surface
-        # below it.
-        assert stroke.standing is not None
-        grid, finger = self.device.grid, self.device.finger
-        cells = grid.disc(x, y, finger.width)
-        square = ((grid.x[cells] - x) ** 2 + (grid.y[cells] - y) ** 2) / finger.width**2
-        gap = finger.height * (1.0 - np.sqrt(np.maximum(1.0 - square, 0.0)))
-        surface = self.device.find_surface(stroke.standing, x, y)
-        return max(surface, float((stroke.standing[cells] - gap).max(initial=0.0)))
-
-    def pass_over_locked(self, stroke: Stroke, x: float, y: float, z: float) -> float:
-        """Return a height of the fingertip, m, at which it presses into no locked pin."""
-        locked, tip = self.device.locked, self.device.finger
-        if locked is None:
-            return z
-        assert stroke.height is not None
-        # A wider one comes up before its side is at a pin that is higher than its middle.
-        wide = Fingertip(WIDER * tip.length, WIDER * tip.width, tip.height)
-        cells = self.device.grid.disc(x, y, max(wide.length, wide.width))
-        cells = cells[locked[cells]]
-        sample, image = stroke.samples[stroke.reached], stroke.images[stroke.image]
-        under = find_undersides(
-            replace(self.device, finger=wide), stroke, image, sample.lean, (x, y), cells
-        )
-        return max(z, float((stroke.height[cells] - under).max(initial=z)))
-
-    def find_lowest(self, stroke: Stroke, x: float, y: float) -> float:
-        """Return how low the fingertip is to be at a place of its path, m."""
-        assert stroke.ground is not None
-        assert stroke.height is not None
-        level = self.device.find_level(stroke, stroke.images[stroke.image], stroke.height)
-        top = self.device.find_top(
-            stroke, stroke.samples[stroke.reached], (x, y), stroke.ground, level
-        )
-        if stroke.brush is Brush.RAISE and stroke.standing is not None:
-            # It rides over what an image before has raised higher.
-            top = max(top, self.find_touch(stroke, x, y))
-        lowest = max(0.0, top - stroke.tracking.sink) if stroke.tracking else top
-        return self.pass_over_locked(stroke, x, y, lowest)
 
 
 def begin(stroke: Stroke, height: Floats, turn: Floats, tracking: Tracking | None) -> Stroke:

@@ -13,7 +13,7 @@ import numpy as np
 from ..core.base.arrays import Floats
 from ..core.control.blister import Blister
 from ..core.control.cell_states import CellStates
-from ..core.control.hybrid import Hybrid
+from ..core.control.hybrid_parameters import Hybrid
 from ..core.control.virtual_master import VirtualMaster
 from ..core.engine.system import System
 from ..core.model.fingertip import Fingertip

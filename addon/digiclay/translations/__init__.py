@@ -78,7 +78,7 @@ def collect_strings() -> set[str]:
 def _property_strings(owner: type[bpy_struct]) -> Iterator[str]:
     """Yield labels and tooltips of the properties that a class or a mixin of it declares, and shows."""
     if issubclass(owner, bpy.types.Menu | bpy.types.Panel):
-        # Their annotations are of Blender's own.
+        # Annotations of these are Blender's own.
         return
     kinds = [kind for kind in owner.__mro__ if kind.__module__.startswith(EXTENSION)]
     declared = {name for kind in kinds for name in inspect.get_annotations(kind)}

@@ -8,7 +8,7 @@ from digiclay.core.base.errors import ParameterError
 from digiclay.core.base.modes import COLORS
 from digiclay.core.scene.scene_source import load
 from digiclay.core.session import snapshot
-from digiclay.device import parts, repair
+from digiclay.device import part_watch, parts
 from digiclay.live import beds, handlers, tick
 from digiclay.overlay import views
 from digiclay.recorded import takes
@@ -30,13 +30,13 @@ PLACES = {1: (-10.0, -10.0), 2: (10.0, 10.0), 3: (10.0, -10.0)}
 def watched():
     """Look after beds as in a window."""
     yield
-    repair.unregister()
+    part_watch.unregister()
 
 
 @pytest.fixture
 def pair(bed):
     """A bed with two fingertips above it."""
-    repair.watch()
+    part_watch.watch()
     select(bed)
     bpy.ops.digiclay.add_fingertip()
     select(bed)

@@ -187,10 +187,8 @@ class HandInGroups(HandControl):
         shape = len(memory.fingers), touched.force.size
         visible, parts = np.zeros(shape, np.bool_), np.ones(shape)
         if touched.discs is not None:
-            followed = np.array([follower.position is not None for follower in memory.fingers])[
-                :, None
-            ]
-            visible = self.arrange("touched", touched).inside & followed
+            followed = np.array([follower.position is not None for follower in memory.fingers])
+            visible = self.arrange("touched", touched).inside & followed[:, None]
             visible[:, pins] &= self.division.share_whole(owner) > 0.0
         parts[:, pins] = shares
         visible[:, pins] |= (owner != NOBODY) & (shares > 0.0)

@@ -202,7 +202,7 @@ def find_tops(
     np.minimum(depths, most, out=depths)
     depths -= under
     forces = sections.reduce(np.add, pulp.predict_force(depths, lost))
-    # Those of each finger, all of whose cells have the same.
+    # All cells of a finger have its top.
     tried = sections.reduce(np.maximum, tops)
     results = []
     for force, sums, heights in zip(wanted, forces.T, tried.T, strict=True):

@@ -89,7 +89,7 @@ def _find_start_in_windows(pid: int) -> float | None:
         owned, code = system.c_void_p(handle), system.c_ulong()
         times = [system.c_ulonglong() for _ in range(4)]
         if kernel.GetExitCodeProcess(owned, system.byref(code)) and code.value != 259:
-            # STILL_ACTIVE.
+            # Any other code than STILL_ACTIVE: the process has ended.
             return None
         if not kernel.GetProcessTimes(owned, *map(system.byref, times)):
             return 0.0
@@ -132,7 +132,7 @@ def hold_lock(path: Path, refusal: str, patience: float = 0.0) -> Iterator[None]
         yield
     finally:
         if os.name == "nt":
-            # Which cannot remove an open file; one that another process waits for remains.
+            # Windows cannot remove an open file; one that another process waits for remains.
             os.close(taken)
         with suppress(OSError):
             path.unlink()

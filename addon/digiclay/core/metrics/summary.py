@@ -1,9 +1,7 @@
 """Metrics of a session: pure functions on the arrays of a history, or on sums over its cells.
 
-Averages are over time, by the trapezium rule: a row stands for half of the intervals on
-either side of it, so histories with uneven rows are judged alike. *In contact* are the
-rows with a total force above zero; the fingertip cannot pull, and a force it no longer
-exerts is exactly zero.
+Averages are those of `signals`. *In contact* are the rows with a total force above zero; the
+fingertip cannot pull, and a force it no longer exerts is exactly zero.
 """
 
 import math
@@ -19,6 +17,16 @@ from ..base.modes import Mode
 from ..model.control_interface import SetPoint, find_set_point
 from ..model.layout import find_grid_shape
 from .metric_table import METRICS
+from .signals import (
+    compute_deviation,
+    compute_mean,
+    compute_rms,
+    compute_weights,
+    find_stretches,
+    measure_oscillation,
+    measure_overshoot,
+    measure_settling_time,
+)
 
 #: How far the fingertip must have gone on from a cell for it to count as left behind, m.
 AWAY = 12e-3
@@ -128,109 +136,6 @@ def measure_ridge_errors(
         if np.max(np.hypot(*(tip[after, :2] - place[cell]).T)) >= away:
             errors.append(float(np.asarray(final)[cell]) - float(tip[chosen[i], 2]))
     return np.array(errors)
-
-
-#: Window of the moving average that is taken off for an oscillation, s. What is left of a sine of f
-#: Hz is 1 - sinc(f WINDOW): less than a tenth below 1 Hz, where fingers move on purpose, and all of
-#: it at 4 Hz; a controller on its limit of stability oscillates at 4 to 10 Hz (digiclay paper).
-WINDOW = 0.25
-
-
-def compute_weights(time: ArrayLike) -> Floats:
-    """Return the time each row stands for, (t,), s: ``w_i = (t_{i+1} - t_{i-1}) / 2``, half at the ends."""
-    moment = np.asarray(time, dtype=np.float64)
-    if len(moment) < 2:  # nothing to average over
-        return np.ones(len(moment))
-    half = 0.5 * np.diff(moment)
-    return np.concatenate([half, [0.0]]) + np.concatenate([[0.0], half])
-
-
-def compute_mean(values: Floats, weight: Floats) -> float | None:
-    """Return the weighted mean of values (t,), or None when there is nothing to average."""
-    total = float(np.sum(weight))
-    return float(np.sum(weight * values)) / total if total > 0.0 else None
-
-
-def compute_rms(values: Floats, weight: Floats) -> float | None:
-    """Return the weighted root mean square of values (t,), or None without any rows."""
-    square = compute_mean(values**2, weight)
-    return None if square is None else math.sqrt(square)
-
-
-def compute_deviation(values: Floats, weight: Floats) -> float | None:
-    """Return the weighted standard deviation about the weighted mean, or None without any rows."""
-    middle = compute_mean(values, weight)
-    return None if middle is None else compute_rms(values - middle, weight)
-
-
-def measure_overshoot(values: ArrayLike, target: float) -> float | None:
-    """Return how far a signal goes beyond its target, as a share of its way there.
-
-    ``max_i (y_i - y_target) / (y_target - y_0)``, at least 0; None for a signal at its target from
-    the start.
-    """
-    signal = np.asarray(values, dtype=np.float64)
-    if not len(signal) or signal[0] == target:
-        return None
-    way = target - float(signal[0])
-    return max(0.0, float(np.max((signal - target) / way)))
-
-
-def measure_settling_time(
-    time: ArrayLike, values: ArrayLike, target: float, band: float
-) -> float | None:
-    """Return the time after which ``|y_i - y_target| <= band`` to the end, s; None when it never does."""
-    moment, signal = np.asarray(time, dtype=np.float64), np.asarray(values, dtype=np.float64)
-    outside = np.flatnonzero(~(np.abs(signal - target) <= band))
-    if not len(signal) or (outside.size and outside[-1] == len(signal) - 1):
-        return None
-    return float(moment[outside[-1] + 1] - moment[0]) if outside.size else 0.0
-
-
-def measure_amplitude(values: ArrayLike) -> float:
-    """Return half the distance from a signal's lowest to its highest value."""
-    return 0.5 * float(np.ptp(np.asarray(values, dtype=np.float64)))
-
-
-def measure_frequency(time: ArrayLike, values: ArrayLike) -> float | None:
-    """Return how often a signal rises through its mean, Hz; None when it does so less than three times."""
-    moment, signal = np.asarray(time, dtype=np.float64), np.asarray(values, dtype=np.float64)
-    above = signal > signal.mean() if len(signal) else np.empty(0, dtype=bool)
-    rises = np.flatnonzero(~above[:-1] & above[1:])
-    if rises.size < 3:
-        return None
-    return float((rises.size - 1) / (moment[rises[-1]] - moment[rises[0]]))
-
-
-def find_stretches(rows: Flags) -> list[slice]:
-    """Return the unbroken stretches of chosen rows, in order. `rows` bool (t,)."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], rows, [False]])))
-    return [
-        slice(int(first), int(after)) for first, after in zip(edges[::2], edges[1::2], strict=True)
-    ]
-
-
-def measure_oscillation(time: ArrayLike, values: ArrayLike, rows: Flags) -> float | None:
-    """Return the rms over time of a signal less its moving average.
-
-    ``sqrt(sum w_i (y_i - m_i)² / sum w_i)``, m_i the mean of y over the window, s, around row i. A
-    row counts when its whole window is within an unbroken stretch of the chosen rows; None when no
-    row does.
-    """
-    moment, signal = np.asarray(time, dtype=np.float64), np.asarray(values, dtype=np.float64)
-    off: list[Floats] = []
-    weight: list[Floats] = []
-    for stretch in find_stretches(rows):
-        t, y = moment[stretch], signal[stretch]
-        area = np.concatenate([[0.0], np.cumsum(0.5 * (y[1:] + y[:-1]) * np.diff(t))])
-        # Half a millionth of the window: an edge on the first row is within.
-        inner = (t - 0.5 * WINDOW >= t[0] - 5e-7 * WINDOW) & (
-            t + 0.5 * WINDOW <= t[-1] + 5e-7 * WINDOW
-        )
-        below, above = (np.interp(t[inner] + side * WINDOW, t, area) for side in (-0.5, 0.5))
-        off.append(y[inner] - (above - below) / WINDOW)
-        weight.append(compute_weights(t)[inner])
-    return compute_rms(np.concatenate(off), np.concatenate(weight)) if off else None
 
 
 #: Force from which on the smaller Weber fractions hold, N.

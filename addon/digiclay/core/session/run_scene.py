@@ -26,9 +26,9 @@ from ..metrics.metric_table import (
     describe_losses,
     describe_time,
 )
+from ..metrics.signals import compute_weights
 from ..metrics.summary import (
     compute_metrics,
-    compute_weights,
     find_contact_rows,
     find_losses,
     split_fingers,

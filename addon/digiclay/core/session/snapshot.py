@@ -129,7 +129,7 @@ def dump(system: System, state: State) -> bytes:
     thin = []
     for number, name in enumerate(ARRAYS):
         if name in THIN and system.fingers > 1:
-            # By their bits, as -0.0 is to be restored.
+            # Values are compared by their bits, as -0.0 is to be restored.
             filled = body[number].view("<i8").reshape(-1) != 0
             body[number] = body[number].reshape(-1)[filled]
             thin.append(body[number].size)

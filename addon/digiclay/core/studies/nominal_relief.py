@@ -16,7 +16,8 @@ import numpy as np
 from ..base.arrays import Array, Floats
 from ..base.modes import FORCE_FOLLOW
 from ..control.blister import Blister
-from ..metrics.summary import compute_cell_area, find_contact_rows, find_stretches, split_fingers
+from ..metrics.signals import find_stretches
+from ..metrics.summary import compute_cell_area, find_contact_rows, split_fingers
 from ..scene.schema import Scene
 
 #: One of this many rows of a history is evaluated.

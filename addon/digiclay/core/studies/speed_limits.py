@@ -151,7 +151,7 @@ def judge(done: Result, start: float, end: float, speed: float) -> Follows:
     behind = measure_lag(sums, part["fingertip"])
     wanted = find_set_point(done.scene.set_point, sums.following)
     deviates = compute_rfd(part["time"], total, wanted, np.ones(len(total), dtype=bool))
-    # Or lost before.
+    # A trial that begins without contact was lost before.
     losses = int(np.sum((ends > start) & (ends <= end + REST)) + (total[0] <= 0.0))
     lag = float(behind.max()) if len(behind) else math.inf
     rfd = math.inf if deviates is None else deviates

@@ -73,7 +73,7 @@ def hash_points(points: Sequence[Point]) -> str:
         text = NOTE.sub("", format_scene(point.scene)) if point.scene else point.error
         scenes.update(text.encode())
         if point.scene is not None:
-            # Empty for a built-in one.
+            # A built-in method's digest is empty.
             scenes.update(find_method(point.scene.method).digest.encode())
     return scenes.hexdigest()
 

@@ -294,7 +294,7 @@ def _by_label(label: Faces) -> dict[int, Indices]:
     """Return the indices of each label from 0 on, ascending."""
     order = np.argsort(label, kind="stable")
     names, starts = np.unique(label[order], return_index=True)
-    # Without labels, one empty group.
+    # Without labels there is one empty group.
     groups = zip(names.tolist(), np.split(order, starts[1:]), strict=False)
     return {name: group for name, group in groups if name >= 0}
 
