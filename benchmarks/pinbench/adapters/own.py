@@ -28,13 +28,11 @@ def prepare(problem: Any, method: str, setting: float) -> Any:
 
     def solve() -> Any:
         system, states = run(scene, commands)
-        rows = []
+        read, rows = (0, system.rows.force), []
         try:
             for period, state in enumerate(states, 1):
                 if period in problem.judged:
-                    rows.append(
-                        (state.row(0)[problem.pins], state.row(system.rows.force)[problem.pins])
-                    )
+                    rows.append([state.row(row)[problem.pins] for row in read])
         except DivergenceError:
             return np.full((len(problem.judged), 2, problem.pins.size), np.inf)
         return rows
