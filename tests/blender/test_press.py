@@ -165,6 +165,7 @@ def test_the_text_beside_the_cursor_names_brush_and_height_or_depth_with_its_uni
     assert [one for one in Brush if brush.amount_name(one) == "height"] == [
         Brush.RAISE,
         Brush.STAMP,
+        Brush.CREST,
     ]
 
 
@@ -378,10 +379,34 @@ def test_strokes_are_formed_and_kept_by_the_bed(small, tmp_path):
     assert bridge.pose(fingertip_of(small))[2] > 40e-3
 
 
+@pytest.mark.parametrize("kind, deepest", [("crease", (2.8, 3.1)), ("flatten", (-0.1, 0.1))])
+def test_creases_are_cut_and_flattened_without_a_touch(small, tmp_path, kind, deepest):
+    file, crease = tmp_path / "press.toml", f'{PRESS}brush = "crease"\n'
+    more = f'{PRESS}brush = "{kind}"\nfalloff = "constant"\n' if kind == "flatten" else ""
+    file.write_text(f"{crease}{more}", encoding="utf-8")
+    assert bpy.ops.digiclay.play_strokes(filepath=str(file)) == {"FINISHED"}
+    low, high = deepest
+    row = depths(small)[4, 4:7]
+    assert low < row.max() - (row.min() if kind == "flatten" else 0.0) < high
+
+
+def test_a_falloff_of_the_tool_is_that_of_its_brush_and_smooth_has_one(settings):
+    kinds = Brush.RAISE, Brush.SMOOTH, Brush.ERASE
+    assert [brush.find_falloff(settings, kind).name for kind in kinds] == [
+        "DEVICE",
+        "SMOOTH",
+        "DEVICE",
+    ]
+    settings.falloff = "SPHERE"
+    assert {brush.find_falloff(settings, kind).name for kind in kinds} == {"SPHERE"}
+
+
 @pytest.mark.parametrize(
     "text, said",
     [
         ("[[stroke", "line 1"),
+        (f'{PRESS}falloff = "bent"\n', "falloff must be one of"),
+        (f'{PRESS}falloff = "root"\n', r"Stroke 1 \(lower\) needs a method with a blister"),
         (f"{PRESS}wide = 3", "known key"),
         (f'{PRESS}{PRESS}brush = "raise"\n', r"Stroke 2 \(raise\) needs a method with a blister"),
     ],

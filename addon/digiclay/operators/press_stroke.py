@@ -1,5 +1,6 @@
 """Strokes of the Press tool, queued for the session: drawn by the mouse, lines and rings."""
 
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -16,10 +17,12 @@ from ..press.pointer import begin_button, read_event
 from ..sessions import running, sculpting
 from ..sessions.sculpting import change_stroke, find_stroke, last_place, queue_stroke
 from ..settings.declared import choice, flag, integer, number, text, title
+from ..strokes.falloff import Falloff
 from ..strokes.stroke import (
     DEEPEST,
     FEWEST,
     MOST,
+    PLACED,
     STAMPS,
     Brush,
     Place,
@@ -31,6 +34,7 @@ from ..strokes.stroke import (
     lay_ring,
     lay_square,
     let_go,
+    needs_blister,
     pull,
     start,
 )
@@ -109,6 +113,12 @@ class PressSettings:
     axis: number("Axis", "Turn of the mirror's axes", default=0.0, subtype="ANGLE", step=1000)
     stamp: choice("Stamp", "Shape that is stamped", items=brush.STAMP_ITEMS, default="heart")
     stamp_file: text("File", "Mesh, picture or .npy file that is stamped", subtype="FILE_PATH")
+    falloff: choice(
+        "Falloff",
+        "Flanks of Raise, Lower and Level, and effect of other brushes in the ring",
+        items=brush.FALLOFF_ITEMS,
+        default="DEVICE",
+    )
     accumulate: flag(
         "Accumulate",
         "Where a stroke returns to what it has formed, it starts from the new surface",
@@ -161,7 +171,8 @@ class Press(PressSettings, Modal, Operator):
         target = find_pressed(self, context, brush.find_press(context, event))
         if target is None:
             return NOT_PRESSED
-        session = open_session(self, context, target.bed, self.kind)
+        falloff = brush.find_falloff(self, self.kind)
+        session = open_session(self, context, target.bed, self.kind, falloff)
         if session is None:
             return {"CANCELLED"}
         # The hand draws on the surface it has seen when it began, not on pins that give way under
@@ -174,9 +185,8 @@ class Press(PressSettings, Modal, Operator):
         self.lagged = place = float(target.point[0]), float(target.point[1])
         depth, share = self._amount()
         images = brush.find_images(self)
-        stroke = start(
-            0, *place, depth, images, self.kind, share, self.lean, accumulate=self.accumulate
-        )
+        stroke = start(0, *place, depth, images, self.kind, share, self.lean)
+        stroke = replace(stroke, accumulate=self.accumulate, falloff=falloff)
         session, self.number = queue_stroke(session, stroke)
         running.put(session)
         self._show(context)
@@ -206,7 +216,7 @@ class Press(PressSettings, Modal, Operator):
         if event.type in MOVES:
             self._move(context, bed, event)
         elif event.type in WHEELS and event.ctrl and self.kind.has_amount:
-            self._deepen(WHEELS[event.type] if self.kind is Brush.RAISE else -WHEELS[event.type])
+            self._deepen(WHEELS[event.type] if self.kind.rises else -WHEELS[event.type])
         elif event.type == "LEFTMOUSE":
             self._move(context, bed, event)
             self._change(let_go)
@@ -305,7 +315,11 @@ def find_pressed(operator: Operator, context: Context, xy: Place) -> aim.Target 
 
 
 def open_session(
-    operator: Operator, context: Context, bed: Object, kind: Brush
+    operator: Operator,
+    context: Context,
+    bed: Object,
+    kind: Brush,
+    falloff: Falloff = Falloff.DEVICE,
 ) -> running.Running | None:
     """Return the session of a bed for a stroke, started if there is none; or report why it cannot be."""
     try:
@@ -324,12 +338,12 @@ def open_session(
     except (DigiclayError, RuntimeError) as error:
         operator.report({"ERROR"}, str(error).removeprefix("Error: ").strip())
         return None
-    if kind.needs_blister and find_tracking(session.scene, session.system) is None:
+    if needs_blister(kind, falloff) and find_tracking(session.scene, session.system) is None:
         names = brush.LABELS[kind], title(session.scene.method)
         inform(operator, NO_BLISTER, *map(localize, names), level="ERROR")
         return None
     if (
-        kind in (Brush.SMOOTH, *STAMPS)
+        kind in (Brush.SMOOTH, *PLACED)
         and session.scene.control
         and METHODS[session.scene.method].recovers
     ):
@@ -466,16 +480,17 @@ def _lay_stroke(settings: OperatorProperties, path: Floats | list[Place], kind: 
     depth = 1e-3 * share * getattr(settings, brush.amount_name(kind))
     (x, y), images, stamp = path[0], brush.find_images(settings), brush.find_stamp(settings, kind)
     laid = start(0, x, y, depth, images, kind, share, accumulate=settings.accumulate, stamp=stamp)
-    return lay_path(laid, path)
+    return lay_path(replace(laid, falloff=brush.find_falloff(settings, kind)), path)
 
 
 def _queue_path(
     operator: Operator, context: Context, bed: Object, path: Floats | list[Place], kind: Brush
 ) -> Result:
     """Queue a path for the fingertip, as the tool's settings have it."""
-    session = open_session(operator, context, bed, kind)
+    stroke = _lay_stroke(brush.tool_settings(context), path, kind)
+    session = open_session(operator, context, bed, kind, stroke.falloff)
     if session is None:
         return {"CANCELLED"}
-    session, _ = queue_stroke(session, _lay_stroke(brush.tool_settings(context), path, kind))
+    session, _ = queue_stroke(session, stroke)
     beds.put(session)
     return {"FINISHED"}

@@ -54,6 +54,7 @@ def stroke_options(column: UILayout, settings: OperatorProperties) -> None:
     # From a popover an operator would be called in the header.
     column.operator_context = "INVOKE_REGION_WIN"
     column.operator("digiclay.press_center", icon="PIVOT_CURSOR")
+    column.prop(settings, "falloff")
     column.prop(settings, "accumulate")
 
 

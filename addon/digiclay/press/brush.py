@@ -13,6 +13,7 @@ from ..core.shapes.heightmap import HeightMap
 from ..live import beds
 from ..roles import bed_of, is_bed
 from ..settings import devices
+from ..strokes.falloff import Falloff
 from ..strokes.stamps import load_stamp
 from ..strokes.stroke import LOCKS, STAMPS, Brush, Image, make_images
 from ..ui_text import localize
@@ -69,6 +70,9 @@ BRUSH_WORDS = {
     Brush.RAISE: "Press lightly, lift the blister by the given height, and draw it along: a ridge. "
     "With Ctrl: Lower",
     Brush.LEVEL: "Bring hills and hollows to the height of the surface under the first touch",
+    Brush.FLATTEN: "Bring the pins in the ring to the plane that fits them best, without a touch; "
+    "none moves farther than the depth",
+    Brush.CREASE: "Cut a sharp crease of the given depth, without a touch. With Ctrl: a sharp crest",
     Brush.SMOOTH: "Drive the pins in the ring to smoothed heights, without a touch. "
     "Shift and drag: with any brush",
     Brush.ERASE: "Drive the pins in the ring back to rest, without a touch",
@@ -83,6 +87,18 @@ SYMMETRY_ITEMS = (
     ("Y", "Y", "Form the stroke and its mirror image across the axis along the bed's x"),
     ("XY", "X and Y", "Form the stroke and its three mirror images"),
     ("RADIAL", "Radial", "Form the stroke and its images rotated about the center"),
+)
+FALLOFF_WORDS = {
+    Falloff.DEVICE: "Profile of the blister; of brushes that press nothing, their own falloff",
+    Falloff.SMOOTH: "Rounded at both ends",
+    Falloff.SPHERE: "Rounded, steep at the rim",
+    Falloff.ROOT: "Broad, steep at the rim",
+    Falloff.SHARP: "Pointed, flat at the rim",
+    Falloff.LINEAR: "Straight",
+    Falloff.CONSTANT: "Full up to the rim",
+}
+FALLOFF_ITEMS = tuple(
+    (kind.value, kind.value.title(), words) for kind, words in FALLOFF_WORDS.items()
 )
 #: Settings of a placed symmetry, and the shortest drag that turns its axis, m.
 PLACED, SHORT = ("symmetry", "center_x", "center_y", "axis"), 1e-3
@@ -163,6 +179,13 @@ def find_press(context: Context, event: Event) -> tuple[int, int]:
 def find_path(settings: OperatorProperties, brush: Brush) -> str:
     """Return the path of a stroke: that of the settings, or STAMP."""
     return "STAMP" if brush in STAMPS else str(settings.path)
+
+
+def find_falloff(settings: OperatorProperties, brush: Brush) -> Falloff:
+    """Return the falloff of a brush, by the settings of the tool; Smooth has one in any case."""
+    falloff = Falloff(settings.falloff)
+    own = (brush, falloff) == (Brush.SMOOTH, Falloff.DEVICE)
+    return Falloff.SMOOTH if own else falloff
 
 
 def find_stamp(settings: OperatorProperties, brush: Brush) -> HeightMap | None:

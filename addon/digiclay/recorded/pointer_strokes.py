@@ -21,6 +21,7 @@ from ..device.instant import find_ellipsoid
 from ..sessions.running import Running
 from ..sessions.sculpting import change_scene, find_stroke, follow_finger, queue_stroke
 from ..settings.devices import BEDS, change_finger
+from ..strokes.falloff import Falloff
 from ..strokes.stamps import load_stamp
 from ..strokes.stroke import (
     DEEPEST,
@@ -35,6 +36,7 @@ from ..strokes.stroke import (
     lay_path,
     lay_ring,
     make_images,
+    needs_blister,
     pull,
     start,
 )
@@ -84,6 +86,12 @@ class PointerStroke(Parameters):
     accumulate: bool = quantity(
         False, "whether a path that comes back counts from what it has left there"
     )
+    falloff: str = quantity(
+        "device",
+        "flanks of Raise, Lower and Level, and effect of other brushes in the ring; device: those of "
+        "blister and brush, Smooth and Erase as the valves sweep them",
+        choices=tuple(falloff.value.lower() for falloff in Falloff),
+    )
     stabilizer: float = quantity(
         0.0, "lag behind the pointer", unit="m", at_least=0.0, at_most=50e-3
     )
@@ -119,6 +127,11 @@ class PointerStroke(Parameters):
         """Brush that the stroke is formed with."""
         brush = Brush(self.brush.upper())
         return brush.inverse if self.ctrl else brush
+
+    @property
+    def shape(self) -> Falloff:
+        """Falloff that the stroke is formed with."""
+        return Falloff(self.falloff.upper())
 
     @property
     def amount(self) -> float:
@@ -190,7 +203,8 @@ def play_strokes(running: Running, strokes: tuple[PointerStroke, ...]) -> Iterat
     usual = running.scene
     for number, stroke in enumerate(strokes, 1):
         running = _take_finger(running, usual, stroke.size_finger(find_ellipsoid(usual)))
-        if stroke.kind.needs_blister and find_tracking(running.scene, running.system) is None:
+        needed = needs_blister(stroke.kind, stroke.shape)
+        if needed and find_tracking(running.scene, running.system) is None:
             raise StateError(
                 f"Stroke {number} ({stroke.kind.value.lower()}) needs a method with a blister."
             )
@@ -217,7 +231,7 @@ def _play(running: Running, stroke: PointerStroke, number: int) -> Iterator[Runn
     path = LAYS[stroke.path](places[0], places[-1]) if stroke.path in LAYS else lagged
     stamp = load_stamp(stroke.stamp) if stroke.kind in STAMPS else None
     begun = start(0, *places[0], stroke.amount, stroke.images, stroke.kind, stroke.strength)
-    begun = replace(begun, accumulate=stroke.accumulate, stamp=stamp)
+    begun = replace(begun, accumulate=stroke.accumulate, stamp=stamp, falloff=stroke.shape)
     running, queued = queue_stroke(running, lay_path(begun, path))
     first = running.state.period
     while find_stroke(running, queued) is not None:

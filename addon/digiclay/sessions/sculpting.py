@@ -531,7 +531,8 @@ def find_device(running: Running) -> Device:
     scene, system = running.scene, running.system
     locked = running.state.mode() == Mode.LOCKED
     parts = system.grid, find_ellipsoid(scene), find_blister(scene), system.cell.actuator.stroke
-    return Device(*parts, locked if locked.any() else None)
+    rest = system.cell.actuator.rest_height
+    return Device(*parts, locked if locked.any() else None, rest)
 
 
 def _advance(running: Running, stroke: Stroke, count: int) -> tuple[Stroke, Floats, Orders | None]:
@@ -545,7 +546,7 @@ def _advance(running: Running, stroke: Stroke, count: int) -> tuple[Stroke, Floa
     if stroke.brush in WHOLE:
         return order_all(stroke, pose)
     arrived = stroke.phase == FINISHING and live_session.has_arrived(state)
-    if stroke.brush in SWEEPS:
+    if stroke.brush in SWEEPS and not stroke.placed:
         return sweep(stroke, device, SWEEPS[stroke.brush], pose, count, period, arrived=arrived)
     if stroke.phase == FINISHING:
         return finish(stroke, device, state.row(0), pose, count, period, arrived=arrived)

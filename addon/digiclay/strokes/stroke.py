@@ -16,6 +16,7 @@ import numpy as np
 
 from ..core.base.arrays import Floats
 from ..core.shapes.heightmap import HeightMap
+from .falloff import Falloff
 from .tracking import Tracking
 
 Place = tuple[float, float]
@@ -103,6 +104,9 @@ class Brush(Enum):
     IMPRINT = "IMPRINT"
     INVERT_LOCKS = "INVERT_LOCKS"
     CLEAR_LOCKS = "CLEAR_LOCKS"
+    CREASE = "CREASE"
+    CREST = "CREST"
+    FLATTEN = "FLATTEN"
 
     @property
     def inverse(self) -> Brush:
@@ -112,25 +116,37 @@ class Brush(Enum):
     @property
     def has_amount(self) -> bool:
         """Whether it has a depth or height, not a strength alone."""
-        return self in (Brush.LOWER, Brush.RAISE, *STAMPS)
+        return self in (Brush.LOWER, Brush.RAISE, *PLACED)
 
     @property
     def rises(self) -> bool:
         """Whether that is a height, not a depth."""
-        return self in (Brush.RAISE, Brush.STAMP)
-
-    @property
-    def needs_blister(self) -> bool:
-        """Whether the blister of the device has to follow the fingertip."""
-        return self in (Brush.RAISE, Brush.LEVEL)
+        return self in (Brush.RAISE, Brush.STAMP, Brush.CREST)
 
 
 #: Brushes without a strength.
 LOCKS = (Brush.LOCK, Brush.UNLOCK, Brush.INVERT_LOCKS, Brush.CLEAR_LOCKS)
 #: Brushes that put a shape onto the surface, up or down.
 STAMPS = (Brush.STAMP, Brush.IMPRINT)
-INVERSES = {Brush.LOWER: Brush.RAISE, Brush.LOCK: Brush.UNLOCK, Brush.STAMP: Brush.IMPRINT}
+#: Brushes that press nothing: the valves bring the pins to their nominal surface.
+PLACED = (*STAMPS, Brush.CREASE, Brush.CREST, Brush.FLATTEN)
+#: Brushes that can be swept along the path by the valves, as they are without a falloff, or placed.
+SWEPT = (Brush.SMOOTH, Brush.ERASE)
+#: Brushes that work in the ring.
+RINGED = (*SWEPT, Brush.LOCK, Brush.UNLOCK, *PLACED[2:])
+INVERSES = {
+    Brush.LOWER: Brush.RAISE,
+    Brush.LOCK: Brush.UNLOCK,
+    Brush.STAMP: Brush.IMPRINT,
+    Brush.CREASE: Brush.CREST,
+}
 INVERSES |= {other: brush for brush, other in INVERSES.items()}
+
+
+def needs_blister(brush: Brush, falloff: Falloff = Falloff.DEVICE) -> bool:
+    """Return whether the blister of the device has to follow the fingertip."""
+    shaped = brush is Brush.LOWER and falloff is not Falloff.DEVICE
+    return shaped or brush in (Brush.RAISE, Brush.LEVEL)
 
 
 @dataclass(frozen=True)
@@ -163,6 +179,7 @@ class Stroke:
     accumulate: bool = False
     #: What is stamped, with values from 0 to 1.
     stamp: HeightMap | None = None
+    falloff: Falloff = Falloff.DEVICE
     #: Whether the hand still draws.
     held: bool = True
     #: The stroke along each image alone, while fingertips go along several at once.
@@ -228,6 +245,12 @@ class Stroke:
                 left or {self.image: (self.reached, False), **later}
             ).items()
         )
+
+    @property
+    def placed(self) -> bool:
+        """Whether the valves alone bring the pins to its nominal surface."""
+        shaped = self.falloff is not Falloff.DEVICE
+        return self.brush in PLACED or (self.brush in SWEPT and shaped)
 
     @property
     def left(self) -> bool:

@@ -150,6 +150,7 @@ def estimate_time(strokes: Sequence[Stroke]) -> float:
         lengths = [
             float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum()) for path in stroke.ahead
         ]
+        lengths = [0.0] if stroke.placed else lengths
         times = [BESIDE + length / speed for length in lengths]
         time += sum(times) if stroke.brush in SWEEPS else max(times)
     return time
