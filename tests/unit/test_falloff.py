@@ -240,6 +240,7 @@ def test_images_locks_and_a_path_that_is_drawn_on_count(brush):
     mirrored = lay(path, brush, images=make_images("X"))
     found = form(mirrored, hill).reshape(36, 36)
     assert_near(found, np.flip(found, 1), 1e-12)
+    assert (found.ravel() - hill).min() < -1e-4
     locked = np.zeros(1296, np.bool_)
     locked[lay_bed().disc(9e-3, 0.0, 2e-3)] = True
     held = form(mirrored, hill, make_device(locked=locked))

@@ -36,8 +36,8 @@ def test_shift_and_a_drag_smooth_a_spike_in_one_stroke(seen):
     assert before[MIDDLE] == pytest.approx(1e3 * SPIKE, abs=1e-3)
     assert smoothed[MIDDLE] < 0.4e3 * SPIKE
     assert seen["smoothed"]["drawn"] == seen["before"]["drawn"] + 1
-    # What one pin gives the others get, and those outside the ring stay.
-    assert smoothed.sum() == pytest.approx(before.sum(), abs=625 * 0.01)
+    # Each pin comes between those about it, and those outside the ring stay.
+    assert -0.01 < smoothed.min() < smoothed.max() < before.max() + 0.01
     outside = np.abs(np.arange(25) - 12) > 3
     np.testing.assert_array_equal(smoothed[outside], before[outside])
     # It begins where the mouse went down, by 0.3 mm a pixel: a drag is told from a click after 3 of
