@@ -1,6 +1,5 @@
 """Strokes of the Press tool, queued for the session: drawn by the mouse, lines and rings."""
 
-from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -121,8 +120,22 @@ class PressSettings:
     )
     accumulate: flag(
         "Accumulate",
-        "Where a stroke returns to what it has formed, it starts from the new surface",
+        "Build on the surface as it is: where strokes meet, or one returns, heights and depths add. "
+        "Else Raise and Lower count from the base",
         default=False,
+    )
+    combine: choice(
+        "Combine",
+        "What Level and Stamp leave where something is formed already",
+        items=brush.COMBINE_ITEMS,
+        default="USUAL",
+    )
+    use_limit: flag("Limit", "Form nothing below and above two heights", default=False)
+    limit_low: millimeters(
+        "Lowest", -10e-3, "Height above rest below which nothing is formed", **PLACE
+    )
+    limit_high: millimeters(
+        "Highest", 10e-3, "Height above rest above which nothing is formed", **PLACE
     )
     path: choice("Stroke", "Path of a stroke", items=brush.PATH_ITEMS, default="FREE")
     stabilizer: millimeters(
@@ -185,8 +198,8 @@ class Press(PressSettings, Modal, Operator):
         self.lagged = place = float(target.point[0]), float(target.point[1])
         depth, share = self._amount()
         images = brush.find_images(self)
-        stroke = start(0, *place, depth, images, self.kind, share, self.lean)
-        stroke = replace(stroke, accumulate=self.accumulate, falloff=falloff)
+        options = brush.find_options(self, self.kind)
+        stroke = start(0, *place, depth, images, self.kind, share, self.lean, **options)
         session, self.number = queue_stroke(session, stroke)
         running.put(session)
         self._show(context)
@@ -479,8 +492,8 @@ def _lay_stroke(settings: OperatorProperties, path: Floats | list[Place], kind: 
     share = float(settings.strength)
     depth = 1e-3 * share * getattr(settings, brush.amount_name(kind))
     (x, y), images, stamp = path[0], brush.find_images(settings), brush.find_stamp(settings, kind)
-    laid = start(0, x, y, depth, images, kind, share, accumulate=settings.accumulate, stamp=stamp)
-    return lay_path(replace(laid, falloff=brush.find_falloff(settings, kind)), path)
+    options = brush.find_options(settings, kind)
+    return lay_path(start(0, x, y, depth, images, kind, share, stamp=stamp, **options), path)
 
 
 def _queue_path(

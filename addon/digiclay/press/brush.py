@@ -4,6 +4,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import astuple, dataclass
 from pathlib import Path
+from typing import Any
 
 from ..compat import Context, Event, Object, OperatorProperties, bpy
 from ..core.files.tables import Record
@@ -15,7 +16,7 @@ from ..roles import bed_of, is_bed
 from ..settings import devices
 from ..strokes.falloff import Falloff
 from ..strokes.stamps import load_stamp
-from ..strokes.stroke import LOCKS, STAMPS, Brush, Image, make_images
+from ..strokes.stroke import COMBINATIONS, LOCKS, STAMPS, Brush, Combine, Image, make_images
 from ..ui_text import localize
 
 #: Semi-axes that differ by less are the same, m.
@@ -141,6 +142,31 @@ PATH_ITEMS = (
     ("RING", "Ring", "Drag from the center of the ring to its rim; it is formed on release"),
 )
 
+COMBINE_ITEMS = (
+    ("USUAL", "As Usual", "Level replaces the surface, Stamp adds to it"),
+    ("HIGHEST", "Highest", "The higher one of the surface and of what is formed on the base"),
+    ("LOWEST", "Lowest", "The lower one of the surface and of what is formed on the base"),
+    ("ADD", "Add", "What is formed on the base is put onto the surface"),
+    ("REPLACE", "Replace", "What is formed on the base replaces the surface"),
+)
+#: How Raise and Lower combine unless they accumulate.
+EXTREMES = {Brush.RAISE: Combine.HIGHEST, Brush.LOWER: Combine.LOWEST}
+
+
+def find_options(settings: OperatorProperties, brush: Brush) -> dict[str, Any]:
+    """Return what the settings of the tool say of a stroke beside its path: fields of `Stroke`."""
+    combine = Combine.USUAL
+    if brush in EXTREMES:
+        combine = combine if settings.accumulate else EXTREMES[brush]
+    elif brush in COMBINATIONS:
+        combine = Combine(settings.combine)
+    falloff = find_falloff(settings, brush)
+    options = {"accumulate": settings.accumulate, "falloff": falloff, "combine": combine}
+    if settings.use_limit:
+        low, high = sorted((1e-3 * settings.limit_low, 1e-3 * settings.limit_high))
+        options["limits"] = low, high
+    return options
+
 
 def tool_settings(context: Context) -> OperatorProperties | None:
     """Return the settings of the Press tool, or None while another tool is in use."""
@@ -211,7 +237,7 @@ def describe_brush(finger: Fingertip, brush: Brush, depth: float, strength: floa
 
 def describe_stroke(brush: Brush, depth: float, strength: float = 1.0) -> str:
     """Return a brush, and its depth or height (m) times strength, in mm."""
-    if brush in LOCKS:
+    if brush in (*LOCKS, Brush.SET_BASE):
         return localize(LABELS[brush])
     if not brush.has_amount:
         return f"{localize(LABELS[brush])} {100.0 * strength:.0f} %"

@@ -314,6 +314,7 @@ class PressTool(bpy.types.WorkSpaceTool):
         ("digiclay.press_size", {"type": "F", "value": "PRESS"}, None),
         ("digiclay.press_depth", {"type": "F", "value": "PRESS", "shift": True}, None),
         ("digiclay.press_strength", {"type": "F", "value": "PRESS", "ctrl": True}, None),
+        ("digiclay.press_base", {"type": "Y", "value": "PRESS"}, None),
         _scale_key("LEFT_BRACKET", 1.0 / 1.1),
         _scale_key("RIGHT_BRACKET", 1.1),
     )

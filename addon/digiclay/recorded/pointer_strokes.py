@@ -24,6 +24,7 @@ from ..settings.devices import BEDS, change_finger
 from ..strokes.falloff import Falloff
 from ..strokes.stamps import load_stamp
 from ..strokes.stroke import (
+    COMBINATIONS,
     DEEPEST,
     FEWEST,
     MOST,
@@ -31,6 +32,7 @@ from ..strokes.stroke import (
     STAMPS,
     SYMMETRIES,
     Brush,
+    Combine,
     Image,
     lay_line,
     lay_path,
@@ -83,6 +85,17 @@ class PointerStroke(Parameters):
         0.0, "turn of the mirrors' axes, in degrees", at_least=-360.0, at_most=360.0
     )
     stamp: str = quantity("heart", "what is stamped: a sample shape's name, or a file")
+    combine: str = quantity(
+        Combine.USUAL.value.lower(),
+        "what the stroke leaves where something is formed",
+        choices=tuple(combine.value.lower() for combine in Combine),
+    )
+    limit_low: float = quantity(
+        -1.0, "lowest that it forms above rest", unit="m", at_least=-1.0, at_most=1.0
+    )
+    limit_high: float = quantity(
+        1.0, "highest that it forms above rest", unit="m", at_least=-1.0, at_most=1.0
+    )
     accumulate: bool = quantity(
         False, "whether a path that comes back counts from what it has left there"
     )
@@ -112,6 +125,14 @@ class PointerStroke(Parameters):
         if wrong:
             rule = "must be lists of time, x and y, finite numbers"
             raise ParameterError("PointerStroke", "moves", rule, str(list(wrong[0])))
+        combinations = COMBINATIONS.get(self.kind, (Combine.USUAL,))
+        if Combine(self.combine.upper()) not in combinations:
+            names = ", ".join(combine.value.lower() for combine in combinations)
+            rule = f"must be one of {names} with {self.kind.value.lower()}"
+            raise ParameterError("PointerStroke", "combine", rule, repr(self.combine))
+        if self.limit_low > self.limit_high:
+            rule = f"must be at most limit_high, {self.limit_high:g} m"
+            raise ParameterError("PointerStroke", "limit_low", rule, f"{self.limit_low:g} m")
         times = [move[0] for move in self.moves]
         late = (
             [times[0]]
@@ -231,7 +252,14 @@ def _play(running: Running, stroke: PointerStroke, number: int) -> Iterator[Runn
     path = LAYS[stroke.path](places[0], places[-1]) if stroke.path in LAYS else lagged
     stamp = load_stamp(stroke.stamp) if stroke.kind in STAMPS else None
     begun = start(0, *places[0], stroke.amount, stroke.images, stroke.kind, stroke.strength)
-    begun = replace(begun, accumulate=stroke.accumulate, stamp=stamp, falloff=stroke.shape)
+    begun = replace(
+        begun,
+        accumulate=stroke.accumulate,
+        stamp=stamp,
+        falloff=stroke.shape,
+        combine=Combine(stroke.combine.upper()),
+        limits=(stroke.limit_low, stroke.limit_high),
+    )
     running, queued = queue_stroke(running, lay_path(begun, path))
     first = running.state.period
     while find_stroke(running, queued) is not None:

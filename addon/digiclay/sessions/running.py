@@ -43,6 +43,8 @@ class Running(LiveSession):
     snapshot: bytes
     #: Counts ticks and never decreases, not even by undo.
     tick: int
+    #: (n,), heights that strokes count from, m.
+    base: Floats
     clock: Clock
     trace: RecentTrace
     #: By the user.
@@ -79,7 +81,9 @@ class Running(LiveSession):
     @property
     def standing(self) -> Moment:
         """What the bed stores beside drawn strokes: all but the stroke that is being formed."""
-        return self.stroke_start or Moment(self.state.period, self.snapshot, self.poses, self.tick)
+        return self.stroke_start or Moment(
+            self.state.period, self.snapshot, self.poses, self.tick, self.base
+        )
 
     @property
     def drawn(self) -> tuple[Stroke, ...]:

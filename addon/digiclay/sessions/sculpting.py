@@ -8,32 +8,29 @@ from typing import Any
 import numpy as np
 
 from ..core.base.arrays import Floats
-from ..core.base.errors import StateError
 from ..core.base.modes import Mode
 from ..core.control.orders import Orders
-from ..core.engine.simulation import begin
 from ..core.engine.state import State
-from ..core.engine.system import System
 from ..core.model.fingers import MOST_FINGERS
 from ..core.scene.assembly import assemble
 from ..core.scene.schema import Scene
 from ..core.session import accuracy, live_session, recent_trace, snapshot
+from ..core.session.live_session import Moment
 from ..device.instant import CLEARANCE, find_ellipsoid
 from ..strokes import drawn
 from ..strokes.motion import begin as begin_stroke
 from ..strokes.motion import follow, follow_images
 from ..strokes.nominal import Device
 from ..strokes.pose import turn_image
-from ..strokes.stroke import FINISHING, Place, Stroke
+from ..strokes.stroke import FINISHING, Brush, Place, Stroke
 from ..strokes.sweep import SWEEPS, WHOLE, finish, order_all, sweep
 from ..strokes.tracking import find_blister, find_tracking
 from ..ui_text import localize
+from .restored_states import CHANGED, Numbers, change_fingers, fit_base, load_state
 from .running import Gesture, Running, match_poses, name_fingers
 
 #: How many gestures can be taken back, and the most memory their states may take, bytes.
 GESTURES, GESTURE_BYTES = 20, 200_000_000
-#: Message when the state of other parts is taken up.
-CHANGED = "Only the heights were kept: the bed's parts or its method have changed"
 #: A fingertip that moves on after resting so long makes another gesture, s.
 REST = 0.5
 #: Control periods of a queue that are simulated at a time, and between two estimates of the error:
@@ -41,8 +38,6 @@ REST = 0.5
 CHUNK, PAUSE = 16, 10 * accuracy.PAUSE
 #: Time between two ticks, s, unless told.
 INTERVAL = 1.0 / 30.0
-#: Numbers of fingertips.
-Numbers = tuple[int, ...]
 #: A finger that is read this near to where it was has not moved, m and parts of a quaternion: one
 #: that is put to a pose comes back from Blender's 32 bits, on a bed 100 units from the origin, by
 #: 1e-6 m beside it.
@@ -58,21 +53,21 @@ def begin_session(
     tick: int = 0,
     numbers: Numbers | None = None,
     was: Numbers | None = None,
+    base: Floats | None = None,
 ) -> tuple[Running, str]:
     """Begin a session from a snapshot, at rest without one; return it, and what of the snapshot was lost.
 
     `numbers`: of the fingertips, behind those of the scene others like its first one; `was`: of
-    those that the snapshot has.
+    those that the snapshot has. `base`: (n,) heights that strokes count from, m; None: the surface.
     """
     fingers = len(scene.fingers)
     numbers = numbers or tuple(range(1, fingers + 1))
     whole = scene.with_fingers(len(numbers))
     system = assemble(whole)
-    state, lost = _load_state(
-        system, _change_fingers(scene, system, stored, was or numbers, numbers)
-    )
+    state, lost = load_state(system, change_fingers(scene, system, stored, was or numbers, numbers))
     poses = live_session.clamp_pose(pose.reshape(-1, 7), system.cell.actuator.stroke)
     now = snapshot.dump(system, state)
+    base = fit_base(None if lost not in ("", localize(CHANGED)) else base, state)
     running = Running(
         scene=scene,
         system=system,
@@ -82,42 +77,14 @@ def begin_session(
         name=name,
         snapshot=now,
         tick=tick + 1,
+        base=base,
         numbers=numbers[:fingers],
         clock=live_session.Clock(),
         monitor=accuracy.start(whole),
         trace=recent_trace.start(system.period, fingers=fingers),
-        next_gesture=live_session.Moment(state.period, now, poses, tick),
+        next_gesture=Moment(state.period, now, poses, tick, base),
     )
     return running, lost
-
-
-def _load_state(system: System, stored: bytes | None) -> tuple[State, str]:
-    """Return the state to continue from, and what could not be taken up."""
-    if stored is None:
-        return begin(system), ""
-    # The state of other parts has heights at least; what has none is of no use.
-    refused = ""
-    for read, words in ((snapshot.load, ""), (snapshot.transfer_heights, CHANGED)):
-        try:
-            return read(system, stored), words and localize(words)
-        except StateError as error:
-            refused = localize("The bed begins at rest. {}", error)
-    return begin(system), refused
-
-
-def _change_fingers(
-    scene: Scene, system: System, stored: bytes | None, was: Numbers, numbers: Numbers
-) -> bytes | None:
-    """Return a snapshot with the state of each fingertip moved to the place of its number in a system."""
-    if stored is None or was == numbers:
-        return stored
-    former = assemble(replace(scene, fingers=scene.fingers[:1] * len(was)))
-    try:
-        state = snapshot.load(former, stored)
-    except StateError:  # what is wrong with it will be said
-        return stored
-    places = [was.index(number) if number in was else None for number in numbers]
-    return snapshot.dump(system, snapshot.change_fingers(former, system, state, places))
 
 
 def advance(
@@ -279,10 +246,10 @@ def _mark_gesture_start(running: Running, poses: Floats, count: int) -> Running:
     return replace(running, rest_time=rest_time, next_gesture=next_gesture)
 
 
-def _mark(running: Running) -> live_session.Moment:
+def _mark(running: Running) -> Moment:
     """Return the moment before the tick that is being simulated."""
-    return live_session.Moment(
-        running.state.period, running.snapshot, running.poses, running.tick - 1
+    return Moment(
+        running.state.period, running.snapshot, running.poses, running.tick - 1, running.base
     )
 
 
@@ -291,11 +258,9 @@ def _count_gesture(running: Running, *, ordered: bool) -> Running:
     touched = ordered or recent_trace.measure_total_force(running.system, running.state) > 0.0
     if running.next_gesture is None or not touched:
         return running
-    begun, room = (
-        running.next_gesture,
-        max(1, min(GESTURES, GESTURE_BYTES // len(running.snapshot))),
-    )
-    gesture = Gesture(begun.period, begun.snapshot, begun.poses, begun.tick)
+    begun = running.next_gesture
+    room = max(1, min(GESTURES, GESTURE_BYTES // len(running.snapshot)))
+    gesture = Gesture(begun.period, begun.snapshot, begun.poses, begun.tick, begun.base)
     return replace(
         running, gestures=(*running.gestures, gesture)[-room:], undone=(), next_gesture=None
     )
@@ -307,25 +272,26 @@ def restore(
     poses: Floats,
     tick: int | None = None,
     was: Numbers | None = None,
+    base: Floats | None = None,
 ) -> Running:
     """Return the session with another snapshot, None: at rest; a recording is cut at `tick`, or ends.
 
-    `was`: numbers of the fingertips of the snapshot, unless they are those of the session.
+    `was`: numbers of the fingertips of the snapshot, unless they are those of the session. `base`:
+    as `begin_session`.
     """
     poses = poses.reshape(-1, 7)
-    if len(running.poses) > len(
-        running.numbers
-    ):  # a stroke that is taken back takes its fingertips along
+    # A stroke that is taken back takes its fingertips along.
+    if len(running.poses) > len(running.numbers):
         system = assemble(running.scene)
         monitor = running.monitor and accuracy.start(running.scene)
         session_poses = running.poses[: len(running.numbers)]
         running = replace(running, system=system, monitor=monitor, poses=session_poses)
     was = was or name_fingers(running.numbers, len(poses))
     if was != running.numbers:
-        stored = _change_fingers(running.scene, running.system, stored, was, running.numbers)
+        stored = change_fingers(running.scene, running.system, stored, was, running.numbers)
         poses = match_poses(poses, was, running.poses, running.numbers)
-    state, _ = _load_state(running.system, stored)
-    now = snapshot.dump(running.system, state)
+    state, _ = load_state(running.system, stored)
+    now, base = snapshot.dump(running.system, state), fit_base(base, state)
     keep = running.recording
     if keep is not None:
         keep = keep.cut_at_tick(running.tick if tick is None else tick, state.period)
@@ -343,8 +309,9 @@ def restore(
         recording=keep,
         gestures=gestures,
         tick=running.tick + 1,
+        base=base,
         rest_time=0.0,
-        next_gesture=live_session.Moment(state.period, now, poses, running.tick) if free else None,
+        next_gesture=Moment(state.period, now, poses, running.tick, base) if free else None,
     )
 
 
@@ -369,11 +336,12 @@ def change_scene(
         running.tick,
         (*numbers, *images),
         running.names,
+        running.base,
     )
 
     def change(moment: Any) -> Any:
         had = name_fingers(was, len(moment.poses))
-        stored = _change_fingers(scene, plain, moment.snapshot, had, numbers)
+        stored = change_fingers(scene, plain, moment.snapshot, had, numbers)
         assert stored is not None
         return replace(
             moment, snapshot=stored, poses=match_poses(moment.poses, had, others, numbers)
@@ -389,15 +357,8 @@ def change_scene(
         running = replace(
             running, stroke_start=running.stroke_start and change(running.stroke_start)
         )
-    names = [
-        "clock",
-        "paused",
-        "blocking_reason",
-        "stale",
-        "begun_strokes",
-        "finished_strokes",
-        "last_place",
-    ]
+    names = ["clock", "paused", "blocking_reason", "stale"]
+    names += ["begun_strokes", "finished_strokes", "last_place"]
     names += [] if lost else ["gestures", "undone", "strokes", "stroke_start"]
     if lost:
         other = _give_fingers(other, 1)
@@ -433,9 +394,14 @@ def withdraw_stroke(running: Running) -> Running:
     return drop_strokes(restore_gesture(running, running.stroke_start))
 
 
-def restore_gesture(running: Running, gesture: live_session.Moment) -> Running:
+def restore_moment(running: Running, moment: Moment) -> Running:
+    """Return the session as it was at one of its moments, without its strokes' progress; see `restore`."""
+    return restore(running, moment.snapshot, moment.poses, base=moment.base)
+
+
+def restore_gesture(running: Running, gesture: Moment) -> Running:
     """Bring state, fingertip and recording back to where a gesture of the session began."""
-    back = restore(replace(running, recording=None), gesture.snapshot, gesture.poses)
+    back = restore_moment(replace(running, recording=None), gesture)
     keep = running.recording
     # The gesture a reset leaves behind has periods of another count.
     if keep is not None:
@@ -450,7 +416,7 @@ def reset(running: Running) -> Running:
     """Bring the bed back to rest and lift the fingertip off it; this can be rewound like a gesture."""
     running = drop_strokes(running)
     # Before period 0, at which the first gesture after the reset may begin.
-    before = Gesture(-1, running.snapshot, running.poses, running.tick)
+    before = Gesture(-1, running.snapshot, running.poses, running.tick, running.base)
     undone = (*running.undone, *running.gestures)[-GESTURES:]
     poses = running.poses.copy()
     poses[:, 2] = np.maximum(poses[:, 2], running.system.cell.actuator.rest_height + CLEARANCE)
@@ -523,16 +489,18 @@ def take_path(running: Running, count: int) -> tuple[Running, Floats, Orders | N
         running = replace(
             running, strokes=left[1:], finished_strokes=finished, last_place=(end.x, end.y)
         )
+        if stroke.brush is Brush.SET_BASE:
+            running = replace(running, base=running.state.row(0))
     return running, path, orders
 
 
 def find_device(running: Running) -> Device:
     """Return what forms the strokes of a session."""
     scene, system = running.scene, running.system
-    locked = running.state.mode() == Mode.LOCKED
-    parts = system.grid, find_ellipsoid(scene), find_blister(scene), system.cell.actuator.stroke
-    rest = system.cell.actuator.rest_height
-    return Device(*parts, locked if locked.any() else None, rest)
+    locked, actuator = running.state.mode() == Mode.LOCKED, system.cell.actuator
+    parts = system.grid, find_ellipsoid(scene), find_blister(scene), actuator.stroke
+    mask = locked if locked.any() else None
+    return Device(*parts, mask, actuator.rest_height, running.base)
 
 
 def _advance(running: Running, stroke: Stroke, count: int) -> tuple[Stroke, Floats, Orders | None]:

@@ -10,6 +10,7 @@ shows of a stroke at once, and what the valves drive the pins to after the finge
 import math
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
@@ -22,7 +23,7 @@ from ..core.surface.pointing import find_ground_height
 from .falloff import Falloff, evaluate
 from .pose import lean_finger, turn_image
 from .smoothing import flatten, smooth
-from .stroke import STAMPS, Brush, Image, Place, Sample, Stroke, needs_blister
+from .stroke import STAMPS, Brush, Combine, Image, Place, Sample, Stroke, needs_blister
 
 #: A path that comes nearer to itself than the fingertip is wide, after so many widths, is a new
 #: pass.
@@ -61,6 +62,8 @@ class Device:
     locked: Flags | None = None
     #: Height of pins at rest, m.
     rest: float = 0.0
+    #: (n,), heights that strokes count from, m; None: from the surface.
+    base: Floats | None = None
 
     @property
     def reach(self) -> float:
@@ -89,12 +92,25 @@ class Device:
 
         It counts from a ground (n,), m; `level`, m: that of a brush that levels, see `find_level`.
         """
-        surface = self.find_surface(ground, *at)
+        surface = start = self.find_surface(self.find_start(stroke, ground), *at)
         if stroke.brush is Brush.LOWER:
-            return max(0.0, surface - sample.depth)
+            return max(0.0, start - sample.depth)
         if stroke.brush is Brush.RAISE:
-            return min(surface + sample.depth, self.highest)
-        return surface if level is None else surface + sample.share * (level - surface)
+            return min(start + sample.depth, self.highest)
+        if stroke.from_base:
+            surface = self.find_surface(ground, *at)
+        return surface if level is None else surface + sample.share * (level - start)
+
+    def find_start(self, stroke: Stroke, surface: Floats) -> Floats:
+        """Return the heights (n,), m, that a stroke counts from where a surface stands (n,), m."""
+        return surface if self.base is None or not stroke.from_base else self.base
+
+    def combine(self, stroke: Stroke, before: Any, formed: Any) -> Any:
+        """Return what a stroke leaves of heights before it where it forms some, m: numbers, or (m,)."""
+        low, high = (self.rest + limit for limit in stroke.limits)
+        low = math.inf if stroke.combine is Combine.HIGHEST else max(low, 0.0)
+        high = -math.inf if stroke.combine is Combine.LOWEST else min(high, self.highest)
+        return np.clip(formed, np.minimum(before, low), np.maximum(before, high))
 
     def find_level(self, stroke: Stroke, image: Image, before: Floats) -> float | None:
         """Return the height, m, that a stroke levels to: of pins (n,), m, at its first place; else None."""
@@ -174,11 +190,16 @@ def _mark(nominal: Nominal, stroke: Stroke, device: Device, image: Image, index:
         for point, at in zip(row, places, strict=True)
     ]
     reach = device.reach + 0.5 * length / parts
+    low, high = LIMITS[stroke.brush]
+    low = 0.0 if stroke.combine is Combine.HIGHEST else low
+    high = 0.0 if stroke.combine is Combine.LOWEST else high
     for part, (start, end) in enumerate(pairwise(places)):
         cells = device.grid.disc(0.5 * (start[0] + end[0]), 0.5 * (start[1] + end[1]), reach)
         if device.locked is not None:
             cells = cells[~device.locked[cells]]
-        ground, now = nominal.ground[cells], nominal.height[cells]
+        counted = device.find_start(stroke, nominal.ground)[cells]
+        ground = counted if level is None else nominal.ground[cells]
+        now = nominal.height[cells]
         if device.blister is None:
             under = find_undersides(device, stroke, image, row[part + 1].lean, end, cells)
             change = tops[part + 1] + under - ground
@@ -189,14 +210,19 @@ def _mark(nominal: Nominal, stroke: Stroke, device: Device, image: Image, index:
                 full = tops[part] + share * (tops[part + 1] - tops[part]) - ground
             else:
                 before, after = row[part].share, row[part + 1].share
-                full = (before + share * (after - before)) * (level - ground)
+                full = (before + share * (after - before)) * (level - counted)
             change = section * full
-        low, high = LIMITS[stroke.brush]
         change = change.clip(low, high)
         nominal.near[cells] = True
-        nominal.height[cells] = np.where(
-            np.abs(change) > np.abs(now - ground) + TIE, ground + change, now
-        )
+        gone = now - ground
+        if low == 0.0:
+            farther = change > gone + TIE
+        elif high == 0.0:
+            farther = change < gone - TIE
+        else:
+            farther = np.abs(change) > np.abs(gone) + TIE
+        formed = device.combine(stroke, nominal.before[cells], ground + change)
+        nominal.height[cells] = np.where(farther, formed, now)
 
 
 def _brush(nominal: Nominal, stroke: Stroke, device: Device, end: int) -> Nominal:
@@ -246,7 +272,8 @@ def _shape(nominal: Nominal, stroke: Stroke, device: Device) -> Nominal:
     else:
         height = ground + (most if stroke.brush is Brush.CREST else -most)
     near = nominal.near | (most > 0.0)
-    return replace(nominal, height=height.clip(0.0, device.highest), near=near)
+    height = device.combine(stroke, nominal.before, height)
+    return replace(nominal, height=height, near=near)
 
 
 def find_frame(stroke: Stroke, device: Device) -> Place:
@@ -281,8 +308,10 @@ def _stamp(nominal: Nominal, stroke: Stroke, device: Device) -> Nominal:
         )
     if device.locked is not None:
         rise[device.locked] = 0.0
-    height = nominal.before + (1.0 if stroke.brush is Brush.STAMP else -1.0) * last.depth * rise
-    height = np.where(rise > 0.0, height.clip(0.0, device.highest), nominal.before)
+    height = device.find_start(stroke, nominal.before)
+    height = height + (1.0 if stroke.brush is Brush.STAMP else -1.0) * last.depth * rise
+    formed = device.combine(stroke, nominal.before, height)
+    height = np.where(rise > 0.0, formed, nominal.before)
     return replace(nominal, height=height, near=rise > 0.0)
 
 
@@ -323,9 +352,13 @@ class Ghost:
 
     stroke: Stroke
     nominal: Nominal
+    #: Base that it was found on.
+    base: Floats | None
 
-    def has_grown(self, stroke: Stroke, before: Floats) -> bool:
+    def has_grown(self, stroke: Stroke, before: Floats, base: Floats | None) -> bool:
         """Tell whether a stroke, on pins at heights (n,), m, is this one drawn on."""
+        if stroke.from_base and self.base is not base:
+            return False
         former, count = self.stroke, self.nominal.count
         same = (
             former.number == stroke.number
@@ -345,12 +378,16 @@ def find_ghosts(
     """
     ghosts: list[Ghost] = []
     for stroke in strokes:
+        if stroke.brush is Brush.SET_BASE:
+            device = replace(device, base=height)
         if stroke.brush in LIMITS or stroke.placed:
             before = height if stroke.height is None else stroke.height
-            same = [ghost.nominal for ghost in former if ghost.has_grown(stroke, before)]
+            same = [
+                ghost.nominal for ghost in former if ghost.has_grown(stroke, before, device.base)
+            ]
             nominal = same[0] if same else find_nominal(stroke, device, before)
             if nominal.count < len(stroke.samples):
                 nominal = extend(nominal, stroke, device)
-            ghosts.append(Ghost(stroke, nominal))
+            ghosts.append(Ghost(stroke, nominal, device.base))
             height = nominal.height
     return tuple(ghosts)

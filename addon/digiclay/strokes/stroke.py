@@ -107,6 +107,7 @@ class Brush(Enum):
     CREASE = "CREASE"
     CREST = "CREST"
     FLATTEN = "FLATTEN"
+    SET_BASE = "SET_BASE"
 
     @property
     def inverse(self) -> Brush:
@@ -149,6 +150,29 @@ def needs_blister(brush: Brush, falloff: Falloff = Falloff.DEVICE) -> bool:
     return shaped or brush in (Brush.RAISE, Brush.LEVEL)
 
 
+class Combine(Enum):
+    """What a stroke leaves where something is formed already.
+
+    HIGHEST and LOWEST leave the higher or lower one of the surface and of what the stroke forms on the
+    base, ADD puts that onto the surface, REPLACE leaves it alone. USUAL: Level replaces, others add.
+    """
+
+    USUAL = "USUAL"
+    HIGHEST = "HIGHEST"
+    LOWEST = "LOWEST"
+    ADD = "ADD"
+    REPLACE = "REPLACE"
+
+
+#: How strokes may combine, by their brush; those of others do so as usual.
+EVERY = tuple(Combine)
+COMBINATIONS = {
+    Brush.LOWER: (Combine.USUAL, Combine.ADD, Combine.LOWEST),
+    Brush.RAISE: (Combine.USUAL, Combine.ADD, Combine.HIGHEST),
+    **dict.fromkeys((Brush.LEVEL, *STAMPS), EVERY),
+}
+
+
 @dataclass(frozen=True)
 class Sample:
     """Point of a press stroke."""
@@ -180,6 +204,10 @@ class Stroke:
     #: What is stamped, with values from 0 to 1.
     stamp: HeightMap | None = None
     falloff: Falloff = Falloff.DEVICE
+    #: What it leaves where something is formed, and the lowest and the highest that it forms, m above
+    #: rest.
+    combine: Combine = Combine.USUAL
+    limits: tuple[float, float] = (-math.inf, math.inf)
     #: Whether the hand still draws.
     held: bool = True
     #: The stroke along each image alone, while fingertips go along several at once.
@@ -222,6 +250,13 @@ class Stroke:
     #: look.
     waited: int = 0
     arrived: bool = False
+
+    @property
+    def from_base(self) -> bool:
+        """Whether it counts from the base, not from the surface."""
+        if self.brush is Brush.LEVEL:
+            return self.combine is Combine.ADD
+        return self.combine not in (Combine.USUAL, Combine.ADD) and not self.accumulate
 
     @property
     def done(self) -> bool:
@@ -277,13 +312,11 @@ def start(
     brush: Brush = Brush.LOWER,
     share: float = 1.0,
     lean: Place = (0.0, 0.0),
-    *,
-    accumulate: bool = False,
-    stamp: HeightMap | None = None,
+    **more: Any,
 ) -> Stroke:
-    """Return the stroke of a mouse that goes down at a place, m; see `Sample`."""
+    """Return the stroke of a mouse that goes down at a place, m; see `Sample`. `more`: of `Stroke`."""
     first = Sample(x, y, _limit_depth(depth), share, lean)
-    return Stroke(number, (first,), brush, images, accumulate, stamp)
+    return Stroke(number, (first,), brush, images, **more)
 
 
 def draw(

@@ -27,8 +27,12 @@ SWEEPS = {
     Brush.LOCK: Verb.LOCK,
     Brush.UNLOCK: Verb.UNLOCK,
 }
-#: Brushes that tell all pins something, at once.
-WHOLE = {Brush.INVERT_LOCKS: Verb.INVERT, Brush.CLEAR_LOCKS: Verb.UNLOCK}
+#: Brushes that tell all pins something, at once, or note how they stand: verb and radius, m.
+WHOLE = {
+    Brush.INVERT_LOCKS: (Verb.INVERT, FARTHEST),
+    Brush.CLEAR_LOCKS: (Verb.UNLOCK, FARTHEST),
+    Brush.SET_BASE: (Verb.SMOOTH, 0.0),
+}
 #: Time that a stroke takes beside its path, s: to come, press, rise and leave.
 BESIDE = 0.4
 #: Least change of a pin that the valves are to make, m.
@@ -78,7 +82,8 @@ def sweep(
 
 def order_all(stroke: Stroke, pose: Floats) -> tuple[Stroke, Floats, Orders]:
     """Tell all pins of the bed what the brush of a stroke does, and end it; returns as `sweep`."""
-    order = repeat_order(1, WHOLE[stroke.brush], radius=FARTHEST)
+    verb, radius = WHOLE[stroke.brush]
+    order = repeat_order(1, verb, radius=radius)
     return replace(stroke, phase=DONE), np.array([pose, pose]), Orders(order)
 
 

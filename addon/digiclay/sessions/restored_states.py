@@ -1,0 +1,53 @@
+"""What sessions take up of snapshots: state, fingertips, base. No Blender."""
+
+from dataclasses import replace
+
+from ..core.base.arrays import Floats
+from ..core.base.errors import StateError
+from ..core.engine.simulation import begin
+from ..core.engine.state import State
+from ..core.engine.system import System
+from ..core.scene.assembly import assemble
+from ..core.scene.schema import Scene
+from ..core.session import snapshot
+from ..ui_text import localize
+
+#: Message when the state of other parts is taken up.
+CHANGED = "Only the heights were kept: the bed's parts or its method have changed"
+#: Numbers of fingertips.
+Numbers = tuple[int, ...]
+
+
+def fit_base(base: Floats | None, state: State) -> Floats:
+    """Return the base (n,), m, of a state: a stored one, or the surface where that has other pins."""
+    surface = state.row(0)
+    return surface if base is None or base.size != surface.size else base
+
+
+def load_state(system: System, stored: bytes | None) -> tuple[State, str]:
+    """Return the state to continue from, and what could not be taken up."""
+    if stored is None:
+        return begin(system), ""
+    # The state of other parts has heights at least; what has none is of no use.
+    refused = ""
+    for read, words in ((snapshot.load, ""), (snapshot.transfer_heights, CHANGED)):
+        try:
+            return read(system, stored), words and localize(words)
+        except StateError as error:
+            refused = localize("The bed begins at rest. {}", error)
+    return begin(system), refused
+
+
+def change_fingers(
+    scene: Scene, system: System, stored: bytes | None, was: Numbers, numbers: Numbers
+) -> bytes | None:
+    """Return a snapshot with the state of each fingertip moved to the place of its number in a system."""
+    if stored is None or was == numbers:
+        return stored
+    former = assemble(replace(scene, fingers=scene.fingers[:1] * len(was)))
+    try:
+        state = snapshot.load(former, stored)
+    except StateError:  # what is wrong with it will be said
+        return stored
+    places = [was.index(number) if number in was else None for number in numbers]
+    return snapshot.dump(system, snapshot.change_fingers(former, system, state, places))
