@@ -112,7 +112,7 @@ def draw_on_bed(
 
 #: Widths from which on a header names popovers in full, and has a button for each brush, in pixels
 #: at a resolution scale of 1.
-WIDE, WIDEST = 1000, 1450
+WIDE, WIDEST = 1000, 1640
 #: Widths of what it holds, in Blender's units of 20 pixels.
 BRUSH, SIZE, AMOUNT, STRENGTH = 4.6, 6.6, 6.6, 5.4
 
