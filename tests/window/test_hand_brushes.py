@@ -15,9 +15,9 @@ MIDDLE, ABOVE = (12, 12), (18, 12)
 
 
 @pytest.mark.parametrize("name, row", [("raised", 12), ("inverted", 5)])
-def test_a_quick_drag_of_60_mm_raises_all_its_columns_by_15_mm(seen, name, row):
+def test_a_quick_drag_of_60_mm_raises_all_its_columns_by_6_mm(seen, name, row):
     risen = up(seen, name)[row, COLUMNS]
-    assert (np.abs(risen - 15.0) < 2.0).mean() >= 0.95
+    assert (np.abs(risen - 6.0) < 2.0).mean() >= 0.95
 
 
 def test_ctrl_lowers_level_fills_a_valley_the_header_smooths_and_a_click_with_shift_forms_a_line(

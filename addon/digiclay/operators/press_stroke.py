@@ -83,7 +83,7 @@ class PressSettings:
     )
     height: millimeters(
         "Height",
-        15e-3,
+        6e-3,
         "How far a stroke of Raise, or a stamp, goes above the surface, in mm",
         min=0.1,
         max=1e3 * DEEPEST,
@@ -137,6 +137,12 @@ class PressSettings:
     limit_high: millimeters(
         "Highest", 10e-3, "Height above rest above which nothing is formed", **PLACE
     )
+    finish: choice(
+        "Finish",
+        "What becomes of the pins when the fingertip of Lower, Raise or Level has left",
+        items=brush.FINISH_ITEMS,
+        default="NOMINAL",
+    )
     path: choice("Stroke", "Path of a stroke", items=brush.PATH_ITEMS, default="FREE")
     stabilizer: millimeters(
         "Stabilizer",
@@ -184,8 +190,8 @@ class Press(PressSettings, Modal, Operator):
         target = find_pressed(self, context, brush.find_press(context, event))
         if target is None:
             return NOT_PRESSED
-        falloff = brush.find_falloff(self, self.kind)
-        session = open_session(self, context, target.bed, self.kind, falloff)
+        options = brush.find_options(self, self.kind)
+        session = open_session(self, context, target.bed, self.kind, options["falloff"])
         if session is None:
             return {"CANCELLED"}
         # The hand draws on the surface it has seen when it began, not on pins that give way under
@@ -198,7 +204,6 @@ class Press(PressSettings, Modal, Operator):
         self.lagged = place = float(target.point[0]), float(target.point[1])
         depth, share = self._amount()
         images = brush.find_images(self)
-        options = brush.find_options(self, self.kind)
         stroke = start(0, *place, depth, images, self.kind, share, self.lean, **options)
         session, self.number = queue_stroke(session, stroke)
         running.put(session)

@@ -62,6 +62,7 @@ def stroke_options(column: UILayout, settings: OperatorProperties) -> None:
     if settings.use_limit:
         column.prop(settings, "limit_low")
         column.prop(settings, "limit_high")
+    column.prop(settings, "finish")
 
 
 @popover("DIGICLAY_PT_press_pen", "Pen")

@@ -67,8 +67,10 @@ ADJUSTING = {
 }
 LABELS = {brush: brush.value.replace("_", " ").title() for brush in Brush}
 BRUSH_WORDS = {
-    Brush.LOWER: "Press a valley of the given depth. With Ctrl: Raise",
-    Brush.RAISE: "Press lightly, lift the blister by the given height, and draw it along: a ridge. "
+    Brush.LOWER: "Press a valley of the given depth, to which the valves bring the pins in the end, "
+    "unless Finish is As Left. With Ctrl: Raise",
+    Brush.RAISE: "Press lightly, lift the blister by the given height, and draw it along: a ridge, "
+    "to whose nominal form the valves bring the pins in the end, unless Finish is As Left. "
     "With Ctrl: Lower",
     Brush.LEVEL: "Bring hills and hollows to the height of the surface under the first touch",
     Brush.FLATTEN: "Bring the pins in the ring to the plane that fits them best, without a touch; "
@@ -136,6 +138,15 @@ STAMP_ITEMS = (
     *((name, name.replace("_", " ").title(), "") for name in list_shapes()),
     (FILE, "File", "A mesh, a picture (bright is high) or a .npy file of heights"),
 )
+FINISH_ITEMS = (
+    (
+        "NOMINAL",
+        "Nominal",
+        "When the fingertip has left, the valves bring the pins to the nominal surface of the "
+        "stroke, which has exactly its depth or height",
+    ),
+    ("AS_LEFT", "As Left", "The pins stay as the finger and the control method have left them"),
+)
 PATH_ITEMS = (
     ("FREE", "Free", "Drag to draw the path"),
     ("LINE", "Line", "Drag from one end of the line to the other; it is formed on release"),
@@ -162,6 +173,7 @@ def find_options(settings: OperatorProperties, brush: Brush) -> dict[str, Any]:
         combine = Combine(settings.combine)
     falloff = find_falloff(settings, brush)
     options = {"accumulate": settings.accumulate, "falloff": falloff, "combine": combine}
+    options["as_left"] = settings.finish == "AS_LEFT"
     if settings.use_limit:
         low, high = sorted((1e-3 * settings.limit_low, 1e-3 * settings.limit_high))
         options["limits"] = low, high

@@ -105,6 +105,11 @@ class PointerStroke(Parameters):
         "blister and brush, Smooth and Erase as the valves sweep them",
         choices=tuple(falloff.value.lower() for falloff in Falloff),
     )
+    finish: str = quantity(
+        "nominal",
+        "whether the valves bring the pins to the nominal surface when the fingertip has left",
+        choices=("nominal", "as_left"),
+    )
     stabilizer: float = quantity(
         0.0, "lag behind the pointer", unit="m", at_least=0.0, at_most=50e-3
     )
@@ -259,6 +264,7 @@ def _play(running: Running, stroke: PointerStroke, number: int) -> Iterator[Runn
         falloff=stroke.shape,
         combine=Combine(stroke.combine.upper()),
         limits=(stroke.limit_low, stroke.limit_high),
+        as_left=stroke.finish == "as_left",
     )
     running, queued = queue_stroke(running, lay_path(begun, path))
     first = running.state.period

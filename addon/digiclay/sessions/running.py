@@ -11,7 +11,7 @@ from ..core.base.arrays import Floats
 from ..core.model.fingers import MOST_FINGERS
 from ..core.session.live_session import Clock, LiveSession, Moment
 from ..core.session.recent_trace import RecentTrace
-from ..strokes.stroke import Place, Stroke
+from ..strokes.stroke import Correction, Place, Stroke
 
 if TYPE_CHECKING:
     from bpy.types import Object
@@ -75,6 +75,8 @@ class Running(LiveSession):
     finished_strokes: int = 0
     #: Where the last finished stroke ended, x and y, m.
     last_place: Place | None = None
+    #: What the valves had to correct of it; None where no finger formed it.
+    correction: Correction | None = None
     #: Stored settings of the bed that `scene` was made of; None: unknown.
     settings: tuple[Any, ...] | None = None
 

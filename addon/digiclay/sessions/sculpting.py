@@ -310,6 +310,7 @@ def restore(
         gestures=gestures,
         tick=running.tick + 1,
         base=base,
+        correction=None,
         rest_time=0.0,
         next_gesture=Moment(state.period, now, poses, running.tick, base) if free else None,
     )
@@ -358,7 +359,7 @@ def change_scene(
             running, stroke_start=running.stroke_start and change(running.stroke_start)
         )
     names = ["clock", "paused", "blocking_reason", "stale"]
-    names += ["begun_strokes", "finished_strokes", "last_place"]
+    names += ["begun_strokes", "finished_strokes", "last_place", "correction"]
     names += [] if lost else ["gestures", "undone", "strokes", "stroke_start"]
     if lost:
         other = _give_fingers(other, 1)
@@ -487,7 +488,11 @@ def take_path(running: Running, count: int) -> tuple[Running, Floats, Orders | N
         end = stroke.samples[-1]
         finished = running.finished_strokes + 1
         running = replace(
-            running, strokes=left[1:], finished_strokes=finished, last_place=(end.x, end.y)
+            running,
+            strokes=left[1:],
+            finished_strokes=finished,
+            last_place=(end.x, end.y),
+            correction=stroke.correction,
         )
         if stroke.brush is Brush.SET_BASE:
             running = replace(running, base=running.state.row(0))

@@ -34,11 +34,19 @@ def _read_limits(values: tuple[float, float]) -> tuple[float, float]:
     return low, high
 
 
+def _read_flag(value: Any) -> bool:
+    """Return a flag; a ValueError tells that it is none."""
+    if not isinstance(value, bool):
+        raise ValueError(value)
+    return value
+
+
 #: Fields of a stroke that a line has where they are not those of older strokes, and their readers.
 FIELDS: dict[str, Callable[[Any], Any]] = {
     "falloff": Falloff,
     "combine": Combine,
     "limits": _read_limits,
+    "as_left": _read_flag,
 }
 
 

@@ -188,6 +188,15 @@ class Sample:
     lean: Place = (0.0, 0.0)
 
 
+class Correction(NamedTuple):
+    """How far pins about a path are from the nominal surface when the fingertip has left, m."""
+
+    rms: float
+    largest: float
+    #: Whether the valves bring them there.
+    made: bool
+
+
 @dataclass(frozen=True, eq=False)
 class Stroke:
     """Press stroke, and the progress of the fingertip along it."""
@@ -208,6 +217,8 @@ class Stroke:
     #: rest.
     combine: Combine = Combine.USUAL
     limits: tuple[float, float] = (-math.inf, math.inf)
+    #: Whether what the finger and the method have formed stays, not brought to the nominal surface.
+    as_left: bool = False
     #: Whether the hand still draws.
     held: bool = True
     #: The stroke along each image alone, while fingertips go along several at once.
@@ -244,8 +255,10 @@ class Stroke:
     #: before.
     turn: Floats | None = None
     #: (n,), heights to which the valves drive pins after the fingertip has left, m, NaN: not
-    #: driven.
+    #: driven; of a stroke finished as left those at the last look.
     finish: Floats | None = None
+    #: How far the pins are from the nominal surface when the fingertip has left; None before.
+    correction: Correction | None = None
     #: Control periods since the fingertip waits for its pins, and whether they stood at the last
     #: look.
     waited: int = 0
