@@ -1,4 +1,4 @@
-"""A finger has the same force on every bed: its closed form, the share of a cell, cautions, parts of files."""
+"""A finger has the same force on every bed: its closed form, shares, cautions; parts of files."""
 
 import itertools
 

@@ -100,7 +100,8 @@ def list_cautions(scene: Scene) -> list[str]:
         if abs(ratio - 1.0) > COARSE:
             lines.append(
                 f"contact.share {law.share:g} gives {ratio:.3g} of the finger's force on this bed; "
-                f"{plan.share:g}, the area of a cell over 26.5 mm², gives all: write format = 2 in an older file"
+                f"{plan.share:g}, the area of a cell over 26.5 mm², gives all"
+                " (an older file takes it with format = 2)"
             )
         if spread > COARSE:
             lines.append(
