@@ -193,6 +193,15 @@ def test_a_crease_is_sharp_and_narrow_and_a_crest_is_its_inverse(arrangement, br
     assert Brush.CREASE.inverse is Brush.CREST
 
 
+@pytest.mark.parametrize("brush", [Brush.CREASE, Brush.CREST, Brush.FLATTEN, Brush.SMOOTH])
+def test_no_brush_in_the_ring_takes_a_pin_beyond_the_limits_unless_it_was_there(brush):
+    rough = REST + np.random.default_rng(5).uniform(-2e-3, 2e-3, 1296)
+    limited = form(replace(lay(LINE, brush, amount=9e-3), limits=(-0.5e-3, 0.5e-3)), rough)
+    assert (limited >= np.minimum(rough, REST - 0.5e-3) - 1e-12).all()
+    assert (limited <= np.maximum(rough, REST + 0.5e-3) + 1e-12).all()
+    assert np.abs(limited - rough).max() > 1e-3
+
+
 @pytest.mark.parametrize("arrangement", ARRANGEMENTS)
 def test_flatten_leaves_a_plane_or_moves_no_pin_farther_than_its_depth(arrangement):
     device = make_device(arrangement)
