@@ -19,7 +19,7 @@ from digiclay.press.brush import FINGERS, find_kind
 from digiclay.roles import fingertip_of
 from digiclay.sessions import running
 from digiclay.settings import devices, properties
-from digiclay.strokes.stroke import Brush
+from digiclay.strokes.stroke import Brush, Combine
 
 from tests.assemble import assert_near
 from tests.blender.at_hand import in_the_view, new_bed
@@ -352,6 +352,35 @@ def test_a_saved_preset_brings_back_what_was_set_and_is_removed(settings, tmp_pa
     assert not saved.exists()
     bpy.ops.wm.tool_set_by_id(name="builtin.select_box")
     assert not bpy.ops.digiclay.press_brush.poll()
+
+
+@pytest.mark.parametrize(
+    "kind, values, combine, limits",
+    [
+        (Brush.RAISE, {}, Combine.HIGHEST, None),
+        (Brush.LOWER, {}, Combine.LOWEST, None),
+        (Brush.RAISE, {"accumulate": True}, Combine.USUAL, None),
+        (Brush.RAISE, {"combine": "LOWEST"}, Combine.HIGHEST, None),
+        (Brush.LEVEL, {}, Combine.USUAL, None),
+        (Brush.IMPRINT, {"combine": "REPLACE"}, Combine.REPLACE, None),
+        (Brush.SMOOTH, {"combine": "ADD"}, Combine.USUAL, None),
+        (Brush.STAMP, {"use_limit": True}, Combine.USUAL, (-10e-3, 10e-3)),
+        (
+            Brush.LOWER,
+            {"use_limit": True, "limit_low": 5.0, "limit_high": -2.0},
+            Combine.LOWEST,
+            (-2e-3, 5e-3),
+        ),
+    ],
+)
+def test_a_stroke_combines_and_is_limited_as_the_tool_is_set(
+    settings, kind, values, combine, limits
+):
+    for name, value in values.items():
+        setattr(settings, name, value)
+    options = brush.find_options(settings, kind)
+    assert options["combine"] is combine
+    assert options.get("limits") == (limits and pytest.approx(limits))
 
 
 PRESS = "[[stroke]]\ndepth = 0.003\nwidth = 0.012\nmoves = [[0, -0.006, 0], [0.2, 0.006, 0]]\n"

@@ -17,7 +17,16 @@ from digiclay.sessions.sculpting import find_device, queue_stroke, reset, rewind
 from digiclay.settings.devices import BEDS, make_scene
 from digiclay.strokes import drawn
 from digiclay.strokes.nominal import Device, find_ghosts, find_nominal
-from digiclay.strokes.stroke import SHALLOWEST, Brush, Combine, lay_path, let_go, make_images, start
+from digiclay.strokes.stroke import (
+    DRAGGING,
+    SHALLOWEST,
+    Brush,
+    Combine,
+    lay_path,
+    let_go,
+    make_images,
+    start,
+)
 
 from tests.assemble import assert_near, refused_in_a_line, table
 from tests.hand import heights
@@ -167,6 +176,14 @@ def test_level_goes_one_way_alone(combine, sign):
     extreme = np.maximum if sign > 0.0 else np.minimum
     assert_near(one, extreme(both, HILLS), 1e-12)
     assert np.ptp(one - HILLS) > 1e-3
+    # Images level to heights of their own: where they meet, what goes farthest that way.
+    slope, images = FLAT + 0.2 * GRID.x, make_images("X")
+    met = [(12, -20), (-2, 18)]
+    each = [
+        form([lay(met, Brush.LEVEL, combine=combine, images=(image,))], slope) for image in images
+    ]
+    both = form([lay(met, Brush.LEVEL, combine=combine, images=images)], slope)
+    assert_near(both, extreme(*each), 1e-9)
 
 
 @pytest.mark.parametrize("symmetry", ["X", "RADIAL"])
@@ -176,7 +193,7 @@ def test_images_that_meet_leave_the_height_of_one_and_accumulate_builds_on_all(s
     left = form([stroke])
     assert 1e3 * (left.max() - REST) == pytest.approx(8.0, abs=1e-9)
     np.testing.assert_array_equal(form([stroke], left), left)
-    more = replace(stroke, combine=Combine.USUAL, accumulate=True)
+    more = replace(stroke, accumulate=True)
     assert 1e3 * (form([more], left).max() - REST) == pytest.approx(16.0, abs=0.2)
 
 
@@ -270,9 +287,11 @@ def test_set_base_is_a_gesture_and_a_reset_brings_the_base_to_rest():
     assert (reset(based).base == REST).all()
     np.testing.assert_array_equal(rewind(reset(based)).base, based.base)
     # Other parameters of the same pins keep it; a bed of other pins counts from its surface.
-    other = replace(based.scene, simulation=replace(based.scene.simulation, duration=9.0))
-    np.testing.assert_array_equal(sculpting.change_scene(based, other)[0].base, based.base)
-    assert sculpting.change_scene(based, scene(21))[0].base.size == 21**2
+    other = replace(twice.scene, simulation=replace(twice.scene.simulation, duration=9.0))
+    np.testing.assert_array_equal(sculpting.change_scene(twice, other)[0].base, based.base)
+    assert sculpting.change_scene(twice, scene(21))[0].base.size == 21**2
+    undone = sculpting.restore(twice, based.snapshot, based.poses, base=np.zeros(3))
+    np.testing.assert_array_equal(undone.base, heights(based))
 
 
 LIMITED = lay(LINE, limits=(-1e-3, 5e-3))
@@ -353,3 +372,30 @@ def test_strokes_of_older_files_form_what_they_formed():
     assert_near(heights(finish(session)[0]), stood["queue"], ROUNDING)
     *_, played = play_strokes(begin(), read_strokes(folder / "file.toml").strokes)
     assert_near(heights(played), stood["played"], ROUNDING)
+
+
+LIMITS = {"limits": (7e-3, 1.0)}
+
+
+@pytest.mark.parametrize(
+    "first, combine, limits",
+    [
+        (Brush.RAISE, Combine.HIGHEST, {}),
+        (Brush.LOWER, Combine.LOWEST, {}),
+        (Brush.RAISE, Combine.USUAL, LIMITS),
+    ],
+)
+def test_the_fingertip_goes_along_what_is_beyond_that_which_its_stroke_forms(
+    first, combine, limits
+):
+    session, _ = finish(queue(begin(), lay([(0, -14), (0, 14)], first)))
+    session = queue(session, lay([(-14, 0), (14, 0)], Brush.LEVEL, combine=combine, **limits))
+    places = []
+    while session.strokes:
+        session = sculpting.follow_finger(session, session.pose, 1)
+        if session.strokes and session.strokes[0].phase == DRAGGING:
+            places.append(1e3 * session.pose[:3])
+    x, _, z = np.array(places).T
+    # The fingertip lies a millimeter deep in the pins that it leads.
+    crossed = z[np.abs(x) < 1.0] - 40.0
+    assert_near(crossed, 7.2 if first.rises else -9.0, 1.5)
