@@ -126,6 +126,8 @@ The codes of `mode` are those of the class `Mode`:
 
 ::: digiclay.force
 
+::: digiclay.plate_force
+
 ::: digiclay.free_speed
 
 ::: digiclay.step_response

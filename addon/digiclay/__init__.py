@@ -35,6 +35,7 @@ LATER = {
     "SetPoint": ("core.model.control_interface", "SetPoint"),
     "force": ("core.session.probes", "force"),
     "free_speed": ("core.session.probes", "free_speed"),
+    "plate_force": ("core.session.plate", "plate_force"),
     "quantity": ("core.base.quantity", "quantity"),
     "step_response": ("core.session.probes", "step_response"),
     "steps": ("core.session.probes", "steps"),
@@ -72,6 +73,8 @@ def unregister() -> None:
 def scene(
     content: Scene | Mapping[str, Any] | str | PathLike[str] | None = None,
     changes: Mapping[str, Any] | None = None,
+    *,
+    with_: str | PathLike[str] | None = None,
 ) -> Scene:
     """Return a scene: all parameters of a session as one valid value.
 
@@ -87,7 +90,10 @@ def scene(
         nested tables. Numbers are in SI units, texts may have a unit, ``"0.3 N"``.
         ``control.method`` is a name of `methods`, a subclass of `Method`, or the file of one,
         ``"yielding.py:Yielding"``, whose code is then run. What follows from a changed method,
-        preset or arrangement of pins changes too.
+        preset or bed changes too.
+    with_ : path, optional
+        File of parts of device and finger, such as ``fitted.toml`` of ``digiclay fit``. They take
+        the place of those of `content`; `changes` come last.
 
     Returns
     -------
@@ -106,7 +112,7 @@ def scene(
     """
     from .front_door import change_scene
 
-    return change_scene({} if content is None else content, changes)
+    return change_scene({} if content is None else content, changes, with_)
 
 
 def run(

@@ -27,6 +27,7 @@ from .core.scene.scene_source import (
     Source,
     list_changes,
     make_scene,
+    read_parts,
     read_source,
     write_word,
 )
@@ -222,8 +223,8 @@ def write_value(key: str, value: Any) -> str:
     )
 
 
-def change_scene(source: Source, changes: Table | None) -> Scene:
-    """Return the scene of a source with changes, whose methods are loaded."""
+def change_scene(source: Source, changes: Table | None, with_: object = None) -> Scene:
+    """Return the scene of a source with parts of a file and changes, whose methods are loaded."""
     if changes is not None and not isinstance(changes, Mapping):
         raise SceneError(f"Changes must be a table of keys and values (got {changes!r:.60}).")
     path, table = read_source(source)
@@ -232,9 +233,9 @@ def change_scene(source: Source, changes: Table | None) -> Scene:
         refuse_former(source)
     elif isinstance(source, Mapping) and isinstance(control, Mapping) and "method" in control:
         given.insert(0, (METHOD, control["method"]))
-    return make_scene(
-        path, table, [Setting(key, write_value(key, value), "changes") for key, value in given]
-    )
+    settings = read_parts(read_path(with_)) if with_ is not None else []
+    settings += [Setting(key, write_value(key, value), "changes") for key, value in given]
+    return make_scene(path, table, settings)
 
 
 def run(scene: Scene, progress: Callable[[int, int], None] | None, *, errors: bool) -> Result:

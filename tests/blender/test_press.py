@@ -19,7 +19,7 @@ from digiclay.press.brush import FINGERS, find_kind
 from digiclay.roles import fingertip_of
 from digiclay.sessions import running
 from digiclay.settings import devices, properties
-from digiclay.strokes.stroke import Brush
+from digiclay.strokes.stroke import Brush, Combine
 
 from tests.assemble import assert_near
 from tests.blender.at_hand import in_the_view, new_bed
@@ -165,6 +165,7 @@ def test_the_text_beside_the_cursor_names_brush_and_height_or_depth_with_its_uni
     assert [one for one in Brush if brush.amount_name(one) == "height"] == [
         Brush.RAISE,
         Brush.STAMP,
+        Brush.CREST,
     ]
 
 
@@ -353,6 +354,35 @@ def test_a_saved_preset_brings_back_what_was_set_and_is_removed(settings, tmp_pa
     assert not bpy.ops.digiclay.press_brush.poll()
 
 
+@pytest.mark.parametrize(
+    "kind, values, combine, limits",
+    [
+        (Brush.RAISE, {}, Combine.HIGHEST, None),
+        (Brush.LOWER, {}, Combine.LOWEST, None),
+        (Brush.RAISE, {"accumulate": True}, Combine.USUAL, None),
+        (Brush.RAISE, {"combine": "LOWEST"}, Combine.HIGHEST, None),
+        (Brush.LEVEL, {}, Combine.USUAL, None),
+        (Brush.IMPRINT, {"combine": "REPLACE"}, Combine.REPLACE, None),
+        (Brush.SMOOTH, {"combine": "ADD"}, Combine.USUAL, None),
+        (Brush.STAMP, {"use_limit": True}, Combine.USUAL, (-10e-3, 10e-3)),
+        (
+            Brush.LOWER,
+            {"use_limit": True, "limit_low": 5.0, "limit_high": -2.0},
+            Combine.LOWEST,
+            (-2e-3, 5e-3),
+        ),
+    ],
+)
+def test_a_stroke_combines_and_is_limited_as_the_tool_is_set(
+    settings, kind, values, combine, limits
+):
+    for name, value in values.items():
+        setattr(settings, name, value)
+    options = brush.find_options(settings, kind)
+    assert options["combine"] is combine
+    assert options.get("limits") == (limits and pytest.approx(limits))
+
+
 PRESS = "[[stroke]]\ndepth = 0.003\nwidth = 0.012\nmoves = [[0, -0.006, 0], [0.2, 0.006, 0]]\n"
 
 
@@ -378,10 +408,34 @@ def test_strokes_are_formed_and_kept_by_the_bed(small, tmp_path):
     assert bridge.pose(fingertip_of(small))[2] > 40e-3
 
 
+@pytest.mark.parametrize("kind, deepest", [("crease", (2.8, 3.1)), ("flatten", (-0.1, 0.1))])
+def test_creases_are_cut_and_flattened_without_a_touch(small, tmp_path, kind, deepest):
+    file, crease = tmp_path / "press.toml", f'{PRESS}brush = "crease"\n'
+    more = f'{PRESS}brush = "{kind}"\nfalloff = "constant"\n' if kind == "flatten" else ""
+    file.write_text(f"{crease}{more}", encoding="utf-8")
+    assert bpy.ops.digiclay.play_strokes(filepath=str(file)) == {"FINISHED"}
+    low, high = deepest
+    row = depths(small)[4, 4:7]
+    assert low < row.max() - (row.min() if kind == "flatten" else 0.0) < high
+
+
+def test_a_falloff_of_the_tool_is_that_of_its_brush_and_smooth_has_one(settings):
+    kinds = Brush.RAISE, Brush.SMOOTH, Brush.ERASE
+    assert [brush.find_falloff(settings, kind).name for kind in kinds] == [
+        "DEVICE",
+        "SMOOTH",
+        "DEVICE",
+    ]
+    settings.falloff = "SPHERE"
+    assert {brush.find_falloff(settings, kind).name for kind in kinds} == {"SPHERE"}
+
+
 @pytest.mark.parametrize(
     "text, said",
     [
         ("[[stroke", "line 1"),
+        (f'{PRESS}falloff = "bent"\n', "falloff must be one of"),
+        (f'{PRESS}falloff = "root"\n', r"Stroke 1 \(lower\) needs a method with a blister"),
         (f"{PRESS}wide = 3", "known key"),
         (f'{PRESS}{PRESS}brush = "raise"\n', r"Stroke 2 \(raise\) needs a method with a blister"),
     ],

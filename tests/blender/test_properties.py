@@ -118,6 +118,7 @@ def test_a_part_that_is_switched_off_is_left_out_and_each_method_keeps_parameter
             ("layout", "arrangement", "hexagonal", one, {"layout": {"arrangement": one}})
             for one in ARRANGEMENTS
         ),
+        ("layout", "pitch", 5.0, 4.0, {"layout": {"pitch": 4e-3}}),
     ],
 )
 def test_a_choice_gives_the_scene_of_a_file(section, name, before, value, table):

@@ -16,7 +16,8 @@ from digiclay.core.session import snapshot
 from digiclay.core.session.live_session import simulate_path
 from digiclay.recorded.takes import read_recording
 from digiclay.sessions import sculpting
-from digiclay.sessions.sculpting import change_stroke, find_device, queue_stroke
+from digiclay.sessions.forming import find_device
+from digiclay.sessions.sculpting import change_stroke, queue_stroke
 from digiclay.settings.devices import BEDS, make_scene
 from digiclay.strokes.nominal import find_nominal, find_radius
 from digiclay.strokes.stroke import Brush, draw, make_images, start

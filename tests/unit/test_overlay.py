@@ -26,6 +26,7 @@ from digiclay.overlay.sections import (
     lay_out,
     place_label,
 )
+from digiclay.strokes.stroke import Correction
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -42,7 +43,8 @@ def session(**changes):
     time = np.linspace(0.0, 10.0, 1001)
     told = Readings(
         name="Digital Clay", method="virtual_master", paused=False, waiting=False, factor=0.97,
-        errors=(2.1e-6, 4.6e-4), set_point=0.4, time=time, force=0.4 + 0.1 * np.sin(time), pins=(312, 40),
+        errors=(2.1e-6, 4.6e-4), correction=None, set_point=0.4, time=time,
+        force=0.4 + 0.1 * np.sin(time), pins=(312, 40),
         heights=np.column_stack([0.04 + 0.001 * np.sin(time), np.full(1001, 0.035)]),
         modes=np.array([600, 10, 0, 15, 0, 0, 0, 0, 0]), colors=tuple(COLORS[mode] for mode in Mode),
         seconds=5.0,
@@ -101,7 +103,15 @@ WORDS = {
     "nothing that is not known yet": (
         {"factor": None, "errors": None, "set_point": None, "time": EMPTY, "force": EMPTY,
          "heights": np.empty((0, 2)), "method": ""},
-        ("Solver error: not estimated yet", "Method: none"), ("real time", "set point"),
+        ("Solver error: not estimated yet", "Method: none"), ("real time", "set point", "Last stroke"),
+    ),
+    "what the valves corrected of the last stroke": (
+        {"correction": Correction(2.1e-3, 11.9e-3, made=True)},
+        ("0.46 mN | Last stroke corrected: 2.10 mm rms, 11.90 mm at most | ",), (),
+    ),
+    "a stroke that was left as it was": (
+        {"correction": Correction(5.3e-4, 2.8e-3, made=False)},
+        ("Last stroke left off nominal: 0.53 mm rms, 2.80 mm at most",), ("corrected",),
     ),
     "pins picked just now": ({"heights": np.full((1001, 2), np.nan)}, ("312: | 40:",), ()),
 }  # fmt: skip

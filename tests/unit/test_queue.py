@@ -11,7 +11,8 @@ from digiclay.core.base.arrays import Floats
 from digiclay.core.model.fingertip import LEVEL
 from digiclay.core.model.layout import Layout
 from digiclay.sessions import sculpting
-from digiclay.sessions.sculpting import change_stroke, find_device, queue_stroke
+from digiclay.sessions.forming import find_device
+from digiclay.sessions.sculpting import change_stroke, queue_stroke
 from digiclay.settings.devices import BEDS, make_scene
 from digiclay.strokes.nominal import find_ghosts
 from digiclay.strokes.stroke import Brush, lay_path, lay_ring, make_images, start

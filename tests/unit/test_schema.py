@@ -42,14 +42,21 @@ def test_an_empty_file_is_a_whole_scene_that_presses_once_and_a_written_one_name
     assert missing == []
 
 
-def test_quantities_may_have_a_unit_and_a_hexagonal_bed_shares_the_force_among_more_cells():
+def test_quantities_may_have_a_unit_and_a_cell_has_the_share_of_its_area():
     scene = resolve({"relaxation": {"times": ["4 ms", 0.07, "1.4 s"]}, "fluid": {"density": 900}})
     # The product of number and unit is rounded once.
     assert scene.section("relaxation").times == pytest.approx((4e-3, 0.07, 1.4), rel=1e-15)
     assert isinstance(scene.fluid.density, float)
-    bed = {"layout": {"arrangement": "hexagonal"}}
-    assert resolve(bed).section("contact").share == 0.29
-    assert resolve({**bed, "contact": {"share": 0.3}}).section("contact").share == 0.3
+    for pitch, arrangement, share in (
+        (3e-3, "aligned", 0.34),
+        (3e-3, "staggered", 0.34),
+        (3e-3, "hexagonal", 0.294449),
+        (4e-3, "aligned", 0.604444),
+        (2e-3, "hexagonal", 0.130866),
+    ):
+        bed = {"layout": {"pitch": pitch, "arrangement": arrangement}}
+        assert resolve(bed).section("contact").share == share
+        assert resolve({**bed, "contact": {"share": 0.3}}).section("contact").share == 0.3
 
 
 @pytest.mark.parametrize("preset", ["fast", "viscous"])

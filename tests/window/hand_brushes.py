@@ -112,7 +112,7 @@ def by_brush(blender):
     note(blender, "by brush")
     blender.shot("smooth_brush")
     process = line(blender, (-HALF, 0.0), (HALF, 0.0), *SLOWER, last="sleep 2")
-    yield from blender.until(lambda: any(one.reached for one in blender.session().strokes))
+    yield from blender.until(lambda: any(one.samples[3:] for one in blender.session().strokes))
     yield from act(blender, "key Escape sleep 0.2 mouseup 1")
     yield from finish(blender, process)
     note(blender, "escaped")

@@ -15,9 +15,9 @@ MIDDLE, ABOVE = (12, 12), (18, 12)
 
 
 @pytest.mark.parametrize("name, row", [("raised", 12), ("inverted", 5)])
-def test_a_quick_drag_of_60_mm_raises_all_its_columns_by_15_mm(seen, name, row):
+def test_a_quick_drag_of_60_mm_raises_all_its_columns_by_6_mm(seen, name, row):
     risen = up(seen, name)[row, COLUMNS]
-    assert (np.abs(risen - 15.0) < 2.0).mean() >= 0.95
+    assert (np.abs(risen - 6.0) < 2.0).mean() >= 0.95
 
 
 def test_ctrl_lowers_level_fills_a_valley_the_header_smooths_and_a_click_with_shift_forms_a_line(
@@ -36,8 +36,8 @@ def test_shift_and_a_drag_smooth_a_spike_in_one_stroke(seen):
     assert before[MIDDLE] == pytest.approx(1e3 * SPIKE, abs=1e-3)
     assert smoothed[MIDDLE] < 0.4e3 * SPIKE
     assert seen["smoothed"]["drawn"] == seen["before"]["drawn"] + 1
-    # What one pin gives the others get, and those outside the ring stay.
-    assert smoothed.sum() == pytest.approx(before.sum(), abs=625 * 0.01)
+    # Each pin comes between those about it, and those outside the ring stay.
+    assert -0.01 < smoothed.min() < smoothed.max() < before.max() + 0.01
     outside = np.abs(np.arange(25) - 12) > 3
     np.testing.assert_array_equal(smoothed[outside], before[outside])
     # It begins where the mouse went down, by 0.3 mm a pixel: a drag is told from a click after 3 of

@@ -40,7 +40,7 @@ def test_the_wheel_presses_deeper_and_ctrl_in_mid_stroke_draws_on_as_deep(seen):
 
 def test_the_text_at_the_cursor_says_what_a_press_does_now_and_what_is_being_formed(seen):
     lower, size = "Lower, depth 4 mm", "Size 16 mm   "
-    assert seen["LEFT_CTRL held"] == f"{size}Raise, height 15 mm"
+    assert seen["LEFT_CTRL held"] == f"{size}Raise, height 6 mm"
     assert seen["RIGHT_SHIFT held"] == f"{size}Smooth 100 %"
     free = ("LEFT_CTRL let go", "RIGHT_SHIFT let go", "moved without Ctrl", "the next one")
     assert {seen[name] for name in free} == {f"{size}{lower}"}

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 from ..core.base.errors import MethodError, OutputError, ParameterError
 from ..core.base.quantity import parse
 from ..core.files.tables import Table
-from ..core.scene.scene_source import Setting, find, load
+from ..core.scene.scene_source import Setting, find, load, read_parts
 from ..core.scene.schema import Scene
 
 #: The key of the control method in scene files.
@@ -61,6 +61,13 @@ SCENE_OPTIONS: Options = {
     "--method M": "control method, also one of your own, mine.py:Mine: the same as --set control.method=M",
     "--stepper S": "stepper: the same as --set simulation.stepper=S",
     "--tolerance T": 'largest error of the heights, such as "1 um": chooses the adaptive stepper',
+    "--with FILE": {
+        "dest": "parts",
+        "type": Path,
+        "action": "append",
+        "default": [],
+        "help": "take the parts of device and finger that a file gives, such as fitted.toml",
+    },
     "--set KEY=VALUE": {
         "dest": "settings",
         "type": _setting,
@@ -91,7 +98,8 @@ def scene_of(arguments: argparse.Namespace) -> tuple[Scene, Path]:
 
 def settings_of(arguments: argparse.Namespace) -> list[Setting]:
     """Return what the options of `add_scene` change of a scene file."""
-    settings = list(arguments.settings)
+    settings = [part for path in arguments.parts for part in read_parts(path)]
+    settings += arguments.settings
     for option, key in SET_BY.items():
         if getattr(arguments, option) is not None:
             settings.append(Setting(key, getattr(arguments, option), f"--{option}"))

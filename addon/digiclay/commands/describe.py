@@ -16,6 +16,7 @@ from ..core.session.memory_limit import (
     count_bytes_needed,
     measure_available_memory,
 )
+from ..core.session.plate import list_cautions
 from ..core.shapes.fitting import fit_shape
 from .arguments import add_scene, command, scene_of
 
@@ -125,6 +126,7 @@ def description(scene: Scene, system: System) -> Iterator[str]:
     layout = scene.layout
     pitch = human(layout.pitch, "m")
     yield f"  {layout.rows} x {layout.columns} = {scene.cells} cells, {pitch} apart, {layout.arrangement}"
+    yield from (_filled("caution", text) for text in list_cautions(scene))
     yield "\nThe pins"
     for name, text in _pins(scene, system):
         yield _filled(name, text)

@@ -19,6 +19,7 @@ from ..core.control.methods import list_added
 from ..core.files.run_folder import Claim, claim_folder, find_name
 from ..core.scene.schema import Scene
 from ..core.session.finished_run import require_surface
+from ..core.session.plate import list_cautions
 from ..core.session.run_scene import History, Result, run, save
 from .arguments import (
     QUIET,
@@ -140,7 +141,7 @@ def carry_out(arguments: Namespace) -> int:
             if fit:
                 result = replace(result, metrics={**result.metrics, "budget": noted(fit)})
             extras = _plan_extras(arguments, result)
-            return write_run(arguments, claim, result, extras, stop)
+            return write_run(arguments, claim, result, extras, stop, *list_cautions(scene))
 
 
 def _refuse_early(arguments: Namespace, scene: Scene) -> None:

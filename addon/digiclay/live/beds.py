@@ -121,12 +121,14 @@ def active_session(context: Context) -> tuple[Object, Running] | None:
 
 #: The state by `core.session.snapshot`, poses and numbers of the fingertips at it, the last tick;
 #: and in JSON the tick in which the stroke began that is being formed, or 0, those of the gestures
-#: before, and the strokes that are to be formed from that state, by `strokes.drawn`.
+#: before, and the strokes that are to be formed from that state, by `strokes.drawn`; the heights
+#: that strokes count from.
 STATE = "digiclay_state"
 POSE = "digiclay_pose"
 NUMBERS = "digiclay_fingers"
 TICK = "digiclay_moment"
 QUEUE = "digiclay_strokes"
+BASE = "digiclay_base"
 
 
 def write(bed: Object, running: Running, before: Running | None = None) -> None:
@@ -144,8 +146,8 @@ def write(bed: Object, running: Running, before: Running | None = None) -> None:
     ticks = [gesture.tick for gesture in running.gestures if gesture.tick < now.tick]
     queue = json.dumps([started, ticks, list(map(drawn.dump, running.drawn))])
     names = bytes(name_fingers(running.numbers, len(now.poses)))
-    values = (STATE, now.snapshot), (POSE, now.poses.tobytes()), (NUMBERS, names), (QUEUE, queue)
-    for name, data in values:
+    stored = now.snapshot, now.poses.tobytes(), names, queue, running.base.tobytes()
+    for name, data in zip((STATE, POSE, NUMBERS, QUEUE, BASE), stored, strict=True):
         # Blender takes bytes that are assigned over others for a text: it stops at the first 0,
         # and corrupts its memory where the lengths differ.
         bed.pop(name, None)
@@ -171,7 +173,7 @@ def put(running: Running) -> None:
 
 def clear(bed: Object) -> None:
     """Remove all session data: the bed is at rest."""
-    for name in (STATE, POSE, NUMBERS, TICK, QUEUE):
+    for name in (STATE, POSE, NUMBERS, TICK, QUEUE, BASE):
         bed.pop(name, None)
 
 
@@ -197,6 +199,16 @@ def read_numbers(bed: Object) -> tuple[int, ...]:
     numbers = tuple(value) if isinstance(value, bytes) else ()
     valid = 0 < len(numbers) == len(set(numbers)) <= len(FINGERS) and min(numbers) > 0
     return numbers if valid else (1,)
+
+
+def read_base(bed: Object) -> Floats | None:
+    """Return the stored base (k,), m, None without one; it is empty where it is unusable."""
+    value = bed.get(BASE)
+    if value is None:
+        return None
+    usable = isinstance(value, bytes) and len(value) % 8 == 0
+    base = np.frombuffer(value if usable else b"", np.float64).copy()
+    return base if np.isfinite(base).all() else base[:0]
 
 
 def read_tick(bed: Object) -> int:

@@ -56,6 +56,13 @@ def start(context: Context, bed: Object) -> list[Note]:
         raise DigiclayError(f"The session of {bed.name} cannot start: {reason}.")
     numbers, was, poses = tuple(fingertips_of(bed)), beds.read_numbers(bed), bridge.poses(bed)
     stood, (*_, lines) = beds.read_poses(bed), beds.read_queue(bed)
+    base, unfit = beds.read_base(bed), ""
+    if base is not None and base.size != scene.cells:
+        unfit = localize(
+            "The stored base must have the bed's {} pins (got {}): the surface is the base",
+            scene.cells,
+            base.size,
+        )
     if lines and stood is not None:  # the fingertip has come along a stroke, which begins anew
         poses = running.match_poses(stood, was, poses, numbers)
     begun, fault = sculpting.begin_session(
@@ -67,6 +74,7 @@ def start(context: Context, bed: Object) -> list[Note]:
         beds.read_tick(bed),
         numbers,
         was,
+        base,
     )
     begun = stored.add_strokes(begun, lines)
     show(bed, replace(begun, settings=settings))
@@ -78,7 +86,7 @@ def start(context: Context, bed: Object) -> list[Note]:
         if damaged
         else ""
     )
-    faults = [Note("WARNING", f"{bed.name}: {each}") for each in (fault, words) if each]
+    faults = [Note("WARNING", f"{bed.name}: {each}") for each in (fault, words, unfit) if each]
     return [*(Note("INFO", words) for words in notes if words), *faults]
 
 
@@ -88,7 +96,7 @@ def stop(uid: int) -> str:
     bed = find_bed(uid, ended.name) if ended else None
     if ended is not None and bed is not None and ended.stroke_start:
         # The stroke is then kept whole, from its beginning.
-        back = sculpting.restore(ended, ended.standing.snapshot, ended.standing.poses)
+        back = sculpting.restore_moment(ended, ended.standing)
         show(bed, replace(back, strokes=ended.strokes, stroke_start=None))
     running.drop(uid)
     follow.end(uid)
@@ -144,7 +152,7 @@ def take_up(context: Context, bed: Object, session: Running) -> Running:
     if poses is None:
         others = session.poses[:1].repeat(len(was), axis=0)
         poses = running.match_poses(session.poses, session.numbers, others, was)
-    back = stored.take_up(session, beds.read_snapshot(bed), poses, was, *queue)
+    back = stored.take_up(session, beds.read_snapshot(bed), poses, was, *queue, beds.read_base(bed))
     if queue[-1]:
         place_fingers(context, bed, back)
     return back
@@ -223,7 +231,7 @@ def _advance_session(
             session, poses, now, most, view.picked_pins(bed), loop.find_interval(context), moment
         )
     except (DivergenceError, MethodError) as error:
-        back = sculpting.restore(session, session.standing.snapshot, session.standing.poses)
+        back = sculpting.restore_moment(session, session.standing)
         later = replace(drop_strokes(back), paused=True)
         yield Note(
             "ERROR", localize("The session of {} is paused: {}", bed.name, error), session.uid

@@ -108,6 +108,12 @@ def invert_locks(operator: Operator, context: Context) -> Result | None:
     return _tell_all(operator, context, Brush.INVERT_LOCKS)
 
 
+@action("digiclay.press_base", "Set Base", no_tool_in_view, no_finger, options=("UNDO",))
+def set_base(operator: Operator, context: Context) -> Result | None:
+    """Count heights and depths from the surface as it stands, strokes of the queue included"""
+    return _tell_all(operator, context, Brush.SET_BASE)
+
+
 @action("digiclay.press_locks_clear", "Clear Locks", no_tool_in_view, no_finger, options=("UNDO",))
 def clear_locks(operator: Operator, context: Context) -> Result | None:
     """Unlock all pins"""

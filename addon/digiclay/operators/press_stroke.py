@@ -17,10 +17,12 @@ from ..sessions import running, sculpting
 from ..sessions.running import find_stroke, last_place
 from ..sessions.sculpting import change_stroke, queue_stroke
 from ..settings.declared import choice, flag, integer, number, text, title
+from ..strokes.falloff import Falloff
 from ..strokes.stroke import (
     DEEPEST,
     FEWEST,
     MOST,
+    PLACED,
     STAMPS,
     Brush,
     Place,
@@ -32,6 +34,7 @@ from ..strokes.stroke import (
     lay_ring,
     lay_square,
     let_go,
+    needs_blister,
     pull,
     start,
 )
@@ -81,7 +84,7 @@ class PressSettings:
     )
     height: millimeters(
         "Height",
-        15e-3,
+        6e-3,
         "How far a stroke of Raise, or a stamp, goes above the surface, in mm",
         min=0.1,
         max=1e3 * DEEPEST,
@@ -110,10 +113,36 @@ class PressSettings:
     axis: number("Axis", "Turn of the mirror's axes", default=0.0, subtype="ANGLE", step=1000)
     stamp: choice("Stamp", "Shape that is stamped", items=brush.STAMP_ITEMS, default="heart")
     stamp_file: text("File", "Mesh, picture or .npy file that is stamped", subtype="FILE_PATH")
+    falloff: choice(
+        "Falloff",
+        "Flanks of Raise, Lower and Level, and effect of brushes in the ring; that of Lock is constant",
+        items=brush.FALLOFF_ITEMS,
+        default="DEVICE",
+    )
     accumulate: flag(
         "Accumulate",
-        "Where a stroke returns to what it has formed, it starts from the new surface",
+        "Build on the surface as it is: where strokes meet, or one returns, heights and depths add. "
+        "Else Raise and Lower count from the base",
         default=False,
+    )
+    combine: choice(
+        "Combine",
+        "What Level and Stamp leave where something is formed already",
+        items=brush.COMBINE_ITEMS,
+        default="USUAL",
+    )
+    use_limit: flag("Limit", "Form nothing below and above two heights", default=False)
+    limit_low: millimeters(
+        "Lowest", -10e-3, "Height above rest below which nothing is formed", **PLACE
+    )
+    limit_high: millimeters(
+        "Highest", 10e-3, "Height above rest above which nothing is formed", **PLACE
+    )
+    finish: choice(
+        "Finish",
+        "What becomes of the pins when the fingertip of Lower, Raise or Level has left",
+        items=brush.FINISH_ITEMS,
+        default="NOMINAL",
     )
     path: choice("Stroke", "Path of a stroke", items=brush.PATH_ITEMS, default="FREE")
     stabilizer: millimeters(
@@ -162,7 +191,8 @@ class Press(PressSettings, Modal, Operator):
         target = find_pressed(self, context, brush.find_press(context, event))
         if target is None:
             return NOT_PRESSED
-        session = open_session(self, context, target.bed, self.kind)
+        options = brush.find_options(self, self.kind)
+        session = open_session(self, context, target.bed, self.kind, options["falloff"])
         if session is None:
             return {"CANCELLED"}
         # The hand draws on the surface it has seen when it began, not on pins that give way under
@@ -175,9 +205,7 @@ class Press(PressSettings, Modal, Operator):
         self.lagged = place = float(target.point[0]), float(target.point[1])
         depth, share = self._amount()
         images = brush.find_images(self)
-        stroke = start(
-            0, *place, depth, images, self.kind, share, self.lean, accumulate=self.accumulate
-        )
+        stroke = start(0, *place, depth, images, self.kind, share, self.lean, **options)
         session, self.number = queue_stroke(session, stroke)
         running.put(session)
         self._show(context)
@@ -207,7 +235,7 @@ class Press(PressSettings, Modal, Operator):
         if event.type in MOVES:
             self._move(context, bed, event)
         elif event.type in WHEELS and event.ctrl and self.kind.has_amount:
-            self._deepen(WHEELS[event.type] if self.kind is Brush.RAISE else -WHEELS[event.type])
+            self._deepen(WHEELS[event.type] if self.kind.rises else -WHEELS[event.type])
         elif event.type == "LEFTMOUSE":
             self._move(context, bed, event)
             self._change(let_go)
@@ -306,7 +334,11 @@ def find_pressed(operator: Operator, context: Context, xy: Place) -> aim.Target 
 
 
 def open_session(
-    operator: Operator, context: Context, bed: Object, kind: Brush
+    operator: Operator,
+    context: Context,
+    bed: Object,
+    kind: Brush,
+    falloff: Falloff = Falloff.DEVICE,
 ) -> running.Running | None:
     """Return the session of a bed for a stroke, started if there is none; or report why it cannot be."""
     try:
@@ -325,12 +357,12 @@ def open_session(
     except (DigiclayError, RuntimeError) as error:
         operator.report({"ERROR"}, str(error).removeprefix("Error: ").strip())
         return None
-    if kind.needs_blister and find_tracking(session.scene, session.system) is None:
+    if needs_blister(kind, falloff) and find_tracking(session.scene, session.system) is None:
         names = brush.LABELS[kind], title(session.scene.method)
         inform(operator, NO_BLISTER, *map(localize, names), level="ERROR")
         return None
     if (
-        kind in (Brush.SMOOTH, *STAMPS)
+        kind in (Brush.SMOOTH, *PLACED)
         and session.scene.control
         and METHODS[session.scene.method].recovers
     ):
@@ -466,17 +498,18 @@ def _lay_stroke(settings: OperatorProperties, path: Floats | list[Place], kind: 
     share = float(settings.strength)
     depth = 1e-3 * share * getattr(settings, brush.amount_name(kind))
     (x, y), images, stamp = path[0], brush.find_images(settings), brush.find_stamp(settings, kind)
-    laid = start(0, x, y, depth, images, kind, share, accumulate=settings.accumulate, stamp=stamp)
-    return lay_path(laid, path)
+    options = brush.find_options(settings, kind)
+    return lay_path(start(0, x, y, depth, images, kind, share, stamp=stamp, **options), path)
 
 
 def _queue_path(
     operator: Operator, context: Context, bed: Object, path: Floats | list[Place], kind: Brush
 ) -> Result:
     """Queue a path for the fingertip, as the tool's settings have it."""
-    session = open_session(operator, context, bed, kind)
+    stroke = _lay_stroke(brush.tool_settings(context), path, kind)
+    session = open_session(operator, context, bed, kind, stroke.falloff)
     if session is None:
         return {"CANCELLED"}
-    session, _ = queue_stroke(session, _lay_stroke(brush.tool_settings(context), path, kind))
+    session, _ = queue_stroke(session, stroke)
     beds.put(session)
     return {"FINISHED"}

@@ -258,6 +258,7 @@ class ReplayTake(TimedAction, Operator):
             tick_count,
             numbers,
             running.name_fingers(numbers, system.fingers),
+            self._take.base,
         )
         beds.write(bed, begun[0])
         view.show_state(bed, system, self._state)

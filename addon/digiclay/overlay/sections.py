@@ -11,6 +11,7 @@ from ..core.base.arrays import Floats, Indices
 from ..core.base.modes import Mode
 from ..core.model.touch import MOST_FORCE, MOST_INDENTATION
 from ..device import heat
+from ..strokes.stroke import Correction
 from ..ui_text import localize
 from .picture import (
     LINES,
@@ -55,6 +56,8 @@ class Readings:
     #: Estimated errors of the heights, m, and of a cell's force, N; None before there is an
     #: estimate.
     errors: tuple[float, float] | None
+    #: What the valves had to correct of the last press stroke; None where no finger formed it.
+    correction: Correction | None
     #: Total force asked for now, N.
     set_point: float | None
     #: (t,), the last seconds: simulated time, s, and total force, N.
@@ -165,6 +168,16 @@ def error_message(errors: Sequence[float] | None) -> str:
     )
 
 
+def correction_message(correction: Correction | None) -> str:
+    """Return the text of how far the last stroke was from its nominal surface; empty without any."""
+    if correction is None:
+        return ""
+    words = "Last stroke corrected: {:.2f} mm rms, {:.2f} mm at most"
+    if not correction.made:
+        words = "Last stroke left off nominal: {:.2f} mm rms, {:.2f} mm at most"
+    return localize(words, 1e3 * correction.rms, 1e3 * correction.largest)
+
+
 def effort_message(effort: tuple[float, ...]) -> str:
     """Return the text of the time that a take took, s, and of its errors, or of what is not known."""
     if not effort:
@@ -198,6 +211,8 @@ def _draw_head(pen: Pen) -> None:
     pen.row(readings.name, describe_state(readings))
     pen.row(localize("Method: {}", localize(readings.method.replace("_", " ") or "none")))
     pen.row(error_message(readings.errors), small=True)
+    if readings.correction:
+        pen.row(correction_message(readings.correction), small=True)
     pen.leave()
 
 

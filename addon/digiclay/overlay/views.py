@@ -97,6 +97,7 @@ def read_session(
         waiting=bool(session.blocking_reason),
         factor=session.clock.factor or None,
         errors=None if errors is None else (errors.height, errors.force),
+        correction=session.correction,
         set_point=wanted if math.isfinite(wanted) else None,
         time=trace.time,
         force=trace.force,

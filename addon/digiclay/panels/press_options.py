@@ -54,7 +54,15 @@ def stroke_options(column: UILayout, settings: OperatorProperties) -> None:
     # From a popover an operator would be called in the header.
     column.operator_context = "INVOKE_REGION_WIN"
     column.operator("digiclay.press_center", icon="PIVOT_CURSOR")
+    column.prop(settings, "falloff")
     column.prop(settings, "accumulate")
+    column.operator("digiclay.press_base", icon="FILE_REFRESH")
+    column.prop(settings, "combine")
+    column.prop(settings, "use_limit")
+    if settings.use_limit:
+        column.prop(settings, "limit_low")
+        column.prop(settings, "limit_high")
+    column.prop(settings, "finish")
 
 
 @popover("DIGICLAY_PT_press_pen", "Pen")

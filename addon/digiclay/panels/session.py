@@ -2,7 +2,7 @@
 
 from ..compat import Context, UILayout
 from ..live import beds, follow
-from ..overlay.sections import effort_message, error_message
+from ..overlay.sections import correction_message, effort_message, error_message
 from ..recorded import bake, takes
 from ..roles import bed_of
 from ..sessions import running
@@ -70,6 +70,7 @@ def _numbers(layout: UILayout, session: Running) -> None:
         words = localize("Speed: {:.2f} × real time", factor)
         column.label(text=words, icon="ERROR" if factor < 0.9 else "NONE")
     draw_lines(column, error_line(session), "NONE")
+    draw_lines(column, correction_message(session.correction), "NONE")
 
 
 def _measure_recording(session: Running) -> float:

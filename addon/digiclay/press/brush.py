@@ -4,6 +4,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import astuple, dataclass
 from pathlib import Path
+from typing import Any
 
 from ..compat import Context, Event, Object, OperatorProperties, bpy
 from ..core.files.tables import Record
@@ -13,8 +14,9 @@ from ..core.shapes.heightmap import HeightMap
 from ..live import beds
 from ..roles import bed_of, is_bed
 from ..settings import devices
+from ..strokes.falloff import Falloff
 from ..strokes.stamps import load_stamp
-from ..strokes.stroke import LOCKS, STAMPS, Brush, Image, make_images
+from ..strokes.stroke import COMBINATIONS, LOCKS, STAMPS, Brush, Combine, Image, make_images
 from ..ui_text import localize
 
 #: Semi-axes that differ by less are the same, m.
@@ -65,10 +67,15 @@ ADJUSTING = {
 }
 LABELS = {brush: brush.value.replace("_", " ").title() for brush in Brush}
 BRUSH_WORDS = {
-    Brush.LOWER: "Press a valley of the given depth. With Ctrl: Raise",
-    Brush.RAISE: "Press lightly, lift the blister by the given height, and draw it along: a ridge. "
+    Brush.LOWER: "Press a valley of the given depth, to which the valves bring the pins in the end, "
+    "unless Finish is As Left. With Ctrl: Raise",
+    Brush.RAISE: "Press lightly, lift the blister by the given height, and draw it along: a ridge, "
+    "to whose nominal form the valves bring the pins in the end, unless Finish is As Left. "
     "With Ctrl: Lower",
     Brush.LEVEL: "Bring hills and hollows to the height of the surface under the first touch",
+    Brush.FLATTEN: "Bring the pins in the ring to the plane that fits them best, without a touch; "
+    "none moves farther than the depth",
+    Brush.CREASE: "Cut a sharp crease of the given depth, without a touch. With Ctrl: a sharp crest",
     Brush.SMOOTH: "Drive the pins in the ring to smoothed heights, without a touch. "
     "Shift and drag: with any brush",
     Brush.ERASE: "Drive the pins in the ring back to rest, without a touch",
@@ -83,6 +90,18 @@ SYMMETRY_ITEMS = (
     ("Y", "Y", "Form the stroke and its mirror image across the axis along the bed's x"),
     ("XY", "X and Y", "Form the stroke and its three mirror images"),
     ("RADIAL", "Radial", "Form the stroke and its images rotated about the center"),
+)
+FALLOFF_WORDS = {
+    Falloff.DEVICE: "Profile of the blister; of brushes that press nothing, their own falloff",
+    Falloff.SMOOTH: "Rounded at both ends",
+    Falloff.SPHERE: "Rounded, steep at the rim",
+    Falloff.ROOT: "Broad, steep at the rim",
+    Falloff.SHARP: "Pointed, flat at the rim",
+    Falloff.LINEAR: "Straight",
+    Falloff.CONSTANT: "Full up to the rim",
+}
+FALLOFF_ITEMS = tuple(
+    (kind.value, kind.value.title(), words) for kind, words in FALLOFF_WORDS.items()
 )
 #: Settings of a placed symmetry, and the shortest drag that turns its axis, m.
 PLACED, SHORT = ("symmetry", "center_x", "center_y", "axis"), 1e-3
@@ -119,11 +138,46 @@ STAMP_ITEMS = (
     *((name, name.replace("_", " ").title(), "") for name in list_shapes()),
     (FILE, "File", "A mesh, a picture (bright is high) or a .npy file of heights"),
 )
+FINISH_ITEMS = (
+    (
+        "NOMINAL",
+        "Nominal",
+        "When the fingertip has left, the valves bring the pins to the nominal surface of the "
+        "stroke, which has exactly its depth or height",
+    ),
+    ("AS_LEFT", "As Left", "The pins stay as the finger and the control method have left them"),
+)
 PATH_ITEMS = (
     ("FREE", "Free", "Drag to draw the path"),
     ("LINE", "Line", "Drag from one end of the line to the other; it is formed on release"),
     ("RING", "Ring", "Drag from the center of the ring to its rim; it is formed on release"),
 )
+
+COMBINE_ITEMS = (
+    ("USUAL", "As Usual", "Level replaces the surface, Stamp adds to it"),
+    ("HIGHEST", "Highest", "The higher one of the surface and of what is formed on the base"),
+    ("LOWEST", "Lowest", "The lower one of the surface and of what is formed on the base"),
+    ("ADD", "Add", "What is formed on the base is put onto the surface"),
+    ("REPLACE", "Replace", "What is formed on the base replaces the surface"),
+)
+#: How Raise and Lower combine unless they accumulate.
+EXTREMES = {Brush.RAISE: Combine.HIGHEST, Brush.LOWER: Combine.LOWEST}
+
+
+def find_options(settings: OperatorProperties, brush: Brush) -> dict[str, Any]:
+    """Return what the settings of the tool say of a stroke beside its path: fields of `Stroke`."""
+    combine = Combine.USUAL
+    if brush in EXTREMES:
+        combine = combine if settings.accumulate else EXTREMES[brush]
+    elif brush in COMBINATIONS:
+        combine = Combine(settings.combine)
+    falloff = find_falloff(settings, brush)
+    options = {"accumulate": settings.accumulate, "falloff": falloff, "combine": combine}
+    options["as_left"] = settings.finish == "AS_LEFT"
+    if settings.use_limit:
+        low, high = sorted((1e-3 * settings.limit_low, 1e-3 * settings.limit_high))
+        options["limits"] = low, high
+    return options
 
 
 def tool_settings(context: Context) -> OperatorProperties | None:
@@ -165,6 +219,13 @@ def find_path(settings: OperatorProperties, brush: Brush) -> str:
     return "STAMP" if brush in STAMPS else str(settings.path)
 
 
+def find_falloff(settings: OperatorProperties, brush: Brush) -> Falloff:
+    """Return the falloff of a brush, by the settings of the tool; Smooth has one in any case."""
+    falloff = Falloff(settings.falloff)
+    own = (brush, falloff) == (Brush.SMOOTH, Falloff.DEVICE)
+    return Falloff.SMOOTH if own else falloff
+
+
 def find_stamp(settings: OperatorProperties, brush: Brush) -> HeightMap | None:
     """Return what a brush stamps; a DigiclayError where it cannot be read."""
     if brush not in STAMPS:
@@ -188,7 +249,7 @@ def describe_brush(finger: Fingertip, brush: Brush, depth: float, strength: floa
 
 def describe_stroke(brush: Brush, depth: float, strength: float = 1.0) -> str:
     """Return a brush, and its depth or height (m) times strength, in mm."""
-    if brush in LOCKS:
+    if brush in (*LOCKS, Brush.SET_BASE):
         return localize(LABELS[brush])
     if not brush.has_amount:
         return f"{localize(LABELS[brush])} {100.0 * strength:.0f} %"

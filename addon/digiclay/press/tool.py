@@ -24,8 +24,8 @@ from ..sessions import running
 from ..sessions.running import list_pressing
 from ..settings import devices
 from ..strokes.nominal import find_radius
-from ..strokes.stroke import LOCKS, STAMPS, Brush, Place, lay_ring, lay_square
-from ..strokes.sweep import SWEEPS, estimate_time
+from ..strokes.stroke import LOCKS, RINGED, STAMPS, Brush, Place, lay_ring, lay_square
+from ..strokes.sweep import estimate_time
 from ..ui_text import localize
 from . import aim
 from .brush import (
@@ -112,7 +112,7 @@ def draw_on_bed(
 
 #: Widths from which on a header names popovers in full, and has a button for each brush, in pixels
 #: at a resolution scale of 1.
-WIDE, WIDEST = 1000, 1450
+WIDE, WIDEST = 1000, 1640
 #: Widths of what it holds, in Blender's units of 20 pixels.
 BRUSH, SIZE, AMOUNT, STRENGTH = 4.6, 6.6, 6.6, 5.4
 
@@ -188,7 +188,7 @@ def find_outline(
     radius = find_radius(finger, layout)
     if brush in STAMPS:
         return lay_square((0.0, 0.0), (radius, 0.0))[:-1]
-    if brush in SWEEPS:
+    if brush in RINGED:
         return find_contact_outline(Fingertip(radius, radius, radius), turn, radius)
     return find_contact_outline(finger, turn, depth)
 
@@ -217,7 +217,7 @@ def _draw_cursor(context: Context, tool: WorkSpaceTool, xy: tuple[int, int]) -> 
     paths = map_paths(partial(drape, target.grid, target.height), [*rims, *_trail(target)])
     paths += find_axes(target.grid, target.height, settings)
     text = describe(target.bed, settings) if preferences.get(context).show_cursor_text else ""
-    color = SMOOTHING if brush in SWEEPS else LIGHT
+    color = SMOOTHING if brush in RINGED else LIGHT
     draw_on_bed(context, target.bed, paths, text, xy, color, corner)
 
 
@@ -314,6 +314,7 @@ class PressTool(bpy.types.WorkSpaceTool):
         ("digiclay.press_size", {"type": "F", "value": "PRESS"}, None),
         ("digiclay.press_depth", {"type": "F", "value": "PRESS", "shift": True}, None),
         ("digiclay.press_strength", {"type": "F", "value": "PRESS", "ctrl": True}, None),
+        ("digiclay.press_base", {"type": "Y", "value": "PRESS"}, None),
         _scale_key("LEFT_BRACKET", 1.0 / 1.1),
         _scale_key("RIGHT_BRACKET", 1.1),
     )

@@ -21,8 +21,10 @@ from ..device.instant import find_ellipsoid
 from ..sessions.running import Running, find_stroke
 from ..sessions.sculpting import change_scene, follow_finger, queue_stroke
 from ..settings.devices import BEDS, change_finger
+from ..strokes.falloff import Falloff
 from ..strokes.stamps import load_stamp
 from ..strokes.stroke import (
+    COMBINATIONS,
     DEEPEST,
     FEWEST,
     MOST,
@@ -30,11 +32,13 @@ from ..strokes.stroke import (
     STAMPS,
     SYMMETRIES,
     Brush,
+    Combine,
     Image,
     lay_line,
     lay_path,
     lay_ring,
     make_images,
+    needs_blister,
     pull,
     start,
 )
@@ -81,8 +85,30 @@ class PointerStroke(Parameters):
         0.0, "turn of the mirrors' axes, in degrees", at_least=-360.0, at_most=360.0
     )
     stamp: str = quantity("heart", "what is stamped: a sample shape's name, or a file")
+    combine: str = quantity(
+        Combine.USUAL.value.lower(),
+        "what the stroke leaves where something is formed",
+        choices=tuple(combine.value.lower() for combine in Combine),
+    )
+    limit_low: float = quantity(
+        -1.0, "lowest that it forms above rest", unit="m", at_least=-1.0, at_most=1.0
+    )
+    limit_high: float = quantity(
+        1.0, "highest that it forms above rest", unit="m", at_least=-1.0, at_most=1.0
+    )
     accumulate: bool = quantity(
         False, "whether a path that comes back counts from what it has left there"
+    )
+    falloff: str = quantity(
+        "device",
+        "flanks of Raise, Lower and Level, and effect of other brushes in the ring; device: those of "
+        "blister and brush, Smooth and Erase as the valves sweep them",
+        choices=tuple(falloff.value.lower() for falloff in Falloff),
+    )
+    finish: str = quantity(
+        "nominal",
+        "whether the valves bring the pins to the nominal surface when the fingertip has left",
+        choices=("nominal", "as_left"),
     )
     stabilizer: float = quantity(
         0.0, "lag behind the pointer", unit="m", at_least=0.0, at_most=50e-3
@@ -104,6 +130,14 @@ class PointerStroke(Parameters):
         if wrong:
             rule = "must be lists of time, x and y, finite numbers"
             raise ParameterError("PointerStroke", "moves", rule, str(list(wrong[0])))
+        combinations = COMBINATIONS.get(self.kind, (Combine.USUAL,))
+        if Combine(self.combine.upper()) not in combinations:
+            names = ", ".join(combine.value.lower() for combine in combinations)
+            rule = f"must be one of {names} with {self.kind.value.lower()}"
+            raise ParameterError("PointerStroke", "combine", rule, repr(self.combine))
+        if self.limit_low > self.limit_high:
+            rule = f"must be at most limit_high, {self.limit_high:g} m"
+            raise ParameterError("PointerStroke", "limit_low", rule, f"{self.limit_low:g} m")
         times = [move[0] for move in self.moves]
         late = (
             [times[0]]
@@ -119,6 +153,11 @@ class PointerStroke(Parameters):
         """Brush that the stroke is formed with."""
         brush = Brush(self.brush.upper())
         return brush.inverse if self.ctrl else brush
+
+    @property
+    def shape(self) -> Falloff:
+        """Falloff that the stroke is formed with."""
+        return Falloff(self.falloff.upper())
 
     @property
     def amount(self) -> float:
@@ -190,7 +229,8 @@ def play_strokes(running: Running, strokes: tuple[PointerStroke, ...]) -> Iterat
     usual = running.scene
     for number, stroke in enumerate(strokes, 1):
         running = _take_finger(running, usual, stroke.size_finger(find_ellipsoid(usual)))
-        if stroke.kind.needs_blister and find_tracking(running.scene, running.system) is None:
+        needed = needs_blister(stroke.kind, stroke.shape)
+        if needed and find_tracking(running.scene, running.system) is None:
             raise StateError(
                 f"Stroke {number} ({stroke.kind.value.lower()}) needs a method with a blister."
             )
@@ -217,7 +257,15 @@ def _play(running: Running, stroke: PointerStroke, number: int) -> Iterator[Runn
     path = LAYS[stroke.path](places[0], places[-1]) if stroke.path in LAYS else lagged
     stamp = load_stamp(stroke.stamp) if stroke.kind in STAMPS else None
     begun = start(0, *places[0], stroke.amount, stroke.images, stroke.kind, stroke.strength)
-    begun = replace(begun, accumulate=stroke.accumulate, stamp=stamp)
+    begun = replace(
+        begun,
+        accumulate=stroke.accumulate,
+        stamp=stamp,
+        falloff=stroke.shape,
+        combine=Combine(stroke.combine.upper()),
+        limits=(stroke.limit_low, stroke.limit_high),
+        as_left=stroke.finish == "as_left",
+    )
     running, queued = queue_stroke(running, lay_path(begun, path))
     first = running.state.period
     while find_stroke(running, queued) is not None:

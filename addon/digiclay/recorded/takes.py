@@ -69,7 +69,9 @@ def find(bed: Object, number: str = "") -> Entry:
 def read_recording(session: Running) -> Take | None:
     """Return what a session has recorded, or None when that is nothing yet."""
     recording = session.recording
-    return None if recording is None else make_take(session.scene, recording, session.snapshot)
+    if recording is None:
+        return None
+    return make_take(session.scene, recording, session.snapshot, session.base)
 
 
 def add(bed: Object, take: Take, name: str = "", session: Running | None = None) -> Entry:

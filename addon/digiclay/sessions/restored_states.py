@@ -1,7 +1,8 @@
-"""What sessions take up of snapshots: state and fingertips. No Blender."""
+"""What sessions take up of snapshots: state, fingertips, base. No Blender."""
 
 from dataclasses import replace
 
+from ..core.base.arrays import Floats
 from ..core.base.errors import StateError
 from ..core.engine.simulation import begin
 from ..core.engine.state import State
@@ -15,6 +16,12 @@ from ..ui_text import localize
 CHANGED = "Only the heights were kept: the bed's parts or its method have changed"
 #: Numbers of fingertips.
 Numbers = tuple[int, ...]
+
+
+def fit_base(base: Floats | None, state: State) -> Floats:
+    """Return the base (n,), m, of a state: a stored one, or the surface where that has other pins."""
+    surface = state.row(0)
+    return surface if base is None or base.size != surface.size else base
 
 
 def load_state(system: System, stored: bytes | None) -> tuple[State, str]:

@@ -11,7 +11,7 @@ from ..core.base.arrays import Floats
 from ..core.model.fingers import MOST_FINGERS
 from ..core.session.live_session import Clock, LiveSession, Moment
 from ..core.session.recent_trace import RecentTrace
-from ..strokes.stroke import Place, Stroke
+from ..strokes.stroke import Correction, Place, Stroke
 
 if TYPE_CHECKING:
     from bpy.types import Object
@@ -43,6 +43,8 @@ class Running(LiveSession):
     snapshot: bytes
     #: Counts ticks and never decreases, not even by undo.
     tick: int
+    #: (n,), heights that strokes count from, m.
+    base: Floats
     clock: Clock
     trace: RecentTrace
     #: By the user.
@@ -73,13 +75,17 @@ class Running(LiveSession):
     finished_strokes: int = 0
     #: Where the last finished stroke ended, x and y, m.
     last_place: Place | None = None
+    #: What the valves had to correct of it; None where no finger formed it.
+    correction: Correction | None = None
     #: Stored settings of the bed that `scene` was made of; None: unknown.
     settings: tuple[Any, ...] | None = None
 
     @property
     def standing(self) -> Moment:
         """What the bed stores beside drawn strokes: all but the stroke that is being formed."""
-        return self.stroke_start or Moment(self.state.period, self.snapshot, self.poses, self.tick)
+        return self.stroke_start or Moment(
+            self.state.period, self.snapshot, self.poses, self.tick, self.base
+        )
 
     @property
     def drawn(self) -> tuple[Stroke, ...]:

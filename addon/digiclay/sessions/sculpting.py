@@ -8,23 +8,24 @@ from typing import Any
 import numpy as np
 
 from ..core.base.arrays import Floats
-from ..core.base.modes import Mode
 from ..core.control.orders import Orders
 from ..core.engine.state import State
 from ..core.model.fingers import MOST_FINGERS
 from ..core.scene.assembly import assemble
 from ..core.scene.schema import Scene
 from ..core.session import accuracy, live_session, recent_trace, snapshot
-from ..device.instant import CLEARANCE, find_ellipsoid
+from ..core.session.live_session import Moment
+from ..device.instant import CLEARANCE
 from ..strokes import drawn
 from ..strokes.motion import begin as begin_stroke
 from ..strokes.motion import follow, follow_images
-from ..strokes.nominal import Device
 from ..strokes.pose import turn_image
-from ..strokes.stroke import FINISHING, Stroke
+from ..strokes.stroke import FINISHING, Brush, Stroke
 from ..strokes.sweep import SWEEPS, WHOLE, finish, order_all, sweep
-from ..strokes.tracking import find_blister, find_tracking
-from .restored_states import Numbers, change_fingers, load_state
+from ..strokes.tracking import find_tracking
+from ..ui_text import localize
+from .forming import find_device
+from .restored_states import CHANGED, Numbers, change_fingers, fit_base, load_state
 from .running import Gesture, Running, find_stroke, list_pressing, match_poses, name_fingers
 
 #: How many gestures can be taken back, and the most memory their states may take, bytes.
@@ -51,11 +52,12 @@ def begin_session(
     tick: int = 0,
     numbers: Numbers | None = None,
     was: Numbers | None = None,
+    base: Floats | None = None,
 ) -> tuple[Running, str]:
     """Begin a session from a snapshot, at rest without one; return it, and what of the snapshot was lost.
 
     `numbers`: of the fingertips, behind those of the scene others like its first one; `was`: of
-    those that the snapshot has.
+    those that the snapshot has. `base`: (n,) heights that strokes count from, m; None: the surface.
     """
     fingers = len(scene.fingers)
     numbers = numbers or tuple(range(1, fingers + 1))
@@ -64,6 +66,7 @@ def begin_session(
     state, lost = load_state(system, change_fingers(scene, system, stored, was or numbers, numbers))
     poses = live_session.clamp_pose(pose.reshape(-1, 7), system.cell.actuator.stroke)
     now = snapshot.dump(system, state)
+    base = fit_base(None if lost not in ("", localize(CHANGED)) else base, state)
     running = Running(
         scene=scene,
         system=system,
@@ -73,11 +76,12 @@ def begin_session(
         name=name,
         snapshot=now,
         tick=tick + 1,
+        base=base,
         numbers=numbers[:fingers],
         clock=live_session.Clock(),
         monitor=accuracy.start(whole),
         trace=recent_trace.start(system.period, fingers=fingers),
-        next_gesture=live_session.Moment(state.period, now, poses, tick),
+        next_gesture=Moment(state.period, now, poses, tick, base),
     )
     return running, lost
 
@@ -233,10 +237,10 @@ def _mark_gesture_start(running: Running, poses: Floats, count: int) -> Running:
     return replace(running, rest_time=rest_time, next_gesture=next_gesture)
 
 
-def _mark(running: Running) -> live_session.Moment:
+def _mark(running: Running) -> Moment:
     """Return the moment before the tick that is being simulated."""
-    return live_session.Moment(
-        running.state.period, running.snapshot, running.poses, running.tick - 1
+    return Moment(
+        running.state.period, running.snapshot, running.poses, running.tick - 1, running.base
     )
 
 
@@ -247,7 +251,7 @@ def _count_gesture(running: Running, *, ordered: bool) -> Running:
         return running
     begun = running.next_gesture
     room = max(1, min(GESTURES, GESTURE_BYTES // len(running.snapshot)))
-    gesture = Gesture(begun.period, begun.snapshot, begun.poses, begun.tick)
+    gesture = Gesture(begun.period, begun.snapshot, begun.poses, begun.tick, begun.base)
     return replace(
         running, gestures=(*running.gestures, gesture)[-room:], undone=(), next_gesture=None
     )
@@ -259,14 +263,16 @@ def restore(
     poses: Floats,
     tick: int | None = None,
     was: Numbers | None = None,
+    base: Floats | None = None,
 ) -> Running:
     """Return the session with another snapshot, None: at rest; a recording is cut at `tick`, or ends.
 
-    `was`: numbers of the fingertips of the snapshot, unless they are those of the session.
+    `was`: numbers of the fingertips of the snapshot, unless they are those of the session. `base`:
+    as `begin_session`.
     """
     poses = poses.reshape(-1, 7)
+    # A stroke that is taken back takes its fingertips along.
     if len(running.poses) > len(running.numbers):
-        # A stroke that is taken back takes its fingertips along.
         system = assemble(running.scene)
         monitor = running.monitor and accuracy.start(running.scene)
         session_poses = running.poses[: len(running.numbers)]
@@ -277,6 +283,7 @@ def restore(
         poses = match_poses(poses, was, running.poses, running.numbers)
     state, _ = load_state(running.system, stored)
     now = snapshot.dump(running.system, state)
+    base = fit_base(base, state)
     keep = running.recording
     if keep is not None:
         keep = keep.cut_at_tick(running.tick if tick is None else tick, state.period)
@@ -294,8 +301,10 @@ def restore(
         recording=keep,
         gestures=gestures,
         tick=running.tick + 1,
+        base=base,
+        correction=None,
         rest_time=0.0,
-        next_gesture=live_session.Moment(state.period, now, poses, running.tick) if free else None,
+        next_gesture=Moment(state.period, now, poses, running.tick, base) if free else None,
     )
 
 
@@ -320,6 +329,7 @@ def change_scene(
         running.tick,
         (*numbers, *images),
         running.names,
+        running.base,
     )
 
     def change(moment: Any) -> Any:
@@ -340,15 +350,8 @@ def change_scene(
         running = replace(
             running, stroke_start=running.stroke_start and change(running.stroke_start)
         )
-    names = [
-        "clock",
-        "paused",
-        "blocking_reason",
-        "stale",
-        "begun_strokes",
-        "finished_strokes",
-        "last_place",
-    ]
+    names = ["clock", "paused", "blocking_reason", "stale"]
+    names += ["begun_strokes", "finished_strokes", "last_place", "correction"]
     names += [] if lost else ["gestures", "undone", "strokes", "stroke_start"]
     if lost:
         other = _give_fingers(other, 1)
@@ -384,9 +387,14 @@ def withdraw_stroke(running: Running) -> Running:
     return drop_strokes(restore_gesture(running, running.stroke_start))
 
 
-def restore_gesture(running: Running, gesture: live_session.Moment) -> Running:
+def restore_moment(running: Running, moment: Moment) -> Running:
+    """Return the session as it was at one of its moments, without its strokes' progress; see `restore`."""
+    return restore(running, moment.snapshot, moment.poses, base=moment.base)
+
+
+def restore_gesture(running: Running, gesture: Moment) -> Running:
     """Bring state, fingertip and recording back to where a gesture of the session began."""
-    back = restore(replace(running, recording=None), gesture.snapshot, gesture.poses)
+    back = restore_moment(replace(running, recording=None), gesture)
     keep = running.recording
     # The gesture a reset leaves behind has periods of another count.
     if keep is not None:
@@ -401,7 +409,7 @@ def reset(running: Running) -> Running:
     """Bring the bed back to rest and lift the fingertip off it; this can be rewound like a gesture."""
     running = drop_strokes(running)
     # Before period 0, at which the first gesture after the reset may begin.
-    before = Gesture(-1, running.snapshot, running.poses, running.tick)
+    before = Gesture(-1, running.snapshot, running.poses, running.tick, running.base)
     undone = (*running.undone, *running.gestures)[-GESTURES:]
     poses = running.poses.copy()
     poses[:, 2] = np.maximum(poses[:, 2], running.system.cell.actuator.rest_height + CLEARANCE)
@@ -459,17 +467,15 @@ def take_path(running: Running, count: int) -> tuple[Running, Floats, Orders | N
         end = stroke.samples[-1]
         finished = running.finished_strokes + 1
         running = replace(
-            running, strokes=left[1:], finished_strokes=finished, last_place=(end.x, end.y)
+            running,
+            strokes=left[1:],
+            finished_strokes=finished,
+            last_place=(end.x, end.y),
+            correction=stroke.correction,
         )
+        if stroke.brush is Brush.SET_BASE:
+            running = replace(running, base=running.state.row(0))
     return running, path, orders
-
-
-def find_device(running: Running) -> Device:
-    """Return what forms the strokes of a session."""
-    scene, system = running.scene, running.system
-    locked = running.state.mode() == Mode.LOCKED
-    parts = system.grid, find_ellipsoid(scene), find_blister(scene), system.cell.actuator.stroke
-    return Device(*parts, locked if locked.any() else None)
 
 
 def _advance(running: Running, stroke: Stroke, count: int) -> tuple[Stroke, Floats, Orders | None]:
@@ -481,7 +487,7 @@ def _advance(running: Running, stroke: Stroke, count: int) -> tuple[Stroke, Floa
     if stroke.brush in WHOLE:
         return order_all(stroke, pose)
     arrived = stroke.phase == FINISHING and live_session.has_arrived(state)
-    if stroke.brush in SWEEPS:
+    if stroke.brush in SWEEPS and not stroke.placed:
         return sweep(stroke, device, SWEEPS[stroke.brush], pose, count, period, arrived=arrived)
     if stroke.phase == FINISHING:
         return finish(stroke, device, state.row(0), pose, count, period, arrived=arrived)

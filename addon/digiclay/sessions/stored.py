@@ -18,6 +18,7 @@ def take_up(
     tick: int,
     ticks: list[int],
     lines: list[str],
+    base: Floats | None,
 ) -> Running:
     """Return the session with what undo or redo has put into its bed, as `restore`.
 
@@ -32,7 +33,7 @@ def take_up(
     }
     while lines and (lines[0], stored) in formed:
         gesture, end = formed[lines[0], stored]
-        stored, poses, tick = end.snapshot, end.poses, end.tick
+        stored, poses, tick, base = end.snapshot, end.poses, end.tick, end.base
         ticks, lines = [*ticks, gesture.tick], lines[1:]
         was = name_fingers(running.numbers, len(poses))
     start = running.stroke_start
@@ -40,7 +41,7 @@ def take_up(
         back, ticks = replace(running, strokes=running.strokes[:1], stale=0), [*ticks, start.tick]
         lines = lines[1:]
     else:
-        back = restore(drop_strokes(running), stored, poses, tick, was)
+        back = restore(drop_strokes(running), stored, poses, tick, was, base)
     done = tuple(gestures.pop(tick) for tick in ticks if tick in gestures)
     return add_strokes(replace(back, gestures=done, undone=tuple(gestures.values())), lines)
 

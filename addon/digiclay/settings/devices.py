@@ -85,12 +85,24 @@ def make_scene(preset: str, layout: Layout, method: str, share: float = 1.0) -> 
 
 
 def change_layout(scene: Scene, layout: Layout) -> Scene:
-    """Return a scene with another plan of the bed; a blister too wide, or cylinders, are made to fit."""
-    actuator = scene.actuator
+    """Return a scene with another plan of the bed, and the same fingers.
+
+    A blister too wide, or cylinders, are made to fit.
+    """
+    actuator, ratio = scene.actuator, layout.share / scene.layout.share
     if actuator.bore > layout.pitch:
         actuator = replace(actuator, bore=BORE * layout.pitch)
     blister = scene.blister and fit_blister(scene.blister, layout)
-    return replace(scene, layout=layout, actuator=actuator, blister=blister)
+    fingers = tuple(_change_share(finger, ratio) for finger in scene.fingers)
+    return replace(scene, layout=layout, actuator=actuator, blister=blister, fingers=fingers)
+
+
+def _change_share(finger: Finger, ratio: float) -> Finger:
+    """Return a finger over cells of another area. `ratio`: of their shares of its contact law."""
+    if finger.contact is None or ratio == 1.0:
+        return finger
+    share = float(f"{finger.contact.share * ratio:.6g}")
+    return replace(finger, contact=replace(finger.contact, share=share))
 
 
 def change_finger(scene: Scene, before: Fingertip, finger: Fingertip) -> Scene:
@@ -113,17 +125,12 @@ def _scale_finger(scene: Scene, share: float) -> Scene:
 
 
 def _scale_tip(finger: Finger, share: float) -> Finger:
-    """Return a fingertip with a tip of another size, of the same pulp."""
-    # As many pins as before are under it, and each has a smaller area: its share of the law of a
-    # flat plate goes with the square of the size.
-    tip, contact = finger.fingertip, finger.contact
-    if tip is not None:
-        tip = replace(
-            tip, length=tip.length * share, width=tip.width * share, height=tip.height * share
-        )
-    if contact is not None:
-        contact = replace(contact, share=contact.share * share**2)
-    return replace(finger, fingertip=tip, contact=contact)
+    """Return a finger with a tip of another size, of the same pulp."""
+    tip = finger.fingertip
+    if tip is None:
+        return finger
+    size = Fingertip(tip.length * share, tip.width * share, tip.height * share)
+    return replace(finger, fingertip=size)
 
 
 def _scale_control(control: ControlParameters, share: float) -> ControlParameters:

@@ -9,7 +9,7 @@ from ..compat import Context, PropertyGroup, bpy
 from ..core.base.quantity import list_quantities
 from ..core.control.methods import METHODS, list_added, list_methods
 from ..core.model.fingertip import Fingertip
-from ..core.model.layout import ARRANGEMENTS
+from ..core.model.layout import Layout
 from ..core.scene.schema import NEEDS, OPTIONAL, SECTIONS, UNASKED, import_parameters
 from ..core.scene.toml_table import PRESETS
 from ..ui_text import localize
@@ -23,6 +23,7 @@ from .declared import (
     group,
     make_group,
     number,
+    read,
     text,
     title,
     whole,
@@ -115,12 +116,11 @@ def take_blister(settings: PropertyGroup, context: Context) -> None:
         devices.suit_blister(settings)
 
 
-def take_arrangement(layout: PropertyGroup, context: Context) -> None:
-    """Set the share of the contact laws a cell carries, which depends on how close the cells stand."""
-    share = ARRANGEMENTS[layout.arrangement].share
-    values = {} if share is None else {"share": share}
+def take_cell(layout: PropertyGroup, context: Context) -> None:
+    """Set the share of the contact laws that a cell carries, which goes with its area."""
+    plan = Layout(**read(layout, Layout, {}, "layout"))
     for settings in devices.list_settings(layout.id_data):
-        fill(settings.contact, import_parameters("contact", ""), ("share",), values)
+        fill(settings.contact, import_parameters("contact", ""), ("share",), {"share": plan.share})
 
 
 def take_size(fingertip: PropertyGroup, context: Context) -> None:
@@ -132,7 +132,7 @@ def take_size(fingertip: PropertyGroup, context: Context) -> None:
 
 #: What happens after a change, by section and field.
 UPDATES: dict[str, dict[str, Update]] = {
-    "layout": {"arrangement": take_arrangement},
+    "layout": dict.fromkeys(("arrangement", "pitch"), take_cell),
     "fingertip": dict.fromkeys(("length", "width", "height"), take_size),
 }
 

@@ -34,11 +34,11 @@ from .stroke import (
     LEAVING,
     PRESSING,
     RISING,
-    STAMPS,
     YIELDING,
     Brush,
     Stroke,
     alter,
+    needs_blister,
 )
 from .tracking import SUDDEN, Tracking
 from .workspace import Workspace
@@ -86,7 +86,7 @@ def begin(stroke: Stroke, height: Floats, turn: Floats, tracking: Tracking | Non
     """
     height = height.copy()
     begun = replace(stroke, height=height, ground=height, phase=ABOVE, tracking=tracking, turn=turn)
-    if tracking is None and stroke.brush.needs_blister:
+    if tracking is None and needs_blister(stroke.brush, stroke.falloff):
         return replace(begun, phase=LEAVING, images=stroke.images[:1])
     if stroke.brush not in LIMITS or len(stroke.images) == 1:
         return begun
@@ -366,8 +366,8 @@ def _step(stroke: Stroke, space: Workspace, place: Point) -> tuple[Stroke, Point
         if stroke.phase == YIELDING:
             return stroke, (x, y, max(z, above))
         return (leave(stroke) if above >= space.safe - TIE else stroke), (x, y, above)
-    if stroke.brush in STAMPS:
-        return _wait_for_stamp(stroke, space, place)
+    if stroke.placed:
+        return _wait_for_hand(stroke, space, place)
     if stroke.phase == PRESSING:
         return _press(stroke, space, place)
     if stroke.phase == RISING:
@@ -380,8 +380,8 @@ def _step(stroke: Stroke, space: Workspace, place: Point) -> tuple[Stroke, Point
     return _drag_on(stroke, space, place)
 
 
-def _wait_for_stamp(stroke: Stroke, space: Workspace, place: Point) -> tuple[Stroke, Point] | None:
-    """Wait above the pins until the hand has drawn how large the stamp is; the valves form all its images."""
+def _wait_for_hand(stroke: Stroke, space: Workspace, place: Point) -> tuple[Stroke, Point] | None:
+    """Wait above the pins until the hand has drawn; then the valves form all images."""
     x, y, z = place
     if stroke.held:
         return None

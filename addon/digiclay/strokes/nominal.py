@@ -10,6 +10,7 @@ shows of a stroke at once, and what the valves drive the pins to after the finge
 import math
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
@@ -19,8 +20,10 @@ from ..core.model.fingertip import LEVEL, Fingertip, compute_forms, compute_unde
 from ..core.model.layout import Grid, Layout
 from ..core.shapes.request import Placement
 from ..core.surface.pointing import find_ground_height
+from .falloff import Falloff, evaluate
 from .pose import lean_finger, turn_image
-from .stroke import STAMPS, Brush, Image, Place, Sample, Stroke
+from .smoothing import flatten, smooth
+from .stroke import STAMPS, Brush, Combine, Image, Place, Sample, Stroke, needs_blister
 
 #: A path that comes nearer to itself than the fingertip is wide, after so many widths, is a new
 #: pass.
@@ -30,6 +33,12 @@ LIMITS = {
     Brush.LOWER: (-math.inf, 0.0),
     Brush.RAISE: (0.0, math.inf),
     Brush.LEVEL: (-math.inf, math.inf),
+}
+#: Falloffs of brushes in the ring, where the stroke has none.
+RING = {
+    Brush.CREASE: Falloff.SHARP,
+    Brush.CREST: Falloff.SHARP,
+    Brush.FLATTEN: Falloff.SMOOTH,
 }
 #: Least radius of the ring, in pitches: below one a pin has no neighbor in it.
 LEAST = 2.0
@@ -51,12 +60,26 @@ class Device:
     highest: float
     #: (n,), pins that nothing moves; None: none are locked.
     locked: Flags | None = None
+    #: Height of pins at rest, m.
+    rest: float = 0.0
+    #: (n,), heights that strokes count from, m; None: from the surface.
+    base: Floats | None = None
 
     @property
     def reach(self) -> float:
         """How far from the path pins are formed, m."""
         finger = max(self.finger.length, self.finger.width, self.finger.height)
         return self.blister.radius if self.blister else finger
+
+    def find_section(self, falloff: Falloff, distance: Floats) -> Floats:
+        """Return the share of the height at distances from the path, m: 1 on the blister's flat top."""
+        assert self.blister is not None
+        flat, radius = self.blister.flat_radius, self.blister.radius
+        if falloff is not Falloff.DEVICE:
+            return evaluate(falloff, distance - flat, radius - flat)
+        section: Floats = self.blister.evaluate_profile(distance).clip(0.0, 1.0)
+        section[distance > radius] = 0.0
+        return section
 
     def find_surface(self, height: Floats, x: float, y: float) -> float:
         """Return the height of a surface (n,), m, under the middle of the fingertip at a place, m."""
@@ -69,12 +92,25 @@ class Device:
 
         It counts from a ground (n,), m; `level`, m: that of a brush that levels, see `find_level`.
         """
-        surface = self.find_surface(ground, *at)
+        surface = start = self.find_surface(self.find_start(stroke, ground), *at)
         if stroke.brush is Brush.LOWER:
-            return max(0.0, surface - sample.depth)
+            return max(0.0, start - sample.depth)
         if stroke.brush is Brush.RAISE:
-            return min(surface + sample.depth, self.highest)
-        return surface if level is None else surface + sample.share * (level - surface)
+            return min(start + sample.depth, self.highest)
+        if stroke.from_base:
+            surface = self.find_surface(ground, *at)
+        return surface if level is None else surface + sample.share * (level - start)
+
+    def find_start(self, stroke: Stroke, surface: Floats) -> Floats:
+        """Return the heights (n,), m, that a stroke counts from where a surface stands (n,), m."""
+        return surface if self.base is None or not stroke.from_base else self.base
+
+    def combine(self, stroke: Stroke, before: Any, formed: Any) -> Any:
+        """Return what a stroke leaves of heights before it where it forms some, m: numbers, or (m,)."""
+        low, high = (self.rest + limit for limit in stroke.limits)
+        low = math.inf if stroke.combine is Combine.HIGHEST else max(low, 0.0)
+        high = -math.inf if stroke.combine is Combine.LOWEST else min(high, self.highest)
+        return np.clip(formed, np.minimum(before, low), np.maximum(before, high))
 
     def find_level(self, stroke: Stroke, image: Image, before: Floats) -> float | None:
         """Return the height, m, that a stroke levels to: of pins (n,), m, at its first place; else None."""
@@ -93,6 +129,8 @@ class Nominal:
     height: Floats
     #: (n,), pins about the path.
     near: Flags
+    #: (images, n), of a brush in the ring: its effect on each pin by the present pass; None before.
+    weight: Floats | None = None
     #: How many samples of the path are in it, and the first one of the present pass.
     count: int = 0
     first: int = 0
@@ -111,7 +149,9 @@ def extend(nominal: Nominal, stroke: Stroke, device: Device, count: int | None =
     end = len(stroke.samples) if count is None else count
     if stroke.brush in STAMPS:
         return _stamp(nominal, stroke, device)
-    if device.blister is None and stroke.brush.needs_blister:
+    if stroke.placed:
+        return _brush(nominal, stroke, device, end)
+    if device.blister is None and needs_blister(stroke.brush, stroke.falloff):
         return replace(nominal, count=end)
     height, near = nominal.height.copy(), nominal.near.copy()
     nominal = replace(nominal, height=height, near=near)
@@ -150,30 +190,90 @@ def _mark(nominal: Nominal, stroke: Stroke, device: Device, image: Image, index:
         for point, at in zip(row, places, strict=True)
     ]
     reach = device.reach + 0.5 * length / parts
+    low, high = LIMITS[stroke.brush]
+    low = 0.0 if stroke.combine is Combine.HIGHEST else low
+    high = 0.0 if stroke.combine is Combine.LOWEST else high
     for part, (start, end) in enumerate(pairwise(places)):
         cells = device.grid.disc(0.5 * (start[0] + end[0]), 0.5 * (start[1] + end[1]), reach)
         if device.locked is not None:
             cells = cells[~device.locked[cells]]
-        ground, now = nominal.ground[cells], nominal.height[cells]
+        counted = device.find_start(stroke, nominal.ground)[cells]
+        ground = counted if level is None else nominal.ground[cells]
+        now = nominal.height[cells]
         if device.blister is None:
             under = find_undersides(device, stroke, image, row[part + 1].lean, end, cells)
             change = tops[part + 1] + under - ground
         else:
             distance, share = _measure(device.grid, cells, start, end)
-            section = device.blister.evaluate_profile(distance).clip(0.0, 1.0)
-            section[distance > device.reach] = 0.0
+            section = device.find_section(stroke.falloff, distance)
             if level is None:
                 full = tops[part] + share * (tops[part + 1] - tops[part]) - ground
             else:
                 before, after = row[part].share, row[part + 1].share
-                full = (before + share * (after - before)) * (level - ground)
+                full = (before + share * (after - before)) * (level - counted)
             change = section * full
-        low, high = LIMITS[stroke.brush]
         change = change.clip(low, high)
         nominal.near[cells] = True
-        nominal.height[cells] = np.where(
-            np.abs(change) > np.abs(now - ground) + TIE, ground + change, now
-        )
+        gone = now - ground
+        if low == 0.0:
+            farther = change > gone + TIE
+        elif high == 0.0:
+            farther = change < gone - TIE
+        else:
+            farther = np.abs(change) > np.abs(gone) + TIE
+        formed = device.combine(stroke, nominal.before[cells], ground + change)
+        nominal.height[cells] = np.where(farther, formed, now)
+
+
+def _brush(nominal: Nominal, stroke: Stroke, device: Device, end: int) -> Nominal:
+    """Return what the valves leave in the ring along the first samples of a path."""
+    weight = np.zeros((len(stroke.images), nominal.before.size))
+    nominal = replace(nominal, weight=weight if nominal.weight is None else nominal.weight.copy())
+    for index in range(nominal.count, end):
+        if returns(stroke, nominal.first, index, device.finger.width):
+            nominal = _shape(nominal, stroke, device)
+            nominal = replace(nominal, ground=nominal.height, first=index, weight=weight.copy())
+        assert nominal.weight is not None
+        for row, image in zip(nominal.weight, stroke.images, strict=True):
+            _weigh(row, stroke, device, image, index)
+    return replace(_shape(nominal, stroke, device), count=end)
+
+
+def _weigh(weight: Floats, stroke: Stroke, device: Device, image: Image, index: int) -> None:
+    """Raise weights (n,) about the path from a sample to the next one, `index`, in place."""
+    last, sample = stroke.samples[max(index - 1, 0)], stroke.samples[index]
+    start, end = image.place(last.x, last.y), image.place(sample.x, sample.y)
+    radius, falloff = find_radius(device.finger, device.grid.layout), stroke.falloff
+    reach = radius + 0.5 * math.dist(start, end)
+    cells = device.grid.disc(0.5 * (start[0] + end[0]), 0.5 * (start[1] + end[1]), reach)
+    distance, share = _measure(device.grid, cells, start, end)
+    named = evaluate(RING[stroke.brush] if falloff is Falloff.DEVICE else falloff, distance, radius)
+    first, full = last.share, sample.share
+    if stroke.brush in (Brush.CREASE, Brush.CREST):
+        first, full = last.depth, sample.depth
+    weight[cells] = np.maximum(weight[cells], named * (first + share * (full - first)))
+
+
+def _shape(nominal: Nominal, stroke: Stroke, device: Device) -> Nominal:
+    """Return the surface that the weights of a pass leave."""
+    assert nominal.weight is not None
+    weight, ground, grid = nominal.weight, nominal.ground, device.grid
+    if device.locked is not None:
+        weight = weight * (1.0 - device.locked)
+    most = weight.max(axis=0)
+    if stroke.brush is Brush.SMOOTH:
+        height = smooth(grid, ground, most, find_radius(device.finger, grid.layout))
+    elif stroke.brush is Brush.ERASE:
+        height = ground + most * (device.rest - ground)
+    elif stroke.brush is Brush.FLATTEN:
+        limit = max(sample.depth for sample in stroke.samples)
+        moves = np.array([flatten(grid, ground, row, limit) for row in weight])
+        height = ground + np.take_along_axis(moves, np.abs(moves).argmax(axis=0)[None], axis=0)[0]
+    else:
+        height = ground + (most if stroke.brush is Brush.CREST else -most)
+    near = nominal.near | (most > 0.0)
+    height = device.combine(stroke, nominal.before, height)
+    return replace(nominal, height=height, near=near)
 
 
 def find_frame(stroke: Stroke, device: Device) -> Place:
@@ -208,8 +308,10 @@ def _stamp(nominal: Nominal, stroke: Stroke, device: Device) -> Nominal:
         )
     if device.locked is not None:
         rise[device.locked] = 0.0
-    height = nominal.before + (1.0 if stroke.brush is Brush.STAMP else -1.0) * last.depth * rise
-    height = np.where(rise > 0.0, height.clip(0.0, device.highest), nominal.before)
+    height = device.find_start(stroke, nominal.before)
+    height = height + (1.0 if stroke.brush is Brush.STAMP else -1.0) * last.depth * rise
+    formed = device.combine(stroke, nominal.before, height)
+    height = np.where(rise > 0.0, formed, nominal.before)
     return replace(nominal, height=height, near=rise > 0.0)
 
 
@@ -250,9 +352,13 @@ class Ghost:
 
     stroke: Stroke
     nominal: Nominal
+    #: Base that it was found on.
+    base: Floats | None
 
-    def has_grown(self, stroke: Stroke, before: Floats) -> bool:
+    def has_grown(self, stroke: Stroke, before: Floats, base: Floats | None) -> bool:
         """Tell whether a stroke, on pins at heights (n,), m, is this one drawn on."""
+        if stroke.from_base and self.base is not base:
+            return False
         former, count = self.stroke, self.nominal.count
         same = (
             former.number == stroke.number
@@ -272,12 +378,16 @@ def find_ghosts(
     """
     ghosts: list[Ghost] = []
     for stroke in strokes:
-        if stroke.brush in LIMITS or stroke.brush in STAMPS:
+        if stroke.brush is Brush.SET_BASE:
+            device = replace(device, base=height)
+        if stroke.brush in LIMITS or stroke.placed:
             before = height if stroke.height is None else stroke.height
-            same = [ghost.nominal for ghost in former if ghost.has_grown(stroke, before)]
+            same = [
+                ghost.nominal for ghost in former if ghost.has_grown(stroke, before, device.base)
+            ]
             nominal = same[0] if same else find_nominal(stroke, device, before)
             if nominal.count < len(stroke.samples):
                 nominal = extend(nominal, stroke, device)
-            ghosts.append(Ghost(stroke, nominal))
+            ghosts.append(Ghost(stroke, nominal, device.base))
             height = nominal.height
     return tuple(ghosts)

@@ -16,6 +16,7 @@ import numpy as np
 
 from ..core.base.arrays import Floats
 from ..core.shapes.heightmap import HeightMap
+from .falloff import Falloff
 from .tracking import Tracking
 
 Place = tuple[float, float]
@@ -103,6 +104,10 @@ class Brush(Enum):
     IMPRINT = "IMPRINT"
     INVERT_LOCKS = "INVERT_LOCKS"
     CLEAR_LOCKS = "CLEAR_LOCKS"
+    CREASE = "CREASE"
+    CREST = "CREST"
+    FLATTEN = "FLATTEN"
+    SET_BASE = "SET_BASE"
 
     @property
     def inverse(self) -> Brush:
@@ -112,25 +117,60 @@ class Brush(Enum):
     @property
     def has_amount(self) -> bool:
         """Whether it has a depth or height, not a strength alone."""
-        return self in (Brush.LOWER, Brush.RAISE, *STAMPS)
+        return self in (Brush.LOWER, Brush.RAISE, *PLACED)
 
     @property
     def rises(self) -> bool:
         """Whether that is a height, not a depth."""
-        return self in (Brush.RAISE, Brush.STAMP)
-
-    @property
-    def needs_blister(self) -> bool:
-        """Whether the blister of the device has to follow the fingertip."""
-        return self in (Brush.RAISE, Brush.LEVEL)
+        return self in (Brush.RAISE, Brush.STAMP, Brush.CREST)
 
 
 #: Brushes without a strength.
 LOCKS = (Brush.LOCK, Brush.UNLOCK, Brush.INVERT_LOCKS, Brush.CLEAR_LOCKS)
 #: Brushes that put a shape onto the surface, up or down.
 STAMPS = (Brush.STAMP, Brush.IMPRINT)
-INVERSES = {Brush.LOWER: Brush.RAISE, Brush.LOCK: Brush.UNLOCK, Brush.STAMP: Brush.IMPRINT}
+#: Brushes that press nothing: the valves bring the pins to their nominal surface.
+PLACED = (*STAMPS, Brush.CREASE, Brush.CREST, Brush.FLATTEN)
+#: Brushes that can be swept along the path by the valves, as they are without a falloff, or placed.
+SWEPT = (Brush.SMOOTH, Brush.ERASE)
+#: Brushes that work in the ring.
+RINGED = (*SWEPT, Brush.LOCK, Brush.UNLOCK, *PLACED[2:])
+INVERSES = {
+    Brush.LOWER: Brush.RAISE,
+    Brush.LOCK: Brush.UNLOCK,
+    Brush.STAMP: Brush.IMPRINT,
+    Brush.CREASE: Brush.CREST,
+}
 INVERSES |= {other: brush for brush, other in INVERSES.items()}
+
+
+def needs_blister(brush: Brush, falloff: Falloff = Falloff.DEVICE) -> bool:
+    """Return whether the blister of the device has to follow the fingertip."""
+    shaped = brush is Brush.LOWER and falloff is not Falloff.DEVICE
+    return shaped or brush in (Brush.RAISE, Brush.LEVEL)
+
+
+class Combine(Enum):
+    """What a stroke leaves where something is formed already.
+
+    HIGHEST and LOWEST leave the higher or lower one of the surface and of what the stroke forms on the
+    base, ADD puts that onto the surface, REPLACE leaves it alone. USUAL: Level replaces, others add.
+    """
+
+    USUAL = "USUAL"
+    HIGHEST = "HIGHEST"
+    LOWEST = "LOWEST"
+    ADD = "ADD"
+    REPLACE = "REPLACE"
+
+
+#: How strokes may combine, by their brush; those of others do so as usual.
+EVERY = tuple(Combine)
+COMBINATIONS = {
+    Brush.LOWER: (Combine.USUAL, Combine.ADD, Combine.LOWEST),
+    Brush.RAISE: (Combine.USUAL, Combine.ADD, Combine.HIGHEST),
+    **dict.fromkeys((Brush.LEVEL, *STAMPS), EVERY),
+}
 
 
 @dataclass(frozen=True)
@@ -148,6 +188,15 @@ class Sample:
     lean: Place = (0.0, 0.0)
 
 
+class Correction(NamedTuple):
+    """How far pins about a path are from the nominal surface when the fingertip has left, m."""
+
+    rms: float
+    largest: float
+    #: Whether the valves bring them there.
+    made: bool
+
+
 @dataclass(frozen=True, eq=False)
 class Stroke:
     """Press stroke, and the progress of the fingertip along it."""
@@ -163,6 +212,13 @@ class Stroke:
     accumulate: bool = False
     #: What is stamped, with values from 0 to 1.
     stamp: HeightMap | None = None
+    falloff: Falloff = Falloff.DEVICE
+    #: What it leaves where something is formed, and the lowest and the highest that it forms, m above
+    #: rest.
+    combine: Combine = Combine.USUAL
+    limits: tuple[float, float] = (-math.inf, math.inf)
+    #: Whether what the finger and the method have formed stays, not brought to the nominal surface.
+    as_left: bool = False
     #: Whether the hand still draws.
     held: bool = True
     #: The stroke along each image alone, while fingertips go along several at once.
@@ -199,12 +255,21 @@ class Stroke:
     #: before.
     turn: Floats | None = None
     #: (n,), heights to which the valves drive pins after the fingertip has left, m, NaN: not
-    #: driven.
+    #: driven; of a stroke finished as left those at the last look.
     finish: Floats | None = None
+    #: How far the pins are from the nominal surface when the fingertip has left; None before.
+    correction: Correction | None = None
     #: Control periods since the fingertip waits for its pins, and whether they stood at the last
     #: look.
     waited: int = 0
     arrived: bool = False
+
+    @property
+    def from_base(self) -> bool:
+        """Whether it counts from the base, not from the surface."""
+        if self.brush is Brush.LEVEL:
+            return self.combine is Combine.ADD
+        return self.combine not in (Combine.USUAL, Combine.ADD) and not self.accumulate
 
     @property
     def done(self) -> bool:
@@ -228,6 +293,12 @@ class Stroke:
                 left or {self.image: (self.reached, False), **later}
             ).items()
         )
+
+    @property
+    def placed(self) -> bool:
+        """Whether the valves alone bring the pins to its nominal surface."""
+        shaped = self.falloff is not Falloff.DEVICE
+        return self.brush in PLACED or (self.brush in SWEPT and shaped)
 
     @property
     def left(self) -> bool:
@@ -254,13 +325,11 @@ def start(
     brush: Brush = Brush.LOWER,
     share: float = 1.0,
     lean: Place = (0.0, 0.0),
-    *,
-    accumulate: bool = False,
-    stamp: HeightMap | None = None,
+    **more: Any,
 ) -> Stroke:
-    """Return the stroke of a mouse that goes down at a place, m; see `Sample`."""
+    """Return the stroke of a mouse that goes down at a place, m; see `Sample`. `more`: of `Stroke`."""
     first = Sample(x, y, _limit_depth(depth), share, lean)
-    return Stroke(number, (first,), brush, images, accumulate, stamp)
+    return Stroke(number, (first,), brush, images, **more)
 
 
 def draw(

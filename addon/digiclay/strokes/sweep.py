@@ -14,8 +14,18 @@ import numpy as np
 from ..core.base.arrays import Floats
 from ..core.control.orders import FARTHEST, ORDER, Orders, Verb, place, repeat_order
 from .motion import DESCEND, DRAG, cross, drag, find_safe
-from .nominal import Device, find_nominal, find_radius
-from .stroke import ABOVE, DONE, DRAGGING, FINISHING, LEAVING, PRESSING, Brush, Stroke
+from .nominal import Device, Nominal, find_nominal, find_radius
+from .stroke import (
+    ABOVE,
+    DONE,
+    DRAGGING,
+    FINISHING,
+    LEAVING,
+    PRESSING,
+    Brush,
+    Correction,
+    Stroke,
+)
 
 #: How long pins are waited for that do not come to their heights, s: noise may hide that they have;
 #: and how many control periods pass between two looks.
@@ -27,12 +37,16 @@ SWEEPS = {
     Brush.LOCK: Verb.LOCK,
     Brush.UNLOCK: Verb.UNLOCK,
 }
-#: Brushes that tell all pins something, at once.
-WHOLE = {Brush.INVERT_LOCKS: Verb.INVERT, Brush.CLEAR_LOCKS: Verb.UNLOCK}
+#: Brushes that tell all pins something, at once, or note how they stand: verb and radius, m.
+WHOLE = {
+    Brush.INVERT_LOCKS: (Verb.INVERT, FARTHEST),
+    Brush.CLEAR_LOCKS: (Verb.UNLOCK, FARTHEST),
+    Brush.SET_BASE: (Verb.SMOOTH, 0.0),
+}
 #: Time that a stroke takes beside its path, s: to come, press, rise and leave.
 BESIDE = 0.4
-#: Least change of a pin that the valves are to make, m.
-LEAST_CHANGE = 1e-7
+#: Least change of a pin that the valves are to make, m; and what pins that stand move within a look.
+LEAST_CHANGE, STILL = 1e-7, 10e-6
 
 
 def sweep(
@@ -78,7 +92,8 @@ def sweep(
 
 def order_all(stroke: Stroke, pose: Floats) -> tuple[Stroke, Floats, Orders]:
     """Tell all pins of the bed what the brush of a stroke does, and end it; returns as `sweep`."""
-    order = repeat_order(1, WHOLE[stroke.brush], radius=FARTHEST)
+    verb, radius = WHOLE[stroke.brush]
+    order = repeat_order(1, verb, radius=radius)
     return replace(stroke, phase=DONE), np.array([pose, pose]), Orders(order)
 
 
@@ -100,22 +115,57 @@ def finish(
     *,
     arrived: bool,
 ) -> tuple[Stroke, Floats, Orders]:
-    """Drive pins, now at heights (n,), m, to a stroke's nominal surface; returns as `sweep`."""
-    assert stroke.height is not None
-    surface = stroke.finish
+    """Drive pins, now at heights (n,), m, to a stroke's nominal surface; returns as `sweep`.
+
+    Those of a stroke that is finished as left are waited for, unless the valves alone form it.
+    """
+    if stroke.as_left and not stroke.placed:
+        return _settle(stroke, device, now, pose, count, period)
+    surface, before = stroke.finish, stroke.height
+    assert before is not None
     if surface is None:
-        nominal = find_nominal(stroke, device, stroke.height)
+        nominal = find_nominal(stroke, device, before)
         surface = np.where(nominal.near, nominal.height, np.nan)
+        if not stroke.placed:
+            stroke = replace(stroke, correction=_compare(nominal, now, made=True))
     # What the method has moved beside the path, or still does, comes back to where it was. It is
     # seen at the looks only, however many control periods are simulated at a time.
-    astray = np.isnan(surface) & (np.abs(stroke.height - now) > LEAST_CHANGE)
+    astray = np.isnan(surface) & (np.abs(before - now) > LEAST_CHANGE)
     if stroke.waited % LOOK == 0 and (stroke.finish is None or astray.any()):
-        stroke = replace(stroke, finish=np.where(astray, stroke.height, surface))
+        stroke = replace(stroke, finish=np.where(astray, before, surface))
     assert stroke.finish is not None
-    # A method that still looks for the fingertip would move pins once more.
-    searched = stroke.tracking is None or stroke.waited * period > stroke.tracking.search + period
-    arrived = arrived and searched and not astray.any()
+    arrived = arrived and _has_searched(stroke, period) and not astray.any()
     return _wait(stroke, pose, count, period, place(1, stroke.finish), arrived=arrived)
+
+
+def _has_searched(stroke: Stroke, period: float) -> bool:
+    """Tell whether a method no longer looks for the fingertip: it would move pins once more."""
+    return stroke.tracking is None or stroke.waited * period > stroke.tracking.search + period
+
+
+def _settle(
+    stroke: Stroke, device: Device, now: Floats, pose: Floats, count: int, period: float
+) -> tuple[Stroke, Floats, Orders]:
+    """Wait until pins, now at heights (n,), m, stand as the method leaves them; returns as `sweep`."""
+    before, stands = stroke.height, False
+    assert before is not None
+    if stroke.waited % LOOK == 0:
+        moved = np.inf if stroke.finish is None else float(np.abs(now - stroke.finish).max())
+        stands = moved < STILL and _has_searched(stroke, period)
+        stroke = replace(stroke, finish=now.copy())
+    none = Orders(np.zeros((1, ORDER)))
+    stroke, path, orders = _wait(stroke, pose, count, period, none, arrived=stands)
+    if stroke.done:
+        nominal = find_nominal(stroke, device, before)
+        stroke = replace(stroke, correction=_compare(nominal, now, made=False))
+    return stroke, path, orders
+
+
+def _compare(nominal: Nominal, now: Floats, *, made: bool) -> Correction:
+    """Return how far pins at heights (n,), m, are from a nominal surface."""
+    error = (nominal.height - now)[nominal.near]
+    rms = math.sqrt(float(error @ error) / max(error.size, 1))
+    return Correction(rms, float(np.abs(error).max(initial=0.0)), made)
 
 
 def _wait(
@@ -150,6 +200,7 @@ def estimate_time(strokes: Sequence[Stroke]) -> float:
         lengths = [
             float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum()) for path in stroke.ahead
         ]
+        lengths = [0.0] if stroke.placed else lengths
         times = [BESIDE + length / speed for length in lengths]
         time += sum(times) if stroke.brush in SWEEPS else max(times)
     return time

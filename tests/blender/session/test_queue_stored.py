@@ -11,7 +11,7 @@ from digiclay.live import beds, handlers, tick
 from digiclay.sessions import running
 from digiclay.sessions.sculpting import change_stroke, queue_stroke
 from digiclay.strokes.stamps import load_stamp
-from digiclay.strokes.stroke import Brush, lay_path, make_images, start
+from digiclay.strokes.stroke import Brush, Combine, lay_path, make_images, start
 
 from tests.assemble import assert_near
 from tests.blender.session.live import FLOAT32, exact, only_bed, shown, started, undone
@@ -182,6 +182,87 @@ def test_a_session_that_is_stopped_keeps_strokes_for_the_next_one(bed, clock, sl
         begin(bed)
     form(clock)
     assert rows() == [True, False, True]
+
+
+def press(y, base=False):
+    """Draw a stroke from the base along a row, or set the base, as the tool does; see `draw`."""
+    how = {"brush": Brush.SET_BASE} if base else {"combine": Combine.LOWEST}
+    draw(y, **how)
+
+
+def test_strokes_from_the_base_leave_one_depth_until_set_base_which_undo_takes_back(bed, clock):
+    begin(bed)
+    for base in (False, False, True, False):
+        press(0.0, base)
+    form(clock)
+    row = slice(13 * 6 + 4, 13 * 6 + 9)
+    # Pins that give way to a force stand 1.1 mm less deep than the fingertip came, and a little
+    # deeper after each pass.
+    once, twice = 40e-3 - 1.9e-3, 40e-3 - 3.8e-3
+    assert_near(exact(only_bed())[row], twice, 0.5e-3)
+    assert_near(running.find(only_bed()).base[row], once, 0.5e-3)
+    undone(clock, 2)
+    form(clock)
+    assert (running.find(only_bed()).base == 40e-3).all()
+    assert_near(exact(only_bed())[row], once, 0.5e-3)
+    redone(clock)
+    form(clock)
+    assert_near(running.find(only_bed()).base[row], once, 0.5e-3)
+    bpy.ops.digiclay.session_rewind("EXEC_DEFAULT", True)
+    assert (running.find(only_bed()).base == 40e-3).all()
+    bpy.ops.digiclay.session_reset("EXEC_DEFAULT", True)
+    assert (running.find(only_bed()).base == 40e-3).all()
+
+
+@pytest.mark.parametrize("when", ["formed", "queued"])
+def test_a_file_and_the_next_session_have_the_base(bed, clock, tmp_path, when):
+    begin(bed)
+    press(0.0)
+    press(0.0, base=True)
+    form(clock)
+    base = running.find(only_bed()).base
+    press(0.0)
+    if when == "formed":
+        form(clock)
+    path = str(tmp_path / "base.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path, copy=True)
+    bpy.ops.wm.open_mainfile(filepath=path)
+    begin(only_bed())
+    form(clock)
+    np.testing.assert_array_equal(running.find(only_bed()).base, base)
+    before = exact(only_bed())
+    press(0.0)
+    form(clock)
+    # What was pressed to its depth settles a little under the fingertip, no more.
+    assert_near(exact(only_bed()), before, 0.3e-3)
+
+
+@pytest.mark.parametrize(
+    "junk, count",
+    [(np.zeros(7).tobytes(), 7), (b"abc", 0), ("text", 0), (np.full(169, np.nan).tobytes(), 0)],
+)
+def test_a_base_of_another_bed_is_refused_in_a_line_and_the_surface_taken(bed, junk, count):
+    bed[beds.BASE] = junk
+    (note,) = tick.start(bpy.context, bed)
+    assert note.level == "WARNING"
+    assert f"base must have the bed's 169 pins (got {count})" in note.message
+    assert len(note.message) < 400
+    assert (running.find(bed).base == 40e-3).all()
+
+
+def test_a_take_brings_its_base(bed, clock):
+    begin(bed)
+    bpy.ops.digiclay.take_record("EXEC_DEFAULT")
+    press(0.0)
+    press(0.0, base=True)
+    form(clock)
+    base = running.find(bed).base
+    bpy.ops.digiclay.take_keep("EXEC_DEFAULT")
+    handlers.end_all(handlers.STOPPED)
+    bpy.ops.digiclay.session_reset("EXEC_DEFAULT")
+    assert beds.read_base(bed) is None
+    bpy.ops.digiclay.take_replay("EXEC_DEFAULT")
+    np.testing.assert_array_equal(beds.read_base(bed), base)
 
 
 GOOD = '["LOWER", false, [[1, 0, 0, 1, 0, 0]], [[0, 0, 0.003, 1, [0, 0]]], null]'

@@ -71,5 +71,9 @@ class Contact(ExponentialLaw, Parameters):
         0.0, "indentation at which force begins", unit="m", symbol="x0", at_least=0.0
     )
     share: float = quantity(
-        0.34, "share of a cell in the flat-plate law", symbol="f_d", source="D", above=0.0
+        0.34,
+        "share of a cell in the flat-plate law; unless given, its area over 26.5 mm²",
+        symbol="f_d",
+        source="D",
+        above=0.0,
     )

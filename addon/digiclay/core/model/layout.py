@@ -20,16 +20,15 @@ Discs = tuple[Any, Any, Any]
 
 
 class Arrangement(NamedTuple):
-    """Distance of rows and shift of odd ones along x, in pitches; meaning; share of the contact law.
+    """Distance of rows and shift of odd ones along x, in pitches; meaning.
 
     A pin has four neighbors if rows are not shifted, and six if they are shifted by half a pitch;
-    features that need neighbors refuse all other beds. `share` is None for the default of the law.
+    features that need neighbors refuse all other beds.
     """
 
     spacing: float
     shift: float
     meaning: str
-    share: float | None = None
 
 
 #: Arrangements of the cells by name; all else is derived from this table.
@@ -39,10 +38,7 @@ ARRANGEMENTS = {
         1.0, 0.5, "Every other row shifted by half a pitch, rows one pitch apart"
     ),
     "hexagonal": Arrangement(
-        math.sqrt(0.75),
-        0.5,
-        "Every other row shifted, six neighbors at the same distance",
-        share=0.29,
+        math.sqrt(0.75), 0.5, "Every other row shifted, six neighbors at the same distance"
     ),
 }
 #: Steps (rows, columns) to the neighbors, counter-clockwise: in a square grid, with diagonal ones;
@@ -99,6 +95,15 @@ class Layout(Parameters):
     def row_spacing(self) -> float:
         """Distance between rows, m."""
         return self.pitch * ARRANGEMENTS[self.arrangement].spacing
+
+    @property
+    def share(self) -> float:
+        """Share f_d of a cell in the law of a flat plate: its area over 26.5 mm², to six digits.
+
+        So a finger has the same force on every bed; 0.34 is that of the paper's, 3 mm by 3 mm.
+        """
+        paper = type(self).pitch
+        return float(f"{0.34 * (self.pitch / paper) * (self.row_spacing / paper):.6g}")
 
     @property
     def shift(self) -> float:

@@ -11,14 +11,34 @@ from typing import Any, NamedTuple
 from ..base.errors import ParameterError, SceneError
 from ..control.methods import list_methods
 from ..files.run_folder import find_file, list_files
-from ..files.tables import LARGEST, ReadParts, Record, Table, format_value, parse_tables
-from .schema import FINGER_SECTIONS, Scene
-from .toml_table import ABSENT, FINGERS, merge_one_finger, resolve, tabulate
+from ..files.tables import (
+    LARGEST,
+    ReadParts,
+    Record,
+    Table,
+    format_value,
+    parse_tables,
+    refuse_unknown,
+)
+from .schema import FINGER_SECTIONS, SECTIONS, Scene
+from .toml_table import (
+    ABSENT,
+    FINGERS,
+    FORMAT,
+    UNCERTAINTY,
+    keep_former_share,
+    merge_one_finger,
+    resolve,
+    tabulate,
+)
 
 #: What a scene is made of: another one, tables as of a file, a file, the folder of a run, or a
 #: sample's name.
 Source = Scene | Table | str | os.PathLike[str]
 
+#: Sections that another scene may take from a file, and what else may stand there.
+PORTABLE = (*SECTIONS[1 : SECTIONS.index("control")],)
+BESIDE = (FORMAT, "name", "description", UNCERTAINTY)
 #: Folder of the sample scenes.
 SAMPLES = Path(__file__).parents[2] / "sample_shapes" / "sessions"
 
@@ -68,6 +88,20 @@ def list_changes(changes: Table, above: str = "") -> Iterator[tuple[str, Any]]:
             yield f"{above}{key}", value
 
 
+def read_parts(path: Path) -> list[Setting]:
+    """Return the parts of device and finger that a file gives, as changes of another scene.
+
+    Its name, description and uncertainty stay behind. SceneError for any other section.
+    """
+    table = read_table(path)
+    try:
+        refuse_unknown("", table, (*PORTABLE, *BESIDE))
+    except ParameterError as error:
+        raise SceneError(f"{path}: {error}") from None
+    parts = {name: part for name, part in table.items() if name in PORTABLE}
+    return [Setting(key, write_word(value), str(path)) for key, value in list_changes(parts)]
+
+
 def write_word(value: object) -> str:
     """Return a value as the word of a `Setting`; a text without quotes where these are not needed."""
     return value if isinstance(value, str) and _read_value(value) == value else format_value(value)
@@ -105,7 +139,9 @@ def make_scene(
     again.
     """
     try:
-        merged = merge_one_finger(_find_beside(table, path.parent) if path else table)
+        if path:
+            table = keep_former_share(_find_beside(table, path.parent))
+        merged = merge_one_finger(table)
         return resolve(_override(merged, settings), path.stem if path else "", cache)
     except ParameterError as error:
         if settings:

@@ -16,7 +16,7 @@ from ..files.tables import (
     shorten,
     show_value,
 )
-from ..model.layout import ARRANGEMENTS, Layout
+from ..model.layout import Layout
 from ..model.trajectory import Path, Waypoint
 from .schema import (
     FINGER_SECTIONS,
@@ -44,11 +44,15 @@ PRESETS: dict[str, dict[str, Record]] = {
     "design": {"valve": {"orifice_diameter": 0.6e-3}, "valve_lag": {"time_constant": 0.16e-3}},
 }
 TEXTS = ("name", "description", "preset")
+#: Key of the format of a file written by hand; see `keep_former_share`.
+FORMAT = "format"
+#: Section of a file of `digiclay fit`: intervals of its values, which a scene does not have.
+UNCERTAINTY = "uncertainty"
 #: List of tables with the sections of several fingers.
 FINGERS = "finger"
 #: Sections of a finger that are parts; the other one is its path.
 FINGER_PARTS = tuple(section for section in FINGER_SECTIONS if section in SECTIONS)
-TOP_LEVEL = (*TEXTS, *SECTIONS, "trajectory", FINGERS)
+TOP_LEVEL = (FORMAT, UNCERTAINTY, *TEXTS, *SECTIONS, "trajectory", FINGERS)
 
 
 def resolve(table: Table, name: str = "", cache: ReadParts | None = None) -> Scene:
@@ -67,6 +71,8 @@ def resolve(table: Table, name: str = "", cache: ReadParts | None = None) -> Sce
         raise ParameterError(
             "preset", "", f"must be one of {', '.join(PRESETS)}", repr(texts["preset"])
         )
+    if table.get(FORMAT, 1) not in (1, 2) or isinstance(table.get(FORMAT), (bool, float)):
+        raise ParameterError(FORMAT, "", "must be 1 or 2", show_value(table[FORMAT]))
     tables = _split_fingers(table)
     shared = {
         section: _read_section(section, table.get(section, ABSENT if section in UNASKED else {}))
@@ -90,11 +96,35 @@ def _find_defaults(preset: str, method: str) -> dict[str, Table]:
 
 
 def _add_share(defaults: dict[str, Table], layout: Layout) -> dict[str, Table]:
-    """Return the defaults with the contact's share that an arrangement of pins has."""
-    share = ARRANGEMENTS[layout.arrangement].share
-    if share is None:
-        return defaults
-    return {**defaults, "contact": {**defaults.get("contact", {}), "share": share}}
+    """Return the defaults with the contact's share that belongs to the area of a cell."""
+    return {**defaults, "contact": {**defaults.get("contact", {}), "share": layout.share}}
+
+
+def keep_former_share(table: Table) -> Table:
+    """Return the tables of a file with the contact's share that version 0.2 gave a bed, if it was another.
+
+    It was the same at any pitch. A file with ``format = 2`` has the share of the area of a cell.
+    """
+    given = table.get("layout")
+    if table.get(FORMAT, 1) != 1 or not isinstance(given, dict):
+        return table
+    layout = read_part("layout", Layout, {}, given)
+    former = 0.29 if layout.arrangement == "hexagonal" else 0.34
+
+    def keep(finger: Table) -> Table:
+        contact = finger.get("contact", {})
+        if not isinstance(contact, dict) or "share" in contact:
+            return finger
+        return {**finger, "contact": {**contact, "share": former}}
+
+    if former == layout.share:
+        return table
+    fingers = table.get(FINGERS)
+    if FINGERS not in table:
+        return keep(table)
+    if not isinstance(fingers, list) or not all(isinstance(finger, dict) for finger in fingers):
+        return table
+    return {**table, FINGERS: [keep(finger) for finger in fingers]}
 
 
 def tabulate(scene: Scene) -> Record:

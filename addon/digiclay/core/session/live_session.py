@@ -290,6 +290,8 @@ class Moment:
     poses: Floats
     tick: int = 0
     """Number of the session's tick, which identifies the moment."""
+    base: Floats | None = None
+    """(n,): Heights that strokes count from, m; None: of a session without strokes."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -45,6 +45,7 @@ from ..scene.toml_table import ABSENT, format_scene
 from ..version import __version__
 from .accuracy import Errors, describe_bends, estimate_errors, explain_absence
 from .memory_limit import check_memory
+from .plate import list_cautions
 
 History = dict[str, Array]
 
@@ -124,14 +125,15 @@ class Result(Described):
         """Return what matters most of it, by name."""
         largest = self.metrics.get("max_total_force")
         reached = "not recorded" if largest is None else f"at most {largest:.2g} N"
-        beyond = self.metrics.get("beyond_a_finger")
+        beyond = filter(None, (self.metrics.get("beyond_a_finger"), *list_cautions(self.scene)))
+        cautions = "; ".join(beyond)
         rows, pins = len(self.history.get("time", ())), self.scene.cells
         return {
             "time": describe_time(self.metrics)
             + (", stopped before its end" if self.incomplete else ""),
             "force": self._describe_force() or reached,
             "errors": describe_errors(self.metrics),
-            **({"caution": beyond} if beyond else {}),
+            **({"caution": cautions} if cautions else {}),
             "history": f"{rows} rows of {pins} pins: {', '.join(self.history)}" if rows else "none",
             "metrics": f"{len(self.metrics)}, in SI units",
         }

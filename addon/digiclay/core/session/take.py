@@ -37,7 +37,7 @@ PARTS = ("scene", "start", "poses", "end")
 #: and their surfaces (s, n) instead; 5 has more fingers than the scene. A take with neither is
 #: written as 2, which older releases read.
 PLAIN, ORDERED, VERSION = 2, 4, 5
-SMOOTHING, ORDERS, SURFACES = "smoothing", "orders", "surfaces"
+SMOOTHING, ORDERS, SURFACES, BASE = "smoothing", "orders", "surfaces", "base"
 #: Most parts of a physics step in a replay.
 MOST_PARTS = 64
 
@@ -47,7 +47,7 @@ class Take:
     """Stretch of a session.
 
     Raises ParameterError when there is no period, a pose is not finite, the scene has another
-    number of fingers, or the orders are invalid.
+    number of fingers, or orders or base are invalid.
     """
 
     scene: Scene
@@ -61,6 +61,8 @@ class Take:
     """The states before and after, from `snapshot.dump`."""
     orders: Orders | None = None
     """Orders of brushes, see `control.orders`; None: none in any period."""
+    base: Floats | None = None
+    """(n,): Heights that strokes count from at the end, m; None: of a session without strokes."""
 
     def __post_init__(self) -> None:
         fingers = len(self.scene.fingers)
@@ -77,10 +79,13 @@ class Take:
             raise ParameterError(
                 "Take", "poses", rule, f"row {int(np.argwhere(~sound)[0][0])} is not"
             )
+        pins, stroke = self.scene.cells, self.scene.actuator.stroke
+        base = self.base
+        if base is not None and not (base.shape == (pins,) and np.isfinite(base).all()):
+            rule = f"must be {pins} finite heights, one per pin of the bed"
+            raise ParameterError("Take", BASE, rule, f"an array of the shape {base.shape}")
         if self.orders is None:
             return
-        pins = self.scene.layout.rows * self.scene.layout.columns
-        stroke = self.scene.actuator.stroke
         fault = find_fault(self.orders, self.periods, pins, stroke)
         if fault:
             rule = (
@@ -194,6 +199,7 @@ def to_bytes(take: Take) -> bytes:
     orders = take.orders
     several = take.poses.shape[1] > len(take.scene.fingers)
     ordered = {} if orders is None else {ORDERS: orders.rows, SURFACES: np.array(orders.surfaces)}
+    based = {} if take.base is None else {BASE: take.base}
     np.savez(
         written,
         scene=np.frombuffer(format_scene(take.scene).encode(), np.uint8),
@@ -202,6 +208,7 @@ def to_bytes(take: Take) -> bytes:
         end=np.frombuffer(take.end, np.uint8),
         version=np.array(VERSION if several else ORDERED if ordered else PLAIN),
         **ordered,
+        **based,
     )
     return written.getvalue()
 
@@ -211,7 +218,7 @@ def from_bytes(data: bytes) -> Take:
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             stored = archive.namelist()
-            optional = ("version", SMOOTHING, ORDERS, SURFACES)
+            optional = ("version", SMOOTHING, ORDERS, SURFACES, BASE)
             names = [*PARTS, *(name for name in optional if f"{name}.npy" in stored)]
             heads = read_heads(archive, names)
             # `to_bytes` does not compress: a take unpacks to at most its own size.
@@ -227,7 +234,8 @@ def from_bytes(data: bytes) -> Take:
         elif not PLAIN <= int(parts["version"].reshape(())) <= VERSION:
             raise ValueError(f"its version must be at most {VERSION} (got {parts['version']})")
         resolved = resolve(parse_tables(scene.tobytes().decode()))
-        return Take(resolved, start.tobytes(), poses, end.tobytes(), _read_orders(parts))
+        states = start.tobytes(), poses, end.tobytes()
+        return Take(resolved, *states, _read_orders(parts), parts.get(BASE))
     except (
         OSError,
         EOFError,
@@ -247,10 +255,12 @@ def _read_orders(parts: dict[str, Array]) -> Orders | None:
     return Orders(parts[ORDERS], tuple(parts[SURFACES])) if ORDERS in parts else None
 
 
-def make_take(scene: Scene, recording: Recording, end: bytes) -> Take | None:
-    """Return a recording as a take, with the snapshot of its end; None without a control period."""
+def make_take(
+    scene: Scene, recording: Recording, end: bytes, base: Floats | None = None
+) -> Take | None:
+    """Return a recording as a take, with snapshot and base of its end; None without a control period."""
     if recording.count < 2:
         return None
     orders = recording.orders
     orders = orders and replace(orders, rows=orders.rows.copy())
-    return Take(scene, recording.start, recording.path.copy(), end, orders)
+    return Take(scene, recording.start, recording.path.copy(), end, orders, base)

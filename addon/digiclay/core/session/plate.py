@@ -1,0 +1,112 @@
+"""A finger over a whole bed: its closed form on a flat plate, and what the lattice of pins makes of it."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ..base.arrays import Floats
+from ..base.errors import ParameterError
+from ..model.contact import ExponentialLaw
+from ..model.fingertip import LEVEL, Fingertip, compute_forms, compute_underside
+from ..model.layout import Layout, make_grid
+from ..scene.schema import Scene
+
+#: Deepest indentation of the closed form, as a share of the height of the fingertip: from there on the
+#: underside is not that of the ellipsoid, see `fingertip.JOIN`.
+DEEPEST = 0.8
+#: Depth at which a lattice is judged, as a share of the height of the fingertip: 2 mm of the paper's.
+JUDGED = 0.25
+#: Places along a pitch and along two row spacings at which it is judged; spread that is tolerated.
+PLACES, COARSE = (8, 16), 0.01
+
+
+def integrate_law(tip: Fingertip, law: ExponentialLaw, indentation: Floats) -> Floats:
+    """Return the law summed over the footprint of a level fingertip on a plate, N m²; see `plate_force`."""
+    stiffening, height = law.exponent, tip.height
+    depth = np.maximum(indentation - law.offset, 0.0)
+    turn = stiffening * depth
+    first = np.expm1(turn) - turn
+    second = (first - 0.5 * turn * turn) / (stiffening * height)
+    size = 2.0 * math.pi * tip.length * tip.width / height
+    return size * law.stiffness / stiffening**2 * (first - second)
+
+
+def plate_force(scene: Scene, indentation: Floats | float) -> Floats:
+    """Return the elastic force of the whole finger, level on a flat plate or on pins that are held.
+
+    With u = max(δ - x0, 0) and e = exp(m u) - 1 it is ``f_d / A_cell 2π a_x a_y / a_z (b / m²)
+    ((e - m u) - (e - m u - (m u)² / 2) / (m a_z))``: the law of a pin (equation 11) summed over the
+    footprint, the mean of `force` over all places. It is no multiple of the law of a pin: measured
+    forces of a whole finger are compared with this one. Held on, it falls as ``G(t) F``.
+
+    Parameters
+    ----------
+    scene : Scene
+        With one finger; its contact, fingertip and layout count.
+    indentation : array_like
+        Depth δ of the lowest point of the fingertip in the plate, m.
+
+    Returns
+    -------
+    ndarray
+        Force, N, of the shape of `indentation`.
+
+    Raises
+    ------
+    DigiclayError
+        Without a fingertip or with several; for an indentation that is not finite, or is deeper than 0.8
+        of the semi-axis ``fingertip.height``.
+    """
+    tip, law = scene.section("fingertip"), scene.section("contact")
+    if tip is None or law is None:
+        raise ParameterError("fingertip", "", "must be given to press a plate", "absent")
+    depth = np.asarray(indentation, np.float64)
+    if not np.isfinite(depth).all() or depth.max(initial=0.0) - law.offset > DEEPEST * tip.height:
+        rule = f"must be finite and at most {DEEPEST * tip.height + law.offset:g} m"
+        raise ParameterError("plate_force", "indentation", rule, f"{depth.max():g} m")
+    plan = scene.layout
+    return law.share / (plan.pitch * plan.row_spacing) * integrate_law(tip, law, depth)
+
+
+def measure_lattice(plan: Layout, tip: Fingertip, law: ExponentialLaw) -> float:
+    """Return half the range of a level finger's force over its places on a bed, as a share of the mean."""
+    closest, widest = min(plan.pitch, plan.row_spacing), max(plan.pitch, plan.row_spacing)
+    if 4.0 * widest < min(tip.length, tip.width):
+        return 0.0
+    side = 2 * math.ceil(max(tip.length, tip.width) / closest) + 5
+    bed = make_grid(Layout(side, side, plan.pitch, plan.arrangement))
+    x, y = (np.arange(count) for count in PLACES)
+    poses = np.empty((x.size * y.size, 7))
+    poses[:, 0] = np.repeat(x * plan.pitch / x.size, y.size)
+    poses[:, 1] = np.tile(y * 2.0 * plan.row_spacing / y.size, x.size)
+    poses[:, 2], poses[:, 3:] = 0.0, LEVEL
+    under = compute_underside(
+        *compute_forms(tip.outline(poses)), bed.compute_basis(np.arange(bed.count))
+    )
+    force = law.tension(JUDGED * tip.height + law.offset - under).sum(axis=1)
+    return float(0.5 * np.ptp(force) / force.mean())
+
+
+def list_cautions(scene: Scene) -> list[str]:
+    """Return lines on fingers that have another force on this bed than on a plate, or none."""
+    plan, lines = scene.layout, []
+    for finger in dict.fromkeys((each.fingertip, each.contact) for each in scene.fingers):
+        tip, law = finger
+        if tip is None or law is None:
+            continue
+        ratio, spread = law.share / plan.share, measure_lattice(plan, tip, law)
+        if abs(ratio - 1.0) > COARSE:
+            lines.append(
+                f"contact.share {law.share:g} gives {ratio:.3g} of the finger's force on this bed; "
+                f"{plan.share:g}, the area of a cell over 26.5 mm², gives all"
+                " (an older file takes it with format = 2)"
+            )
+        if spread > COARSE:
+            lines.append(
+                f"pins {plan.pitch * 1e3:g} mm apart are coarse for this finger: "
+                f"its force changes by ± {100 * spread:.2g} % from place to place, "
+                f"{JUDGED * tip.height * 1e3:g} mm deep"
+            )
+    return lines

@@ -1,0 +1,402 @@
+"""Strokes that meet: what they leave on a base, how they combine, their limits; drawings."""
+
+import math
+from dataclasses import replace
+from functools import cache
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from digiclay.core.base.errors import SceneError
+from digiclay.core.model.fingertip import LEVEL, Fingertip
+from digiclay.core.model.layout import Layout, make_grid
+from digiclay.core.shapes.heightmap import make_height_map
+from digiclay.recorded.pointer_strokes import PointerStroke, play_strokes, read_strokes
+from digiclay.sessions import sculpting
+from digiclay.sessions.forming import find_device
+from digiclay.sessions.sculpting import queue_stroke, reset, rewind
+from digiclay.settings.devices import BEDS, make_scene
+from digiclay.strokes import drawn
+from digiclay.strokes.nominal import Device, find_ghosts, find_nominal
+from digiclay.strokes.stroke import (
+    DRAGGING,
+    SHALLOWEST,
+    Brush,
+    Combine,
+    lay_path,
+    let_go,
+    make_images,
+    start,
+)
+
+from tests.assemble import assert_near, refused_in_a_line, table
+from tests.hand import heights
+from tests.renew import SAMPLES
+
+PITCH, REST = BEDS["design"].pitch, 40e-3
+#: As wide as drawings need it, with the blister of the bed "design".
+GRID = make_grid(Layout(70, 70, PITCH))
+FLAT = np.full(GRID.count, REST)
+ABOVE = np.array([0.0, 0.0, 46e-3, *LEVEL])
+
+
+@cache
+def scene(count=31):
+    return make_scene(
+        BEDS["design"].preset, Layout(count, count, PITCH), BEDS["design"].method, 0.5
+    )
+
+
+def device(base=FLAT):
+    """Return what forms strokes on a base (n,), m."""
+    blister, actuator = scene().blister, scene().actuator
+    return Device(GRID, Fingertip(), blister, actuator.stroke, rest=REST, base=base)
+
+
+#: How Raise and Lower are combined by the tool.
+EXTREME = {Brush.RAISE: Combine.HIGHEST, Brush.LOWER: Combine.LOWEST}
+
+
+def lay(path, brush=Brush.RAISE, amount=8.0, **more):
+    """Return a stroke along a path, mm, on the base unless told."""
+    places = 1e-3 * np.asarray(path, float)
+    more = {"combine": EXTREME.get(brush, Combine.USUAL)} | more
+    return lay_path(start(0, *places[0], 1e-3 * amount, brush=brush, **more), places)
+
+
+def form(strokes, surface=FLAT, base=FLAT):
+    """Return the heights (n,), m, that strokes leave one after the other."""
+    for stroke in strokes:
+        surface = find_nominal(stroke, device(base), surface).height
+    return surface
+
+
+def bow(x, y, radius, first, last, count=40):
+    """Return places on a circle, mm, between two angles, degrees."""
+    turn = np.radians(np.linspace(first, last, count))
+    return np.column_stack([x + radius * np.cos(turn), y + radius * np.sin(turn)])
+
+
+#: Drawings as a hand makes them, each of several strokes that begin and end on others, mm.
+BOWL = np.vstack([[(-14, 26)], bow(2, 14, 12, 90, -90), [(-14, 2)]])
+DRAWINGS = {
+    "an R": [[(-14, -26), (-14, 26)], BOWL, [(2, 2), (16, -26)]],
+    "an X": [[(-20, -24), (20, 24)], [(20, -24), (-20, 24)]],
+    "a ring and an e": [
+        bow(0, 0, 28, 0, 360, 90),
+        [(-12, 0), (12, 0)],
+        bow(0, 0, 12, 0, 310),
+    ],
+    "a face in profile": [
+        bow(-4, 4, 22, 120, 250),
+        [(-4, 26), (6, 10), (14, 2), (6, -2), (8, -8), (4, -14)],
+        [(4, -14), (-11.5, -16.7)],
+        [(-10, 8), (2, 8)],
+    ],
+}
+
+
+def sample_path(path):
+    """Return places a fifth of a millimeter apart along a path, mm, (k, 2), m."""
+    path = np.asarray(path, float)
+    parts = [np.linspace(a, b, 2 + int(5 * math.dist(a, b))) for a, b in pairwise(path)]
+    return 1e-3 * np.vstack(parts)
+
+
+def along(surface, path):
+    """Return the heights above rest, mm, of the pins along a path that are within half a flat top of it."""
+    places = sample_path(path)
+    return 1e3 * (surface[GRID.at(*places.T)] - REST)
+
+
+@pytest.mark.parametrize(
+    "brush, amount", [(Brush.RAISE, 8.0), (Brush.LOWER, 4.0)], ids=["raised", "lowered"]
+)
+@pytest.mark.parametrize("name", DRAWINGS)
+def test_a_drawing_of_several_strokes_has_its_height_on_each_path(name, brush, amount):
+    strokes, sign = [lay(path, brush, amount) for path in DRAWINGS[name]], 1 if brush.rises else -1
+    left = form(strokes)
+    for path in DRAWINGS[name]:
+        assert_near(sign * along(left, path), amount, 0.1)
+    assert np.abs(left - FLAT).max() == pytest.approx(1e-3 * amount, abs=1e-9)
+    # Pin by pin what goes farthest; so another order, or a second pass, changes nothing.
+    each = np.array([form([stroke]) for stroke in strokes])
+    assert_near(left, each.max(0) if sign > 0 else each.min(0), 1e-12)
+    np.testing.assert_array_equal(form(strokes, left), left)
+    # On the surface, as older strokes were, they add.
+    added = [replace(stroke, combine=Combine.USUAL) for stroke in strokes]
+    assert np.abs(form(added) - FLAT).max() > 1.5e-3 * amount
+
+
+HILLS = FLAT + 3e-3 * np.sin(180.0 * GRID.x) * np.cos(150.0 * GRID.y)
+OTHER = FLAT + 2e-3 * np.cos(210.0 * GRID.x + 70.0 * GRID.y)
+LINE = [(-20, -7), (20, 5)]
+RAMP = make_height_map("ramp", np.arange(1.0, 17.0).reshape(4, 4) / 16.0)
+SQUARE = {"stamp": RAMP}
+
+
+@table(
+    "brush, combine, more, expected",
+    {
+        "raised on a base": (Brush.RAISE, Combine.HIGHEST, {}, np.maximum),
+        "lowered from a base": (Brush.LOWER, Combine.LOWEST, {}, np.minimum),
+        "stamped, the higher one": (Brush.STAMP, Combine.HIGHEST, SQUARE, np.maximum),
+        "stamped, the lower one": (Brush.STAMP, Combine.LOWEST, SQUARE, np.minimum),
+        "stamped, in place": (Brush.STAMP, Combine.REPLACE, SQUARE, lambda _, formed: formed),
+        "imprinted, the lower one": (Brush.IMPRINT, Combine.LOWEST, SQUARE, np.minimum),
+        "stamped onto it": (
+            Brush.STAMP, Combine.ADD, SQUARE, lambda surface, formed: surface + formed - OTHER,
+        ),
+        "leveled onto it": (
+            Brush.LEVEL, Combine.ADD, {}, lambda surface, formed: surface + formed - OTHER,
+        ),
+    },
+)  # fmt: skip
+def test_a_stroke_combines_a_surface_with_what_it_forms_on_the_base(brush, combine, more, expected):
+    stroke = lay(LINE, brush, 4.0, combine=combine, **more)
+    found = find_nominal(stroke, device(OTHER), HILLS)
+    on_base = replace(stroke, combine=Combine.USUAL)
+    if brush is Brush.LEVEL:  # to the height of the surface under its first place
+        first = find_nominal(stroke, device(HILLS), HILLS)
+        level = device().find_level(stroke, stroke.images[0], HILLS)
+        share = (first.height - HILLS) / (level - HILLS)
+        near = found.near & (np.abs(level - HILLS) > 0.5e-3) & (share < 1.0 - 1e-6)
+        assert_near(found.height[near], (HILLS + share * (level - OTHER))[near], 1e-9)
+        return
+    formed = find_nominal(on_base, device(OTHER), OTHER)
+    near = formed.near
+    assert near.sum() > 100
+    assert_near(found.height[near], expected(HILLS, formed.height)[near], 1e-12)
+    np.testing.assert_array_equal(found.height[~near], HILLS[~near])
+
+
+@pytest.mark.parametrize("combine, sign", [(Combine.HIGHEST, 1.0), (Combine.LOWEST, -1.0)])
+def test_level_goes_one_way_alone(combine, sign):
+    both = find_nominal(lay(LINE, Brush.LEVEL), device(), HILLS).height
+    one = find_nominal(lay(LINE, Brush.LEVEL, combine=combine), device(), HILLS).height
+    extreme = np.maximum if sign > 0.0 else np.minimum
+    assert_near(one, extreme(both, HILLS), 1e-12)
+    assert np.ptp(one - HILLS) > 1e-3
+    # Images level to heights of their own: where they meet, what goes farthest that way.
+    slope, images = FLAT + 0.2 * GRID.x, make_images("X")
+    met = [(12, -20), (-2, 18)]
+    each = [
+        form([lay(met, Brush.LEVEL, combine=combine, images=(image,))], slope) for image in images
+    ]
+    both = form([lay(met, Brush.LEVEL, combine=combine, images=images)], slope)
+    assert_near(both, extreme(*each), 1e-9)
+
+
+@pytest.mark.parametrize("symmetry", ["X", "RADIAL"])
+def test_images_that_meet_leave_the_height_of_one_and_accumulate_builds_on_all(symmetry):
+    images = make_images(symmetry, 5)
+    stroke = lay([(-18, -10), (18, 10)], images=images)
+    left = form([stroke])
+    assert 1e3 * (left.max() - REST) == pytest.approx(8.0, abs=1e-9)
+    np.testing.assert_array_equal(form([stroke], left), left)
+    more = replace(stroke, accumulate=True)
+    assert 1e3 * (form([more], left).max() - REST) == pytest.approx(16.0, abs=0.2)
+
+
+@table(
+    "brush, limits, surface, lowest, highest",
+    {
+        "a ridge": (Brush.RAISE, (-math.inf, 5e-3), FLAT, 0.0, 5.0),
+        "a valley": (Brush.LOWER, (-3e-3, 5e-3), FLAT, -3.0, 0.0),
+        "a ridge below what stands": (Brush.RAISE, (-1.0, 1e-3), FLAT + 2e-3, 2.0, 2.0),
+        "a stamp": (Brush.STAMP, (-1.0, 6e-3), FLAT, 0.0, 6.0),
+        "an imprint": (Brush.IMPRINT, (-2e-3, 1.0), FLAT, -2.0, 0.0),
+        "neither": (Brush.RAISE, (-math.inf, math.inf), FLAT, 0.0, 8.0),
+    },
+)
+def test_nothing_that_a_stroke_forms_is_beyond_its_limits(brush, limits, surface, lowest, highest):
+    left = form([lay(LINE, brush, limits=limits, stamp=RAMP)], surface) - REST
+    assert (1e3 * left.min(), 1e3 * left.max()) == pytest.approx((lowest, highest), abs=1e-9)
+
+
+def set_base():
+    return let_go(start(0, 0.0, 0.0, SHALLOWEST, brush=Brush.SET_BASE))
+
+
+def test_the_ghost_of_a_queue_counts_from_the_base_that_the_queue_sets():
+    first, second = lay(LINE), lay([(0, -20), (0, 20)])
+    strokes = tuple(
+        replace(each, number=n) for n, each in enumerate([first, second, set_base(), second])
+    )
+    ghosts = find_ghosts(strokes, device(), FLAT)
+    met = form([first, second])
+    np.testing.assert_array_equal(ghosts[1].nominal.height, met)
+    np.testing.assert_array_equal(ghosts[-1].nominal.height, form([second], met, met))
+    # The same path on another base is found anew; on the same one it stays.
+    kept = find_ghosts(strokes[:1], device(), FLAT)
+    assert find_ghosts(strokes[:1], device(OTHER), FLAT, kept)[0].nominal is not kept[0].nominal
+    same = replace(device(), base=kept[0].base)
+    assert find_ghosts(strokes[:1], same, FLAT, kept)[0].nominal is kept[0].nominal
+
+
+def begin(count=31):
+    return sculpting.begin_session(7, "Bed", scene(count), ABOVE)[0]
+
+
+def queue(session, *strokes):
+    for stroke in strokes:
+        session, _ = queue_stroke(session, stroke)
+    return session
+
+
+def finish(session):
+    """Return the session when its strokes are formed, and the largest force, N, of the fingertip."""
+    force = 0.0
+    while session.strokes:
+        session = sculpting.follow_finger(session, session.pose, 16)
+        force = max(force, float(session.trace.force.max(initial=0.0)))
+    return session, force
+
+
+SMALL_R = [
+    [(-8, -14), (-8, 14)],
+    np.vstack([[(-8, 13)], bow(0, 7, 6, 90, -90, 20), [(-8, 1)]]),
+    [(0, 1), (9, -14)],
+]
+
+
+@pytest.mark.parametrize("brush, amount", [(Brush.RAISE, 8.0), (Brush.LOWER, 4.0)])
+def test_an_r_of_three_strokes_is_formed_as_its_ghost_shows_and_no_finger_is_pressed_hard(
+    brush, amount
+):
+    session = queue(begin(), *(lay(path, brush, amount) for path in SMALL_R))
+    ghost = find_ghosts(session.strokes, find_device(session), heights(session))[-1].nominal
+    done, force = finish(session)
+    # A pin has arrived within half a micrometer, and its valve still lets as much through.
+    assert_near(heights(done), ghost.height, 1.5e-6)
+    off = 1e3 * np.abs(heights(done) - REST)
+    assert off.max() == pytest.approx(amount, abs=0.01)
+    # As elsewhere on a formed bed: a hand presses with 1 N.
+    assert force < 2.0
+
+
+def test_set_base_is_a_gesture_and_a_reset_brings_the_base_to_rest():
+    session, _ = finish(queue(begin(), lay([(-9, 0), (9, 0)])))
+    assert (session.base == REST).all()
+    based, _ = finish(queue(session, set_base()))
+    np.testing.assert_array_equal(based.base, heights(based))
+    assert len(based.gestures) == len(session.gestures) + 1
+    twice, _ = finish(queue(based, lay([(-9, 0), (9, 0)])))
+    assert 1e3 * (heights(twice).max() - REST) == pytest.approx(16.0, abs=0.1)
+    back = rewind(rewind(twice))
+    assert (back.base == REST).all()
+    assert (reset(based).base == REST).all()
+    np.testing.assert_array_equal(rewind(reset(based)).base, based.base)
+    # Other parameters of the same pins keep it; a bed of other pins counts from its surface.
+    other = replace(twice.scene, simulation=replace(twice.scene.simulation, duration=9.0))
+    np.testing.assert_array_equal(sculpting.change_scene(twice, other)[0].base, based.base)
+    assert sculpting.change_scene(twice, scene(21))[0].base.size == 21**2
+    undone = sculpting.restore(twice, based.snapshot, based.poses, base=np.zeros(3))
+    np.testing.assert_array_equal(undone.base, heights(based))
+
+
+LIMITED = lay(LINE, limits=(-1e-3, 5e-3))
+
+
+@pytest.mark.parametrize(
+    "stroke",
+    [LIMITED, lay(LINE, combine=Combine.USUAL), lay(LINE, Brush.LEVEL, combine=Combine.ADD)],
+)
+def test_a_stored_stroke_is_what_was_drawn(stroke):
+    read = drawn.load(drawn.dump(stroke))
+    assert (read.combine, read.limits, read.samples) == (
+        stroke.combine,
+        stroke.limits,
+        stroke.samples,
+    )
+
+
+@pytest.mark.parametrize(
+    "more",
+    ['"LOUD"', '{"combine": "LOUD"}', '{"combine": "LOWEST"}', '{"limits": [1, 0]}', '{"limits": [1]}',
+     '{"limits": [NaN, 1]}', '{"limits": "ab"}', '{"depth": 3}', "7", "{}, {}"],
+)  # fmt: skip
+def test_a_stored_stroke_somebody_has_broken_is_none(more):
+    line = drawn.dump(lay(LINE, combine=Combine.USUAL))
+    assert drawn.load(line) is not None
+    assert drawn.load(f"{line[:-1]}, {more}]") is None
+
+
+STROKE = "[[stroke]]\nmoves = [[0, 0, 0], [0.1, 0.01, 0]]\n"
+
+
+@pytest.mark.parametrize(
+    "text, said",
+    [
+        ('brush = "raise"\ncombine = "lowest"', r"must be one of usual, add, highest with raise"),
+        ('brush = "smooth"\ncombine = "add"', r"combine must be one of usual with smooth"),
+        ('combine = "most"', r"stroke #1\.combine must be one of"),
+        ('limit_low = "5 mm"\nlimit_high = "1 mm"', r"limit_low must be at most limit_high, 0\.001 m"),
+        ("limit_low = nan", r"limit_low must be a finite number"),
+    ],
+)  # fmt: skip
+def test_a_file_of_strokes_that_cannot_combine_so_is_refused(tmp_path, text, said):
+    path = tmp_path / "strokes.toml"
+    path.write_text(f"{STROKE}{text}\n", encoding="utf-8")
+    with refused_in_a_line(SceneError, said):
+        read_strokes(path)
+
+
+def test_a_file_of_strokes_sets_a_base_and_limits():
+    line = {"brush": "raise", "combine": "highest", "height": 6e-3, "path": "line"}
+    moves = ((0.0, -9e-3, 0.0), (0.2, 9e-3, 0.0))
+    strokes = [PointerStroke(**line, moves=moves), PointerStroke(**line, moves=moves)]
+    *_, once = play_strokes(begin(21), tuple(strokes))
+    assert 1e3 * (heights(once).max() - REST) == pytest.approx(6.0, abs=0.01)
+    strokes.insert(1, PointerStroke(brush="set_base"))
+    strokes[-1] = replace(strokes[-1], limit_high=9e-3)
+    *_, twice = play_strokes(begin(21), tuple(strokes))
+    assert 1e3 * (heights(twice).max() - REST) == pytest.approx(9.0, abs=0.01)
+
+
+#: m: other processors and versions of numpy take sums in another order. On that of the samples' README
+#: the heights are the same.
+ROUNDING = 1e-9
+
+
+def test_strokes_of_older_files_form_what_they_formed():
+    folder = SAMPLES / "strokes"
+    lines, stood = (
+        (folder / "queue.txt").read_text(encoding="utf-8").splitlines(),
+        np.load(folder / "heights.npz"),
+    )
+    strokes = [drawn.load(line) for line in lines]
+    assert [drawn.dump(stroke) for stroke in strokes] == lines
+    session = queue(begin(), *strokes)
+    ghost = find_ghosts(session.strokes, find_device(session), heights(session))[-1]
+    assert_near(ghost.nominal.height, stood["ghost"], ROUNDING)
+    assert_near(heights(finish(session)[0]), stood["queue"], ROUNDING)
+    *_, played = play_strokes(begin(), read_strokes(folder / "file.toml").strokes)
+    assert_near(heights(played), stood["played"], ROUNDING)
+
+
+LIMITS = {"limits": (7e-3, 1.0)}
+
+
+@pytest.mark.parametrize(
+    "first, combine, limits",
+    [
+        (Brush.RAISE, Combine.HIGHEST, {}),
+        (Brush.LOWER, Combine.LOWEST, {}),
+        (Brush.RAISE, Combine.USUAL, LIMITS),
+    ],
+)
+def test_the_fingertip_goes_along_what_is_beyond_that_which_its_stroke_forms(
+    first, combine, limits
+):
+    session, _ = finish(queue(begin(), lay([(0, -14), (0, 14)], first)))
+    session = queue(session, lay([(-14, 0), (14, 0)], Brush.LEVEL, combine=combine, **limits))
+    places = []
+    while session.strokes:
+        session = sculpting.follow_finger(session, session.pose, 1)
+        if session.strokes and session.strokes[0].phase == DRAGGING:
+            places.append(1e3 * session.pose[:3])
+    x, _, z = np.array(places).T
+    # The fingertip lies a millimeter deep in the pins that it leads.
+    crossed = z[np.abs(x) < 1.0] - 40.0
+    assert_near(crossed, 7.2 if first.rises else -9.0, 1.5)
