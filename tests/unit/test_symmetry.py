@@ -10,7 +10,7 @@ from digiclay.core.model.fingertip import LEVEL
 from digiclay.core.model.layout import Layout
 from digiclay.core.session import snapshot
 from digiclay.core.session.take import from_bytes, make_take, play, to_bytes
-from digiclay.sessions.forming import find_device
+from digiclay.sessions.forming_device import find_device
 from digiclay.sessions.running import list_pressing
 from digiclay.sessions.sculpting import (
     begin_session,

@@ -16,12 +16,10 @@ from ..press.pointer import begin_button, read_event
 from ..sessions import running, sculpting
 from ..sessions.running import find_stroke, last_place
 from ..sessions.sculpting import change_stroke, queue_stroke
-from ..settings.declared import choice, flag, integer, number, text, title
+from ..settings.declared import title
 from ..strokes.falloff import Falloff
 from ..strokes.stroke import (
     DEEPEST,
-    FEWEST,
-    MOST,
     PLACED,
     STAMPS,
     Brush,
@@ -40,8 +38,9 @@ from ..strokes.stroke import (
 )
 from ..strokes.tracking import find_tracking
 from ..ui_text import localize
-from .action import Drawing, Modal, Polled, Result, clear_status, inform, millimeters, show_status
+from .action import Drawing, Modal, Polled, Result, clear_status, inform, show_status
 from .poll_messages import no_place, no_tool
+from .press_settings import PressSettings
 
 #: How far a turn of the wheel takes the surface up, m.
 WHEEL = 0.25e-3
@@ -57,121 +56,6 @@ HIDDEN = "{} hides the bed here: press beside it, look from elsewhere, or hide i
 RECOVERS = "These pins will not stay: the method {} moves all pins back"
 #: Result of a press on something else: Blender shows no reports of an operator that only passes.
 NOT_PRESSED = {"CANCELLED", "PASS_THROUGH"}
-
-
-#: Range of a place on the bed, mm.
-PLACE = {"soft_min": -100.0, "soft_max": 100.0, "step": 100}
-
-
-class PressSettings:
-    """Settings of the tool: properties of the operator, which the header shows and presets store."""
-
-    brush: choice(
-        "Brush",
-        "What a stroke does to the surface",
-        items=brush.BRUSH_ITEMS,
-        default="LOWER",
-        translation_context="Brush",
-    )
-    depth: millimeters(
-        "Depth",
-        4e-3,
-        "How far a stroke of Lower, or a stamp with Ctrl, goes below the surface, in mm",
-        min=0.1,
-        max=1e3 * DEEPEST,
-        soft_max=10.0,
-        step=25,
-    )
-    height: millimeters(
-        "Height",
-        6e-3,
-        "How far a stroke of Raise, or a stamp, goes above the surface, in mm",
-        min=0.1,
-        max=1e3 * DEEPEST,
-        soft_max=30.0,
-        step=100,
-    )
-    strength: number(
-        "Strength",
-        "Share of the depth, of the height, or of the way to the level that a stroke reaches, "
-        "and strength of Smooth; pen pressure scales it further",
-        default=1.0,
-        min=0.01,
-        max=1.0,
-        subtype="FACTOR",
-        precision=2,
-    )
-    symmetry: choice(
-        "Symmetry",
-        "Mirrored or rotated images of a stroke, formed at the same time as one undo step",
-        items=brush.SYMMETRY_ITEMS,
-        default="NONE",
-    )
-    radial: integer("Radial Count", "Number of images", default=6, min=FEWEST, max=MOST)
-    center_x: millimeters("Center X", 0.0, "Center of the symmetry", **PLACE)
-    center_y: millimeters("Center Y", 0.0, "Center of the symmetry", **PLACE)
-    axis: number("Axis", "Turn of the mirror's axes", default=0.0, subtype="ANGLE", step=1000)
-    stamp: choice("Stamp", "Shape that is stamped", items=brush.STAMP_ITEMS, default="heart")
-    stamp_file: text("File", "Mesh, picture or .npy file that is stamped", subtype="FILE_PATH")
-    falloff: choice(
-        "Falloff",
-        "Flanks of Raise, Lower and Level, and effect of brushes in the ring; that of Lock is constant",
-        items=brush.FALLOFF_ITEMS,
-        default="DEVICE",
-    )
-    accumulate: flag(
-        "Accumulate",
-        "Build on the surface as it is: where strokes meet, or one returns, heights and depths add. "
-        "Else Raise and Lower count from the base",
-        default=False,
-    )
-    combine: choice(
-        "Combine",
-        "What Level and Stamp leave where something is formed already",
-        items=brush.COMBINE_ITEMS,
-        default="USUAL",
-    )
-    use_limit: flag("Limit", "Form nothing below and above two heights", default=False)
-    limit_low: millimeters(
-        "Lowest", -10e-3, "Height above rest below which nothing is formed", **PLACE
-    )
-    limit_high: millimeters(
-        "Highest", 10e-3, "Height above rest above which nothing is formed", **PLACE
-    )
-    finish: choice(
-        "Finish",
-        "What becomes of the pins when the fingertip of Lower, Raise or Level has left",
-        items=brush.FINISH_ITEMS,
-        default="NOMINAL",
-    )
-    path: choice("Stroke", "Path of a stroke", items=brush.PATH_ITEMS, default="FREE")
-    stabilizer: millimeters(
-        "Stabilizer",
-        0.0,
-        "Length, in mm, by which a free stroke lags behind the mouse, so that it becomes smoother; "
-        "its end is reached. 0: none",
-        min=0.0,
-        max=50.0,
-        soft_max=15.0,
-        precision=1,
-        step=50,
-    )
-    use_pressure: flag(
-        "Pen Pressure",
-        "Pen pressure scales depth, height and strength, up to their values",
-        default=True,
-    )
-    pressure_curve: choice(
-        "Pressure Curve",
-        "Share of the values that a pen reaches with part of its pressure",
-        items=pointer.CURVE_ITEMS,
-        default="LINEAR",
-    )
-    use_tilt: flag(
-        "Pen Tilt",
-        "The fingertip leans with the pen, by up to 60 degrees, until the stroke ends",
-        default=True,
-    )
 
 
 class Press(PressSettings, Modal, Operator):

@@ -18,7 +18,7 @@ from ..core.base.arrays import Floats
 from ..core.model.layout import Grid, Layout
 from ..core.surface.formed import take_corners
 from ..sessions import running
-from ..sessions.forming import find_device
+from ..sessions.forming_device import find_device
 from ..sessions.running import Running
 from ..strokes.nominal import Ghost, find_ghosts
 from ..strokes.stroke import Stroke

@@ -24,7 +24,7 @@ from ..strokes.stroke import FINISHING, Brush, Stroke
 from ..strokes.sweep import SWEEPS, WHOLE, finish, order_all, sweep
 from ..strokes.tracking import find_tracking
 from ..ui_text import localize
-from .forming import find_device
+from .forming_device import find_device
 from .restored_states import CHANGED, Numbers, change_fingers, fit_base, load_state
 from .running import Gesture, Running, find_stroke, list_pressing, match_poses, name_fingers
 

@@ -56,6 +56,8 @@ class Workspace:
         top = self.device.find_top(
             stroke, stroke.samples[stroke.reached], (x, y), stroke.ground, level
         )
+        # Where the surface is beyond what the stroke forms it goes along on that.
+        top = float(self.device.combine(stroke, self.device.find_surface(stroke.ground, x, y), top))
         if stroke.brush is Brush.RAISE and stroke.standing is not None:
             # It rides over what an image before has raised higher.
             top = max(top, self.find_touch(stroke, x, y))
