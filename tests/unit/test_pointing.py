@@ -149,3 +149,17 @@ def test_the_patch_never_leaves_the_finger(depth):
     radius = np.hypot(rim[:, 0] / 10e-3, rim[:, 1] / 8e-3)
     # The root of a rounding error of 1e-16 is 1e-8.
     assert_near(radius, 1.0 if depth > 0.0 else 0.0, 1e-7)
+
+
+# So far off in the device's measures is where an orthographic view of a bed at a thousandth of its size
+# begins to look.
+@pytest.mark.parametrize("away", [0.3, 1e5])
+def test_flat_pins_are_met_from_any_distance_however_a_ray_is_rounded(away):
+    cells, _ = bed()
+    flat, rng = np.full(cells.count, 0.04), np.random.default_rng(4)
+    lowest, highest = [-0.02, -0.015, 0.0, 0.8], [0.02, 0.015, 6.2, 1.5]
+    for x, y, turn, tilt in rng.uniform(lowest, highest, (200, 4)):
+        way = np.array([np.sin(tilt) * np.cos(turn), np.sin(tilt) * np.sin(turn), -np.cos(tilt)])
+        found = intersect_surface(cells, flat, np.array([x, y, 0.04]) - away * way, way)
+        # Fifteen digits of the distance.
+        assert_near(found, [x, y, 0.04], 1e-15 * (1.0 + away))

@@ -6,6 +6,7 @@ import numpy as np
 from tests.window.hand_strokes import (
     act,
     brush,
+    done,
     finish,
     line,
     note,
@@ -22,16 +23,19 @@ LONG, HALF = 30.0, 15.0
 QUICK, SLOWER = (0.5, 125), (0.6, 125)
 #: How far the pins stand out that are smoothed, m, and where, mm.
 SPIKE, SPIKES = 12e-3, ((0.0, 0.0), (0.0, 18.0))
+#: Height of a ridge along y, m, and its width, mm.
+RIDGE, WIDTH = 15e-3, 8.0
 
 
-def put_spikes(blender):
+def put_up(blender, rise):
+    """Have pins stand out at rest, by what is found from the grid, m."""
     session = blender.session()
     system = session.system
     state = blender.part("core.engine.simulation").begin(system)
-    cells = system.grid.at(*(1e-3 * np.array(SPIKES)).T)
+    rises = rise(system.grid)
     for row in (0, system.rows.target):
-        state.rows[row, cells] += SPIKE
-    state.modes[cells] = 1
+        state.rows[row] += rises
+    state.modes[rises > 0.0] = 1
     kept = blender.part("core.session.snapshot").dump(
         system, state._replace(peak=float(state.rows[0].max()))
     )
@@ -40,7 +44,17 @@ def put_spikes(blender):
     back = blender.part("sessions.sculpting").restore(session, kept, pose)
     blender.part("live.tick").show(blender.beds()[0], back)
     blender.part("live.tick").place_fingers(bpy.context, blender.beds()[0], back)
-    blender.call(bpy.ops.ed.undo_push, message="Spikes")
+    blender.call(bpy.ops.ed.undo_push, message="Pins that stand out")
+
+
+def spikes(grid):
+    rise = np.zeros(grid.count)
+    rise[grid.at(*(1e-3 * np.array(SPIKES)).T)] = SPIKE
+    return rise
+
+
+def ridge(grid):
+    return RIDGE * np.exp(-((1e3 * grid.x / WIDTH) ** 2))
 
 
 def script(blender):
@@ -48,6 +62,25 @@ def script(blender):
     yield from raise_and_level(blender)
     yield from reset(blender)
     yield from smooth(blender)
+    yield from reset(blender)
+    yield from across_a_ridge(blender)
+
+
+def across_a_ridge(blender):
+    """Draw a line of Lower that is straight in perspective across a ridge, projected either way."""
+    settings = brush(blender)
+    for project in ("SURFACE", "PLANE"):
+        put_up(blender, ridge)
+        yield from blender.settle(5)
+        settings.project = project
+        process = line(blender, (-LONG, -HALF), (LONG, HALF), *QUICK)
+        yield from done(blender, process)
+        blender.shot(f"ridge_{project.lower()}")
+        (stroke,) = blender.session().strokes
+        path = [[1e3 * sample.x, 1e3 * sample.y] for sample in stroke.samples]
+        yield from act(blender, "key ctrl+z")
+        note(blender, project)
+        blender.SEEN[project]["path"] = path
 
 
 def raise_and_level(blender):
@@ -76,7 +109,7 @@ def raise_and_level(blender):
 def smooth(blender):
     """Smooth by Shift and by the header's brush, undo, cancel, and form a line by Shift and a click."""
     yield from act(blender, to(on_the_screen(blender, -27.0, -27.0)), "click 1")
-    put_spikes(blender)
+    put_up(blender, spikes)
     yield from blender.settle(5)
     note(blender, "before")
     first = []

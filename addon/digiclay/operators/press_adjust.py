@@ -155,7 +155,8 @@ class AdjustMixin(Drawing):
 
 def _find_place(context: Context, xy: Place) -> tuple[Any, Any]:
     """Return the bed under a pixel of the region and the place there, m; or the bed in use and its middle."""
-    target = aim.find_target(context, xy)
+    settings = brush.tool_settings(context)
+    target = aim.find_target(context, xy, settings.project if settings else aim.SURFACE)
     tip = target and fingertip_of(target.bed)
     if target is not None and tip is not None and not find_obstacle(context, target.bed, Use.FORM):
         return target.bed, target.point

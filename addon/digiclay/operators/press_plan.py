@@ -40,19 +40,16 @@ class PlaceCenter(Drawing, Operator):
         xy = event.mouse_x - self.region.x, event.mouse_y - self.region.y
         if event.type == "LEFTMOUSE" and event.value == "PRESS":
             with context.temp_override(region=self.region):
-                target = find_pressed(self, bpy.context, xy)
+                target = find_pressed(self, bpy.context, xy, settings)
             if target is not None:
-                self.uid, self.grid, self.height = (
-                    target.bed.session_uid,
-                    target.grid,
-                    target.height.copy(),
-                )
+                self.uid, self.grid = target.bed.session_uid, target.grid
+                self.canvas = target.canvas.copy()
                 self.center = float(target.point[0]), float(target.point[1])
                 brush.put_center(settings, *self.center)
         elif event.type in ("MOUSEMOVE", "LEFTMOUSE") and self.uid:
             bed = brush.find_bed(context, self.uid)
             with context.temp_override(region=self.region):
-                point = bed and aim.hit_point(bpy.context, bed, self.grid, self.height, xy)
+                point = bed and aim.hit_point(bpy.context, bed, self.grid, self.canvas, xy)
             if point is not None:
                 brush.turn_axis(
                     settings, float(point[0]) - self.center[0], float(point[1]) - self.center[1]

@@ -90,6 +90,12 @@ class PressSettings:
         items=brush.FINISH_ITEMS,
         default="NOMINAL",
     )
+    project: choice(
+        "Project",
+        "What the mouse moves over as it draws",
+        items=brush.PROJECT_ITEMS,
+        default=brush.SURFACE,
+    )
     path: choice("Stroke", "Path of a stroke", items=brush.PATH_ITEMS, default="FREE")
     stabilizer: millimeters(
         "Stabilizer",

@@ -72,7 +72,7 @@ class Press(PressSettings, Modal, Operator):
         self.kind = brush.choose_brush(self.brush, event)
         if brush.find_path(self, self.kind) != "FREE":
             return {"PASS_THROUGH"}  # to the operator of lines, rings and stamps
-        target = find_pressed(self, context, brush.find_press(context, event))
+        target = find_pressed(self, context, brush.find_press(context, event), self)
         if target is None:
             return NOT_PRESSED
         options = brush.find_options(self, self.kind)
@@ -81,7 +81,7 @@ class Press(PressSettings, Modal, Operator):
             return {"CANCELLED"}
         # The hand draws on the surface it has seen when it began, not on pins that give way under
         # it.
-        self.uid, self.grid, self.surface = session.uid, target.grid, target.height.copy()
+        self.uid, self.grid, self.canvas = session.uid, target.grid, target.canvas.copy()
         self.full = 1e-3 * getattr(self, brush.amount_name(self.kind))
         self.pressure, self.lean = 1.0, (0.0, 0.0)
         self.button = begin_button(event.value, (event.type_prev, event.value_prev))
@@ -141,7 +141,7 @@ class Press(PressSettings, Modal, Operator):
         xy = event.mouse_x - self.region.x, event.mouse_y - self.region.y
         with context.temp_override(region=self.region):
             self._feel(bpy.context, bed, event)
-            point = aim.hit_point(bpy.context, bed, self.grid, self.surface, xy)
+            point = aim.hit_point(bpy.context, bed, self.grid, self.canvas, xy)
         if point is not None and event.value != "PRESS":
             # Released, the stroke goes on to the mouse: a stabilized one has not come there yet.
             string = 1e-3 * self.stabilizer if event.type != "LEFTMOUSE" else 0.0
@@ -209,9 +209,11 @@ def _is_undo_key(context: Context, event: Event) -> bool:
     )
 
 
-def find_pressed(operator: Operator, context: Context, xy: Place) -> aim.Target | None:
+def find_pressed(
+    operator: Operator, context: Context, xy: Place, settings: OperatorProperties
+) -> aim.Target | None:
     """Return the place on a bed under a pixel of the region; the operator reports what hides it."""
-    target, hider = aim.look_at(context, xy)
+    target, hider = aim.look_at(context, xy, settings.project)
     if hider is not None:
         inform(operator, HIDDEN, hider.name, level="WARNING")
     return target if hider is None else None
@@ -293,10 +295,11 @@ class PressShape(Drawing, Operator):
         self.shape = brush.find_path(settings, self.kind)
         if self.shape not in SHAPES:
             return {"PASS_THROUGH"}  # Shift smooths along a free path
-        target = find_pressed(self, context, brush.find_press(context, event))
+        target = find_pressed(self, context, brush.find_press(context, event), settings)
         if target is None:
             return NOT_PRESSED
         self.uid, self.grid, self.height = target.bed.session_uid, target.grid, target.height.copy()
+        self.canvas = target.canvas.copy()
         self.start = self.to = float(target.point[0]), float(target.point[1])
         self._show(context)
         return None
@@ -312,7 +315,7 @@ class PressShape(Drawing, Operator):
             return {"PASS_THROUGH"}
         xy = event.mouse_x - self.region.x, event.mouse_y - self.region.y
         with context.temp_override(region=self.region):
-            point = aim.hit_point(bpy.context, bed, self.grid, self.height, xy)
+            point = aim.hit_point(bpy.context, bed, self.grid, self.canvas, xy)
         if point is not None:
             self.to = float(point[0]), float(point[1])
         self._show(context)
@@ -365,13 +368,14 @@ class PressLine(Polled, Operator):
 
     def invoke(self, context: Context, event: Event) -> Result:
         """Queue the line; without a stroke before it, the place alone."""
-        target = find_pressed(self, context, (event.mouse_region_x, event.mouse_region_y))
+        settings: OperatorProperties = brush.tool_settings(context)
+        xy = event.mouse_region_x, event.mouse_region_y
+        target = find_pressed(self, context, xy, settings)
         if target is None:
             return NOT_PRESSED
         to = float(target.point[0]), float(target.point[1])
         session = running.find(target.bed)
         start = last_place(session) if session is not None else None
-        settings: OperatorProperties = brush.tool_settings(context)
         kind = Brush(settings.brush)
         path = [to] if start is None or kind in STAMPS else lay_line(start, to)
         return _queue_path(self, context, target.bed, path, kind)

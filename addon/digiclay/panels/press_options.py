@@ -43,6 +43,7 @@ def stroke_options(column: UILayout, settings: OperatorProperties) -> None:
     row = column.column()
     row.enabled = settings.path == "FREE"
     row.prop(settings, "stabilizer")
+    column.prop(settings, "project")
     column.prop(settings, "symmetry")
     if settings.symmetry == "RADIAL":
         column.prop(settings, "radial")

@@ -29,7 +29,9 @@ class Target:
     grid: Grid
     #: (n,), heights of the pin tops, m.
     height: Floats
-    #: (3,), where the ray met them, in the bed's space, m.
+    #: (n,), heights of what the mouse moves over, m: of those, or of the rest plane.
+    canvas: Floats
+    #: (3,), where the ray met that, in the bed's space, m.
     point: Floats
 
     @property
@@ -38,34 +40,52 @@ class Target:
         return int(self.grid.at(self.point[:1], self.point[1:2])[0])
 
 
-def find_target(context: Context, xy: Place) -> Target | None:
+#: Where a stroke goes: on the surface that is seen, or on the plane of the pins at rest.
+SURFACE, PLANE = "SURFACE", "PLANE"
+
+
+def find_target(context: Context, xy: Place, project: str = SURFACE) -> Target | None:
     """Return the nearest place on a bed that is seen under a pixel of the context's region."""
-    target, hider = look_at(context, xy)
+    target, hider = look_at(context, xy, project)
     return target if hider is None else None
 
 
-def look_at(context: Context, xy: Place) -> tuple[Target | None, Object | None]:
+def look_at(
+    context: Context, xy: Place, project: str = SURFACE
+) -> tuple[Target | None, Object | None]:
     """Return the nearest place on a visible bed under a pixel, and the object that hides it there, if any."""
-    target, nearest, eye = None, np.inf, np.zeros(3)
+    target, nearest, sight = None, np.inf, np.zeros((2, 3))
     for bed in context.visible_objects:
         if not is_bed(bed):
             continue
         try:
             cells, height = read_surface(bed)
-            point = hit_point(context, bed, cells, height, xy)
+            seen = hit_point(context, bed, cells, height, xy)
+            canvas = _find_canvas(bed, height, project)
+            point = seen if canvas is height else hit_point(context, bed, cells, canvas, xy)
         except DigiclayError:  # the bed is looked through; pressing on it reports why
             continue
         if point is None:
             continue
+        # What hides the bed is in front of its pins, also where these are in front of the plane.
+        end = point if seen is None else seen
         origin, direction = _ray(context, bed, xy)
-        distance = bridge.uniform(bed) * float((point - origin) @ direction)
+        distance = bridge.uniform(bed) * float((end - origin) @ direction)
         if distance < nearest:
-            target, nearest, eye = Target(bed, cells, height, point), distance, origin
+            target, nearest = Target(bed, cells, height, canvas, point), distance
+            sight = np.array([_place(bed, origin), _place(bed, end)])
     if target is None:
         return None, None
-    return target, find_hider(
-        context, target.bed, _place(target.bed, eye), _place(target.bed, target.point)
-    )
+    return target, find_hider(context, target.bed, *sight)
+
+
+def _find_canvas(bed: Object, height: Floats, project: str) -> Floats:
+    """Return the heights (n,), m, of what the mouse moves over on pins at heights (n,), m."""
+    if project == SURFACE:
+        return height
+    session = running.find(bed)
+    scene = properties.scene_of(bed) if session is None else session.scene
+    return np.full_like(height, scene.actuator.rest_height)
 
 
 def read_surface(bed: Object) -> tuple[Grid, Floats]:

@@ -18,6 +18,7 @@ from ..strokes.falloff import Falloff
 from ..strokes.stamps import load_stamp
 from ..strokes.stroke import COMBINATIONS, LOCKS, STAMPS, Brush, Combine, Image, make_images
 from ..ui_text import localize
+from .aim import PLANE, SURFACE
 
 #: Semi-axes that differ by less are the same, m.
 SAME = 1e-6
@@ -151,6 +152,19 @@ PATH_ITEMS = (
     ("FREE", "Free", "Drag to draw the path"),
     ("LINE", "Line", "Drag from one end of the line to the other; it is formed on release"),
     ("RING", "Ring", "Drag from the center of the ring to its rim; it is formed on release"),
+)
+PROJECT_ITEMS = (
+    (
+        SURFACE,
+        "Surface",
+        "Where the mouse is on the surface that is seen. In an orthographic top view both are the same",
+    ),
+    (
+        PLANE,
+        "Rest Plane",
+        "Where the mouse is on the plane of the pins at rest: a line that is straight in the view is "
+        "straight on the bed, whatever stands there",
+    ),
 )
 
 COMBINE_ITEMS = (

@@ -203,13 +203,13 @@ def _draw_cursor(context: Context, tool: WorkSpaceTool, xy: tuple[int, int]) -> 
     if any(operator.bl_idname in ADJUSTING for operator in context.window.modal_operators):
         return
     corner = region.x, region.y
-    target, hider = aim.look_at(context, (xy[0] - region.x, xy[1] - region.y))
+    settings = tool.operator_properties(OPERATOR)
+    target, hider = aim.look_at(context, (xy[0] - region.x, xy[1] - region.y), settings.project)
     if hider is not None:
         cursor([], make_label(context, localize("{} hides the bed", hider.name), xy, corner))
         return
     if target is None or fingertip_of(target.bed) is None:
         return
-    settings = tool.operator_properties(OPERATOR)
     brush, amount, _ = find_shown(target.bed, settings)
     depth = 1e-3 * settings.depth if brush.rises else amount
     rim = close(touch_outline(target.bed, target.grid.layout, target.point[:2], depth, brush))
@@ -224,6 +224,8 @@ def _draw_cursor(context: Context, tool: WorkSpaceTool, xy: tuple[int, int]) -> 
 def describe(bed: Object, settings: OperatorProperties) -> str:
     """Return what is shown beside the cursor: what the press does, and what the bed's session forms."""
     words = describe_brush(bridge.finger_of(fingertip_of(bed)), *find_shown(bed, settings))
+    if settings.project == aim.PLANE:
+        words += localize("   Rest Plane")
     session = running.find(bed)
     if session is None or not session.strokes:
         return words

@@ -53,8 +53,8 @@ def intersect_surface(
     count = 2 + math.ceil(STEPS * length / min(plan.pitch, plan.row_spacing))
     times = np.linspace(first, last, count)
     points = origin + times[:, None] * direction
-    # Rounding must not let the ray slip below the lowest top.
-    points[-1, 2] = max(points[-1, 2], low[2])
+    # Rounding must not let the ray slip below the lowest top, nor pass over flat ones.
+    points[:, 2] = points[:, 2].clip(low[2], high[2])
     tops = height[grid.at(points[:, 0], points[:, 1])]
     met = np.flatnonzero(points[:, 2] <= tops + 1e-12)
     if not met.size:
