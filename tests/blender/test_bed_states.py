@@ -71,6 +71,7 @@ ELSEWHERE = {
     "digiclay.press_strength",
     "digiclay.press_brush",
     "digiclay.press_brush_save",
+    "digiclay.press_base",
     "digiclay.press_center",
     "digiclay.press_keys",
     "digiclay.press_locks_invert",
