@@ -1,9 +1,8 @@
-"""Strokes that meet: what they leave on a base, how they combine, their limits; drawings."""
+"""Strokes that meet: what they leave on a base, how they combine, their limits."""
 
 import math
 from dataclasses import replace
 from functools import cache
-from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -75,57 +74,6 @@ def bow(x, y, radius, first, last, count=40):
     """Return places on a circle, mm, between two angles, degrees."""
     turn = np.radians(np.linspace(first, last, count))
     return np.column_stack([x + radius * np.cos(turn), y + radius * np.sin(turn)])
-
-
-#: Drawings as a hand makes them, each of several strokes that begin and end on others, mm.
-BOWL = np.vstack([[(-14, 26)], bow(2, 14, 12, 90, -90), [(-14, 2)]])
-DRAWINGS = {
-    "an R": [[(-14, -26), (-14, 26)], BOWL, [(2, 2), (16, -26)]],
-    "an X": [[(-20, -24), (20, 24)], [(20, -24), (-20, 24)]],
-    "a ring and an e": [
-        bow(0, 0, 28, 0, 360, 90),
-        [(-12, 0), (12, 0)],
-        bow(0, 0, 12, 0, 310),
-    ],
-    "a face in profile": [
-        bow(-4, 4, 22, 120, 250),
-        [(-4, 26), (6, 10), (14, 2), (6, -2), (8, -8), (4, -14)],
-        [(4, -14), (-11.5, -16.7)],
-        [(-10, 8), (2, 8)],
-    ],
-}
-
-
-def sample_path(path):
-    """Return places a fifth of a millimeter apart along a path, mm, (k, 2), m."""
-    path = np.asarray(path, float)
-    parts = [np.linspace(a, b, 2 + int(5 * math.dist(a, b))) for a, b in pairwise(path)]
-    return 1e-3 * np.vstack(parts)
-
-
-def along(surface, path):
-    """Return the heights above rest, mm, of the pins along a path that are within half a flat top of it."""
-    places = sample_path(path)
-    return 1e3 * (surface[GRID.at(*places.T)] - REST)
-
-
-@pytest.mark.parametrize(
-    "brush, amount", [(Brush.RAISE, 8.0), (Brush.LOWER, 4.0)], ids=["raised", "lowered"]
-)
-@pytest.mark.parametrize("name", DRAWINGS)
-def test_a_drawing_of_several_strokes_has_its_height_on_each_path(name, brush, amount):
-    strokes, sign = [lay(path, brush, amount) for path in DRAWINGS[name]], 1 if brush.rises else -1
-    left = form(strokes)
-    for path in DRAWINGS[name]:
-        assert_near(sign * along(left, path), amount, 0.1)
-    assert np.abs(left - FLAT).max() == pytest.approx(1e-3 * amount, abs=1e-9)
-    # Pin by pin what goes farthest; so another order, or a second pass, changes nothing.
-    each = np.array([form([stroke]) for stroke in strokes])
-    assert_near(left, each.max(0) if sign > 0 else each.min(0), 1e-12)
-    np.testing.assert_array_equal(form(strokes, left), left)
-    # On the surface, as older strokes were, they add.
-    added = [replace(stroke, combine=Combine.USUAL) for stroke in strokes]
-    assert np.abs(form(added) - FLAT).max() > 1.5e-3 * amount
 
 
 HILLS = FLAT + 3e-3 * np.sin(180.0 * GRID.x) * np.cos(150.0 * GRID.y)
