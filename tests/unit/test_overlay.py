@@ -107,11 +107,11 @@ WORDS = {
     ),
     "what the valves corrected of the last stroke": (
         {"correction": Correction(2.1e-3, 11.9e-3, made=True)},
-        ("0.46 mN | Last stroke corrected: 2.10 mm rms, 11.90 mm at most | ",), (),
+        ("0.46 mN | Last stroke corrected: 2.10 mm rms, max 11.90 mm | ",), (),
     ),
     "a stroke that was left as it was": (
         {"correction": Correction(5.3e-4, 2.8e-3, made=False)},
-        ("Last stroke left off nominal: 0.53 mm rms, 2.80 mm at most",), ("corrected",),
+        ("Last stroke off nominal: 0.53 mm rms, max 2.80 mm",), ("corrected",),
     ),
     "pins picked just now": ({"heights": np.full((1001, 2), np.nan)}, ("312: | 40:",), ()),
 }  # fmt: skip

@@ -172,9 +172,9 @@ def correction_message(correction: Correction | None) -> str:
     """Return the text of how far the last stroke was from its nominal surface; empty without any."""
     if correction is None:
         return ""
-    words = "Last stroke corrected: {:.2f} mm rms, {:.2f} mm at most"
+    words = "Last stroke corrected: {:.2f} mm rms, max {:.2f} mm"
     if not correction.made:
-        words = "Last stroke left off nominal: {:.2f} mm rms, {:.2f} mm at most"
+        words = "Last stroke off nominal: {:.2f} mm rms, max {:.2f} mm"
     return localize(words, 1e3 * correction.rms, 1e3 * correction.largest)
 
 

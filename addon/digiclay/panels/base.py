@@ -1,5 +1,6 @@
 """Common parts of the panels: location and bed."""
 
+import re
 import textwrap
 from collections.abc import Callable
 from typing import Any
@@ -85,7 +86,8 @@ def draw_lines(layout: UILayout, words: str, icon: str) -> None:
     """Draw words on as many lines as they need."""
     column = layout.column(align=True)
     column.scale_y = 0.8
-    for number, line in enumerate(textwrap.wrap(words, LINE)):
+    whole = re.sub(r"(?<=\d) (?=\w)", "\u00a0", words)  # a number and its unit share a line
+    for number, line in enumerate(textwrap.wrap(whole, LINE)):
         column.label(text=line, icon=icon if number == 0 else "BLANK1")
 
 

@@ -73,7 +73,8 @@ BRUSH_WORDS = {
     Brush.RAISE: "Press lightly, lift the blister by the given height, and draw it along: a ridge, "
     "to whose nominal form the valves bring the pins in the end, unless Finish is As Left. "
     "With Ctrl: Lower",
-    Brush.LEVEL: "Bring hills and hollows to the height of the surface under the first touch",
+    Brush.LEVEL: "Bring hills and hollows to the height of the surface under the first touch, to which "
+    "the valves bring the pins in the end, unless Finish is As Left",
     Brush.FLATTEN: "Bring the pins in the ring to the plane that fits them best, without a touch; "
     "none moves farther than the depth",
     Brush.CREASE: "Cut a sharp crease of the given depth, without a touch. With Ctrl: a sharp crest",
@@ -146,7 +147,12 @@ FINISH_ITEMS = (
         "When the fingertip has left, the valves bring the pins to the nominal surface of the "
         "stroke, which has exactly its depth or height",
     ),
-    ("AS_LEFT", "As Left", "The pins stay as the finger and the control method have left them"),
+    (
+        "AS_LEFT",
+        "As Left",
+        "The pins stay as the finger and the control method have left them: off nominal by tenths "
+        "of a millimeter rms, at single pins by several millimeters. Laboratory says by how much",
+    ),
 )
 PATH_ITEMS = (
     ("FREE", "Free", "Drag to draw the path"),
