@@ -54,7 +54,8 @@ def points(name: str, count: int) -> Mesh:
 
 def find_fault(bed: Mesh, pins: int | None = None) -> str:
     """Return why a bed's mesh can be neither read nor written as that of its pins now, or an empty text."""
-    if not isinstance(bed, bpy.types.Mesh) or not ATTRIBUTES.keys() <= set(bed.attributes.keys()):
+    pins_alone = isinstance(bed, bpy.types.Mesh) and not bed.polygons
+    if not pins_alone or not ATTRIBUTES.keys() <= set(bed.attributes.keys()):
         return localize("the bed's mesh is no longer that of its pins: undo that to go on")
     if bed.is_editmode:  # its attributes have length 0
         return localize("the bed is being edited: go back to Object Mode to go on")

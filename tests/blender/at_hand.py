@@ -127,7 +127,7 @@ def whole(*found):
 
 
 def instances(bed):
-    """Give what Blender draws for a bed: pins, arrows, the skin; each until the next is asked for."""
+    """Give the instances that Blender draws for a bed, pins and arrows; each until the next is asked for."""
     for item in bpy.context.evaluated_depsgraph_get().object_instances:
         if item.is_instance and item.parent.original == bed:
             yield item

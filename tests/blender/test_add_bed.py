@@ -105,6 +105,34 @@ def test_a_bed_of_any_scale_stands_on_the_cursor_with_its_fingertip_above(scale)
     assert bridge.pose(fingertip_of(bed))[2] > 0.040
 
 
+@pytest.mark.parametrize(
+    "system, unit, given, scale, millimeter",
+    [
+        ("METRIC", 1.0, {}, 1.0, 1e-2),  # ten times its size, as before there was a choice
+        ("METRIC", 0.001, {}, 100.0, 1e-3),
+        ("METRIC", 0.01, {}, 10.0, 1e-3),
+        ("METRIC", 0.001, {"scale": 250.0}, 250.0, 2.5e-3),
+        ("METRIC", 1.0, {"scale": -1.0}, 1e-5, 1e-7),
+        ("IMPERIAL", 1.0, {}, 1.0, 1e-2),
+        ("IMPERIAL", 0.0254, {}, 3.93701, 1e-3),
+        ("NONE", 0.001, {}, 1.0, 1e-5),  # Blender scales no lengths without a system of units
+        ("METRIC", 1e5, {}, 1e-5, 1e-2),  # nothing smaller can be inverted
+    ],
+)
+def test_a_bed_has_its_true_size_where_a_unit_is_no_meter(system, unit, given, scale, millimeter):
+    units = bpy.context.scene.unit_settings
+    units.system, units.scale_length = system, unit
+    for added in (
+        lambda: bpy.ops.mesh.digital_clay_add(rows=2, columns=2, **given),
+        lambda: bpy.ops.digiclay.add_sample(sample="session:tap", take=False, **given),
+    ):
+        added()
+        assert tuple(bpy.context.object.scale) == pytest.approx((scale,) * 3, rel=1e-5)
+    shown = bpy.context.window_manager.operator_properties_last("mesh.digital_clay_add")
+    shown.scale = scale
+    assert shown.millimeter * unit == pytest.approx(millimeter, rel=1e-5)
+
+
 @pytest.mark.parametrize("name", BEDS)
 def test_a_bed_has_the_plan_and_the_fingertip_of_its_kind(name):
     bed = add(bed=name)

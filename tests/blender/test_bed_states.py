@@ -411,7 +411,7 @@ SOME = "pins now instead of 25: undo that"
 #: What Blender's own verbs make of a bed, which are selected then, and what is said against a
 #: session and a bake of each bed, and against its export as it is drawn; nothing: they are right.
 VERBS = {
-    "joined with a cube": (join(lambda bed: bed), SOME, SOME),
+    "joined with a cube": (join(lambda bed: bed), NOT_PINS, NOT_PINS),
     "scale applied": (apply_scale(2.0, 2.0, 2.0), LAYOUT, ""),
     "stretch applied": (apply_scale(2.0, 1.0, 1.0), LAYOUT, ""),
     "mirror applied": (apply_scale(-1.0, 1.0, 1.0), LAYOUT, ""),

@@ -44,26 +44,28 @@ def shape(bed, seed):
     bridge.write_cells(bed.data, cells["position"], height)
 
 
+def mesh_with(bed, name):
+    """Return what is drawn of a bed as a mesh, and which of its faces wear materials of a name."""
+    mesh = bed.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    roles = [material[ROLE] if material else "" for material in mesh.materials]
+    worn = [roles[face.material_index].startswith(name) for face in mesh.polygons]
+    return mesh, np.flatnonzero(worn)
+
+
 def drawn(bed):
     """Return the points of the skin that is drawn, m, and how many pins are drawn."""
-    points, pins = np.empty((0, 3)), 0
-    for item in instances(bed):
-        roles = [material.get(ROLE) for material in item.object.data.materials if material]
-        if not {"skin", "skin_clear"}.intersection(roles):
-            pins += 1
-            continue
-        points = np.array([vertex.co for vertex in item.object.data.vertices]) / bridge.SCALE
-    return points, pins
+    mesh, faces = mesh_with(bed, "skin")
+    used = sorted({point for face in faces for point in mesh.polygons[face].vertices})
+    points = np.array([mesh.vertices[point].co for point in used]).reshape(-1, 3) / bridge.SCALE
+    return points, len([*instances(bed)])
 
 
 def drawn_tints(bed):
     """Return the role of the material of every face of the skin that is drawn, and its middle in plan, m."""
-    named = (item.object.data for item in instances(bed))
-    mesh = next(
-        one for one in named if any(each and each.get(ROLE) == "skin" for each in one.materials)
-    )
-    middles = np.array([face.center[:2] for face in mesh.polygons]) / bridge.SCALE
-    return [mesh.materials[face.material_index][ROLE] for face in mesh.polygons], middles
+    mesh, faces = mesh_with(bed, "skin")
+    shown = [mesh.polygons[face] for face in faces]
+    middles = np.array([face.center[:2] for face in shown]) / bridge.SCALE
+    return [mesh.materials[face.material_index][ROLE] for face in shown], middles
 
 
 def baked_heights(bed):

@@ -38,6 +38,8 @@ ARROWS, ARROW_LENGTH = "Force Arrows", "Arrow Length (mm/N)"
 #: the pins are too small in the views for "automatic" to draw them, and whether the skin is tinted
 #: by their modes.
 FORM, MEMBRANE, FAR, TINT = "Form", "Membrane", "Far", "Tint"
+#: Name of the setting that makes one mesh of all that is drawn, for what takes no instances.
+REALIZE = "Realize Instances"
 #: How long an arrow is drawn by default, mm for each N.
 LENGTH = 150.0
 #: Size of a place for a node in the editor, pixels.
@@ -186,7 +188,9 @@ def bed_nodes(sources: Sources, deck: float, length: float, unit: float) -> Node
     skin = switch(tree, "GEOMETRY", skin_on, None, _skin(tree, sources, settings, both_on))
     case = node(tree, "GeometryNodeObjectInfo", {"Object": sources.housing}, name=CASE)
     every = {"Geometry": [case.outputs["Geometry"], drawn, skin]}
-    finish(tree, node(tree, "GeometryNodeJoinGeometry", every).outputs["Geometry"])
+    joined = node(tree, "GeometryNodeJoinGeometry", every).outputs["Geometry"]
+    whole = node(tree, "GeometryNodeRealizeInstances", {"Geometry": joined}).outputs["Geometry"]
+    finish(tree, switch(tree, "GEOMETRY", settings.outputs[REALIZE], joined, whole))
     return tree
 
 
@@ -200,6 +204,7 @@ SETTINGS = (
     (MEMBRANE, "Bool", False, "Stretch the skin over the flat ends of the pins"),
     (TINT, "Bool", True, "Tint the skin by the modes of the pins under it"),
     (FAR, "Bool", False, "Pins are too small in the views; set by the extension"),
+    (REALIZE, "Bool", False, "Make pins and arrows part of one mesh; slow"),
 )
 
 
@@ -235,8 +240,12 @@ def _skin(tree: NodeTree, sources: Sources, settings: Node, both: NodeSocket) ->
     look = {"Geometry": skin, "Material": sources.clear}
     clear = node(tree, "GeometryNodeSetMaterial", look).outputs["Geometry"]
     chosen = switch(tree, "GEOMETRY", both, skin, clear)
-    # An instance is joined with the housing without a copy of its points and their attributes.
-    return node(tree, "GeometryNodeGeometryToInstance", {"Geometry": chosen}).outputs["Instances"]
+    # Exporters and Object > Convert have what is a mesh: not the weights it was made with.
+    weights = (words + kind for words in WEIGHTS for kind in KINDS)
+    for name in (LOW, HIGH, NEAREST, *weights):
+        removed = {"Geometry": chosen, "Name": name}
+        chosen = node(tree, "GeometryNodeRemoveAttribute", removed).outputs["Geometry"]
+    return chosen
 
 
 def _stretch(tree: NodeTree, deck: float, length: float) -> NodeSocket:

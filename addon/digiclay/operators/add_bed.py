@@ -63,6 +63,19 @@ def take_bed(operator: Operator, context: Context) -> None:
         setattr(operator, name, value)
 
 
+#: Length of a millimeter of a bed of scale 1, Blender units.
+MILLIMETER = 1e-3 * bridge.SCALE
+
+
+def find_scale(context: Context) -> float:
+    """Return the scale of a new bed: 1, or where a Blender unit is no meter that of its true size."""
+    units = context.scene.unit_settings
+    if units.system == "NONE" or units.scale_length == 1.0:
+        return 1.0
+    # A scene's unit has 32 bits.
+    return float(f"{1.0 / (bridge.SCALE * units.scale_length):.6g}")
+
+
 class Placed:
     """Mixin of an operator that adds a bed: at the 3D cursor, or where it is seen."""
 
@@ -77,6 +90,25 @@ class Placed:
         subtype="TRANSLATION",
         options={"SKIP_SAVE", "SKIP_PRESET"},
     )
+    scale: number(
+        "Scale",
+        "Scale of the bed's object; by default the bed has ten times its size, and in a scene of a unit "
+        "scale other than 1 its true size",
+        default=1.0,
+        min=1e-5,
+        soft_min=0.1,
+        soft_max=1000.0,
+        max=1e6,
+        options={"SKIP_SAVE", "SKIP_PRESET"},
+    )
+    millimeter: number(
+        "1 mm of the Device",
+        "Length of a millimeter of the device in the scene, by the scale",
+        subtype="DISTANCE",
+        precision=5,
+        options={"SKIP_SAVE", "SKIP_PRESET"},
+        get=lambda operator: operator.scale * MILLIMETER,
+    )
 
     def invoke(self, context: Context, event: Event) -> Result:
         """Add the bed, and show all of it."""
@@ -89,6 +121,9 @@ class Placed:
     def place(self, context: Context, bed: Object) -> None:
         """Put the bed there, active; in a window it is not selected, since each pin would have an outline."""
         shown, words = find_view(context), ""
+        if not self.properties.is_property_set("scale"):
+            self.scale = find_scale(context)
+        bed.scale = (self.scale,) * 3
         if not self.properties.is_property_set("location"):
             self.location = context.scene.cursor.location
             if shown is not None:
@@ -140,15 +175,6 @@ class AddBed(Placed, Action, Operator):
     preset: choice(
         "Preset", "Fluid, valves and all other parameters of a custom preset", items=offered
     )
-    scale: number(
-        "Scale (cm/mm)",
-        "Scale of the device: centimeters in Blender per millimeter of the device",
-        default=1.0,
-        min=0.001,
-        soft_min=0.1,
-        soft_max=10.0,
-        max=1000.0,
-    )
 
     def invoke(self, context: Context, event: Event) -> Result:
         """Add the bed to design on unless another is chosen."""
@@ -171,7 +197,6 @@ class AddBed(Placed, Action, Operator):
             arrangement=self.arrangement,
         )
         bed = add(context, make_scene(self.preset, layout, self.method, BEDS[self.bed].share))
-        bed.scale = (self.scale,) * 3
         self.place(context, bed)
 
 

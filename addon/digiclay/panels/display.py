@@ -21,6 +21,7 @@ from ..device.node_tree import (
     FORM,
     LENGTH,
     MEMBRANE,
+    REALIZE,
     TINT,
     TOP_FORCE,
 )
@@ -150,6 +151,12 @@ class Display(bpy.types.PropertyGroup):
         step=1000,
         **_in_nodes(ARROW_LENGTH, LENGTH),
     )
+    realize: flag(
+        "Realize Instances",
+        "Make pins and arrows part of the bed's mesh, for Object > Convert > Mesh and for exporters that "
+        "leave out instances; slows a session down",
+        **_in_nodes(REALIZE, False),
+    )
     overlay: flag(
         "Overlay",
         "While a session runs, show force and state in a corner of the 3D view",
@@ -209,6 +216,7 @@ def details(sidebar: Sidebar, context: Context) -> None:
     draw_property(column, shown, "top_force", shown.color == "force")
     draw_property(column, shown, "arrows")
     draw_property(column, shown, "arrow_length", shown.arrows)
+    draw_property(column, shown, "realize", view.has_setting(bed, REALIZE))
     column = layout.column()
     column.active = shown.overlay
     draw_property(column, shown, "overlay_full")
