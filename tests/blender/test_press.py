@@ -1,6 +1,8 @@
 """The Press tool: where the mouse points, size and presets of the brush, and strokes that a script plays."""
 
 import ast
+import importlib
+import sys
 from pathlib import Path
 
 import bpy
@@ -12,7 +14,7 @@ from digiclay.core.base.errors import DigiclayError
 from digiclay.core.model.fingertip import Fingertip
 from digiclay.core.model.layout import make_grid
 from digiclay.core.scene.assembly import assemble
-from digiclay.live import beds
+from digiclay.live import beds, handlers
 from digiclay.operators.press_adjust import AdjustStrength, BrushMenu
 from digiclay.press import aim, brush, tool
 from digiclay.press.brush import FINGERS, find_kind
@@ -298,7 +300,8 @@ def apply(name):
     """Apply a preset as its entry in the menu does."""
     (folder,) = [Path(path) for path in bpy.utils.preset_paths(brush.SUBFOLDER)][-1:]
     file = next(path for path in (SHIPPED / f"{name}.py", folder / f"{name}.py") if path.is_file())
-    bpy.ops.digiclay.press_brush(filepath=str(file), menu_idname=BrushMenu.bl_idname)
+    bpy.ops.digiclay.press_brush(filepath=str(file))
+    assert BrushMenu.bl_label == bpy.path.display_name(file.stem)
 
 
 @pytest.mark.parametrize("file", sorted(SHIPPED.glob("*.py")), ids=lambda file: file.stem)
@@ -324,13 +327,132 @@ def test_each_preset_sets_a_known_finger_and_every_setting(settings, file):
     assert {name: getattr(settings, name) for name in wanted} == wanted
 
 
-def test_a_preset_that_cannot_be_run_changes_nothing(settings, tmp_path):
-    settings.depth, settings.symmetry = 7.5, "XY"
-    file = tmp_path / "broken.py"
-    file.write_text("settings.depth = 3.0")
-    with pytest.raises(RuntimeError, match="settings"):
-        bpy.ops.digiclay.press_brush(filepath=str(file), menu_idname=BrushMenu.bl_idname)
-    assert (settings.depth, settings.symmetry) == (7.5, "XY")
+#: What a preset that cannot be applied contains, and what is said of it.
+SPOILT = [
+    ("settings.dept = 3.0", "spoilt.py: a key must be a setting of the Press tool (got 'dept')"),
+    ('settings.brush = "RAIS"', "brush must be a value of that setting (got 'RAIS')"),
+    ('settings.brush = "RAISE"\nsettings.depth = "deep"', "depth must be a value"),
+    ('settings.brush = "RAISE"\nwm.digiclay_finger = (0.0, 1.0, 1.0)', "digiclay_finger must be"),
+    ("wm.digiclay_finger = (5.0,)", "digiclay_finger must be"),
+    ("settings.depth = open('x')", "spoilt.py cannot be read: malformed"),
+    ("settings.depth = nan", "spoilt.py cannot be read: malformed"),
+    ("settings.depth = ", "spoilt.py cannot be read: invalid syntax"),
+    ("\x00", "spoilt.py cannot be read: source code"),
+    (None, "spoilt.py cannot be read"),
+]
+
+
+@pytest.mark.parametrize("content, said", SPOILT, ids=[str(row[0]) for row in SPOILT])
+def test_a_preset_that_cannot_be_applied_is_told_of_in_one_line_and_changes_nothing(
+    settings, tmp_path, content, said
+):
+    settings.depth, settings.symmetry, settings.strength = 7.5, "XY", 0.3
+    names = {*settings.bl_rna.properties.keys()} - {"rna_type"}
+    before = {name: getattr(settings, name) for name in names}
+    file = tmp_path / "spoilt.py"
+    if content is not None:
+        file.write_text(content)
+    with pytest.raises(RuntimeError) as caught:
+        bpy.ops.digiclay.press_brush(filepath=str(file))
+    line = str(caught.value).strip()
+    assert said in line
+    assert len(line.splitlines()) == 1
+    assert len(line) < 400
+    assert {name: getattr(settings, name) for name in names} == before
+    assert bpy.context.object.digiclay.size == pytest.approx(16.0, rel=1e-6)  # 32 bits
+
+
+#: Brush, its strength, and the size of its fingertip, mm, chosen one after the other.
+CHOSEN = [("LOWER", 0.3, 12.0), ("RAISE", 0.8, 24.0), ("SMOOTH", 0.1, 40.0)]
+
+
+def test_each_brush_has_a_strength_and_a_fingertip_of_its_own(settings):
+    bed = bpy.context.object
+    for name, strength, size in CHOSEN:
+        settings.brush = name
+        assert settings.strength == 1.0, f"{name} has not been set"
+        settings.strength, bed.digiclay.size = strength, size
+    finger = devices.read_finger(bed.digiclay)
+    for name, strength, size in (*CHOSEN, *CHOSEN):
+        settings.brush = name
+        shown = settings.strength, bed.digiclay.size, lengths(bed)[0]
+        assert shown == pytest.approx((strength, size, size), rel=1e-5), name  # 32 bits
+        assert bridge.finger_of(fingertip_of(bed)).width == pytest.approx(5e-4 * size, rel=1e-5)
+        # Shift smooths with the strength of Smooth, Ctrl inverts with that of the brush.
+        assert brush.read_own(settings, "strength", Brush.SMOOTH) == pytest.approx(0.1)
+        for kind in (Brush(name), Brush(name).inverse):
+            assert brush.read_own(settings, "strength", kind) == pytest.approx(strength)
+    # The form comes back bit for bit, the blister but for the rounding of 32 bits.
+    assert devices.read_finger(bed.digiclay) == finger
+    settings.brush = "LEVEL"  # not used yet: its fingertip is the present one
+    assert (settings.strength, bed.digiclay.size) == (1.0, pytest.approx(40.0))
+
+
+def test_a_bed_that_comes_into_use_later_gets_the_fingertip_of_the_brush_when_it_is_pressed(
+    settings,
+):
+    first = bpy.context.object
+    settings.brush = "RAISE"
+    first.digiclay.size = 24.0
+    bpy.ops.mesh.digital_clay_add(rows=6, columns=6)
+    other = bpy.context.object
+    other.digiclay.size = 10.0
+    settings.brush = "LOWER"
+    assert [bed.digiclay.size for bed in (first, other)] == pytest.approx([24.0, 10.0])
+    brush.take_finger(bpy.context, first)
+    assert first.digiclay.size == pytest.approx(16.0)
+    settings.brush = "RAISE"
+    brush.take_finger(bpy.context, first)
+    assert first.digiclay.size == pytest.approx(24.0)
+
+
+def test_a_file_keeps_what_each_brush_has(extension, tmp_path):
+    new_bed()
+    with in_the_view():
+        bpy.ops.wm.tool_set_by_id(name=brush.TOOL)
+        settings = brush.tool_settings(bpy.context)
+        for name, strength, size in CHOSEN:
+            settings.brush = name
+            settings.strength, bpy.context.object.digiclay.size = strength, size
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "brushes.blend"))
+    bpy.ops.wm.read_homefile(use_factory_startup=True)
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "brushes.blend"))
+    with in_the_view():
+        opened = brush.tool_settings(bpy.context)
+        for name, strength, size in CHOSEN:
+            opened.brush = name
+            shown = opened.strength, bpy.context.object.digiclay.size
+            assert shown == pytest.approx((strength, size), rel=1e-5), name  # 32 bits
+
+
+def test_no_key_of_blender_s_in_object_mode_is_taken_outside_the_tool():
+    presets = bpy.utils.resource_path("LOCAL")
+    sys.path.append(str(Path(presets, "scripts", "presets", "keyconfig", "keymap_data")))
+    try:
+        blender_default = importlib.import_module("blender_default")
+    finally:
+        sys.path.pop()
+    # What Blender looks through in a 3D view in Object Mode.
+    looked = (
+        "Object Mode",
+        "Object Non-modal",
+        "3D View",
+        "3D View Generic",
+        "Window",
+        "Screen Editing",
+    )
+    taken = {
+        (event["type"], *(bool(event.get(key)) for key in ("ctrl", "shift", "alt", "oskey")))
+        for name, _, content in blender_default.generate_keymaps(blender_default.Params())
+        if name in looked
+        for _, event, *_ in content["items"]
+    }
+    keys = [
+        (key, *(bool(held.get(name)) for name in ("ctrl", "shift", "alt", "oskey")))
+        for _, _, key, held in handlers.KEYS
+    ]
+    assert ("S", False, False, True, False) in taken, "Alt S clears the scale"
+    assert taken.isdisjoint(keys)
 
 
 def test_a_saved_preset_brings_back_what_was_set_and_is_removed(settings, tmp_path):
@@ -345,7 +467,7 @@ def test_a_saved_preset_brings_back_what_was_set_and_is_removed(settings, tmp_pa
     assert saved.is_relative_to(tmp_path)
     settings.depth, settings.symmetry, settings.path = 2.0, "NONE", "FREE"
     bpy.context.object.digiclay.size = 30.0
-    bpy.ops.digiclay.press_brush(filepath=str(saved), menu_idname=BrushMenu.bl_idname)
+    bpy.ops.digiclay.press_brush(filepath=str(saved))
     assert (settings.depth, settings.symmetry, settings.path) == (7.5, "XY", "RING")
     assert bpy.context.object.digiclay.size == pytest.approx(11.0, abs=1e-3)
     bpy.ops.digiclay.press_brush_save(name="Of_my_own", remove_name=True)
@@ -426,8 +548,12 @@ def test_a_falloff_of_the_tool_is_that_of_its_brush_and_smooth_has_one(settings)
         "SMOOTH",
         "DEVICE",
     ]
-    settings.falloff = "SPHERE"
-    assert {brush.find_falloff(settings, kind).name for kind in kinds} == {"SPHERE"}
+    settings.falloff = "SPHERE"  # of the brush in hand, Lower, and of its inverse
+    assert [brush.find_falloff(settings, kind).name for kind in kinds] == [
+        "SPHERE",
+        "SMOOTH",
+        "DEVICE",
+    ]
 
 
 @pytest.mark.parametrize(

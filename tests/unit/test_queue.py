@@ -1,19 +1,21 @@
 """Queue of press strokes: the same heights in whatever ticks, the ghost that is shown of it, its time."""
 
 import functools
-from dataclasses import replace
+import json
+from dataclasses import astuple, replace
 from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 import pytest
 from digiclay.core.base.arrays import Floats
-from digiclay.core.model.fingertip import LEVEL
+from digiclay.core.model.fingertip import LEVEL, Fingertip
 from digiclay.core.model.layout import Layout
 from digiclay.sessions import sculpting
 from digiclay.sessions.forming_device import find_device
-from digiclay.sessions.sculpting import change_stroke, queue_stroke
-from digiclay.settings.devices import BEDS, make_scene
+from digiclay.sessions.sculpting import change_stroke, queue_stroke, rewind
+from digiclay.settings.devices import BEDS, make_scene, scale_blister
+from digiclay.strokes import drawn
 from digiclay.strokes.nominal import find_ghosts
 from digiclay.strokes.stroke import Brush, lay_path, lay_ring, make_images, start
 from digiclay.strokes.sweep import estimate_time
@@ -157,3 +159,92 @@ def test_the_time_that_a_queue_still_takes_is_known_roughly(queue):
     formed = form("Method III", queue)
     assert 0.6 * formed.taken < formed.expected < 1.6 * formed.taken
     assert formed.left == 0.0
+
+
+#: Fingertips of strokes of one queue by their brush, as shares of that of the bed, and the path of
+#: each, mm: apart from each other, so that each can be formed alone.
+TWO_SIZES = {
+    "valleys": [(Brush.LOWER, 1.0, -15.0), (Brush.LOWER, 0.5, 15.0)],
+    "ridges": [(Brush.RAISE, 0.6, -12.0), (Brush.RAISE, 1.0, 16.0)],
+    "what valves drive": [(Brush.CREASE, 1.0, -15.0), (Brush.CREST, 0.5, 15.0)],
+}
+
+
+def queue_sizes(queue, shares):
+    """Return a session with the strokes of a row of `TWO_SIZES` queued; None: the bed's fingertip."""
+    session = begin("Method III")
+    for (brush, _, y), share in zip(TWO_SIZES[queue], shares, strict=True):
+        sizes = find_sizes(session, share) if share else {}
+        stroke = start(0, -9e-3, 1e-3 * y, 3e-3, brush=brush, **sizes)
+        stroke = lay_path(stroke, 1e-3 * np.array([[-9.0, y], [9.0, y]]))
+        session, _ = queue_stroke(session, stroke)
+    return session
+
+
+def find_sizes(session, share):
+    """Return fingertip and blister of a stroke, a share of those of a session's scene."""
+    scene = session.scene
+    finger = Fingertip(*(share * axis for axis in astuple(scene.fingers[0].fingertip)))
+    return {"finger": finger, "blister": scale_blister(scene.blister, share)}
+
+
+def form_after_another(queue, shares):
+    """Return heights (n,), m, that strokes leave which are queued one after another, as fingertips change."""
+    session = begin("Method III")
+    usual = session.scene
+    for index, share in enumerate(shares):
+        stroke = queue_sizes(queue, shares).strokes[index]
+        sizes = find_sizes(replace(session, scene=usual), share)
+        tip = replace(usual.fingers[0], fingertip=sizes["finger"])
+        scene = replace(usual, fingers=(tip,), blister=sizes["blister"])
+        session, _ = sculpting.change_scene(session, scene)
+        plain = replace(stroke, finger=None, blister=None)
+        session = finish(queue_stroke(session, plain)[0], 64)
+    return heights(session)
+
+
+@pytest.mark.parametrize("queue", TWO_SIZES)
+def test_each_stroke_of_a_queue_is_formed_and_shown_with_the_fingertip_that_it_was_drawn_with(
+    queue,
+):
+    shares = [share for _, share, _ in TWO_SIZES[queue]]
+    session = queue_sizes(queue, shares)
+    wanted = form_after_another(queue, shares)
+    np.testing.assert_array_equal(heights(finish(session, 64)), wanted)
+    # What would be left by fingertips of the other's size is another surface.
+    other = heights(finish(queue_sizes(queue, shares[::-1]), 64))
+    assert np.abs(other - wanted).max() > 0.2e-3
+    ghosts = [
+        find_ghosts(each.strokes, find_device(each), heights(each))[-1].nominal.height
+        for each in (session, queue_sizes(queue, [1.0, 1.0]), queue_sizes(queue, [None, None]))
+    ]
+    assert np.abs(ghosts[0] - ghosts[1]).max() > 0.2e-3
+    np.testing.assert_array_equal(ghosts[1], ghosts[2])
+
+
+def test_a_stroke_keeps_its_fingertip_where_it_is_stored_and_taken_back():
+    session = queue_sizes("valleys", [1.0, 0.5])
+    lines = [drawn.dump(stroke) for stroke in session.strokes]
+    loaded = [drawn.load(line) for line in lines]
+    sizes = [(stroke.finger, stroke.blister) for stroke in session.strokes]
+    assert [(stroke.finger, stroke.blister) for stroke in loaded] == sizes
+    assert [drawn.dump(stroke) for stroke in loaded] == lines
+    done = finish(session, 64)
+    # Redo finds the ends of both strokes: the other fingertip of the second one spoils none.
+    assert [gesture.stroke for gesture in done.gestures] == lines
+    assert all(gesture.end is not None for gesture in done.gestures)
+    back = rewind(done)
+    again = sculpting.follow_finger(queue_stroke(back, loaded[1])[0], back.pose, 8)
+    np.testing.assert_array_equal(heights(finish(again, 64)), heights(done))
+
+
+#: Fingertip of a stored stroke, its semi-axes, m, that is none.
+SPOILT = [[0.0, 1e-3, 1e-3], [-1e-3] * 3, [1e-3] * 2, ["a", 1, 1], [float("nan")] * 3, [1e9] * 3, 5]
+
+
+@pytest.mark.parametrize("axes", SPOILT, ids=str)
+def test_a_stored_stroke_with_a_spoilt_fingertip_is_none(axes):
+    line = json.loads(drawn.dump(queue_sizes("valleys", [1.0, 0.5]).strokes[0]))
+    assert drawn.load(json.dumps(line)) is not None
+    line[-1]["finger"] = axes
+    assert drawn.load(json.dumps(line)) is None

@@ -163,7 +163,7 @@ def ridge(blender):
 
 def valley(blender):
     yield from done(
-        blender, to(on_the_screen(blender, 0.0, 0.0)), "key shift+f sleep 0.5", f"key {DEPTH}"
+        blender, to(on_the_screen(blender, 0.0, 0.0)), "key ctrl+f sleep 0.5", f"key {DEPTH}"
     )
     blender.shot("relief_depth")
     yield from done(blender, "key Return")

@@ -89,12 +89,12 @@ def sizes(blender):
     yield from done(blender, keys("bracketright bracketright bracketleft"), name="brackets")
     yield from done(blender, keys("f 1 6 Return"))
     yield from done(
-        blender, to(start), keys("shift+f"), drag(start, (start[0] + 40, start[1]), 0.4, 60)
+        blender, to(start), keys("ctrl+f"), drag(start, (start[0] + 40, start[1]), 0.4, 60)
     )
     blender.shot("size_depth")
     yield from done(blender, "click 1", name="deeper")
-    yield from done(blender, keys("shift+f 4 Return ctrl+f 5 0 Return"), name="strength")
-    yield from done(blender, keys("ctrl+f 1 0 0 Return"))
+    yield from done(blender, keys("ctrl+f 4 Return shift+f 5 0 Return"), name="strength")
+    yield from done(blender, keys("shift+f 1 0 0 Return"))
 
 
 def symmetric(blender):

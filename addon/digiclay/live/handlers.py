@@ -22,8 +22,6 @@ STALE = 2
 STOPPED = "was stopped; the bed keeps its state"
 #: Blender's keymaps: their names and the editors they are of.
 VIEW, WINDOW = ("3D View", "VIEW_3D"), ("Window", "EMPTY")
-#: The keymap in which Alt S clears the scale: its keys precede those of the view.
-OBJECT = ("Object Mode", "EMPTY")
 #: Keymap, operator, key, and modifier keys. Without a session, or a bed, the operators decline, and
 #: the key has its usual effect.
 KEYS: tuple[tuple[tuple[str, str], str, str, dict[str, bool]], ...] = (
@@ -33,7 +31,6 @@ KEYS: tuple[tuple[tuple[str, str], str, str, dict[str, bool]], ...] = (
     (VIEW, "digiclay.session_rewind", "BACK_SPACE", {}),
     (VIEW, "digiclay.session_reset", "BACK_SPACE", {"shift": True}),
     (WINDOW, "digiclay.session_escape", "ESC", {"any": True}),
-    (OBJECT, "digiclay.skin_toggle", "S", {"alt": True}),
 )
 
 

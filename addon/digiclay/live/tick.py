@@ -5,7 +5,7 @@ No reference to Blender's data outlives a tick: undo and loading invalidate them
 
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from ..recorded import takes
 from ..recorded.bake import is_baked
 from ..roles import fingertips_of
 from ..sessions import running, sculpting, stored
+from ..sessions.forming_device import suit_scene
 from ..sessions.running import Running
 from ..sessions.sculpting import drop_strokes
 from ..settings import properties
@@ -45,7 +46,7 @@ def start(context: Context, bed: Object) -> list[Note]:
     obstacle = beds.find_obstacle(context, bed, beds.Use.FORM)
     if obstacle:
         raise DigiclayError(f"The session of {bed.name} cannot start: {obstacle}.")
-    settings, scene, notes = properties.read_stored_settings(bed), properties.scene_of(bed), []
+    settings, scene, notes = (properties.read_stored_settings(bed),), properties.scene_of(bed), []
     if bed.data.users > 1:
         bed.data = bed.data.copy()
         notes.append(localize("{} got pins of its own: it shared them with another bed", bed.name))
@@ -280,7 +281,7 @@ def _read_changes(context: Context, bed: Object, session: Running) -> tuple[str,
         return reason, session, words
     bridge.keep_sizes(bed)
     try:
-        settings = properties.read_stored_settings(bed)
+        settings = _read_settings(bed, session)
         changed = settings != session.settings or properties.find_layout_mismatch(
             bed, session.scene.layout
         )
@@ -297,12 +298,25 @@ def _read_changes(context: Context, bed: Object, session: Running) -> tuple[str,
     return "", session, words
 
 
+def _read_settings(bed: Object, session: Running) -> tuple[Any, ...]:
+    """Return what the scene of a session is made of: its bed's settings, and the size of its stroke."""
+    sizes = [(stroke.finger, stroke.blister) for stroke in session.strokes[:1]]
+    return properties.read_stored_settings(bed), *sizes
+
+
 def _take_settings(bed: Object, session: Running) -> tuple[Running, str]:
     """Return the session with the scene of its bed's settings, and words about what that ended."""
-    scene, numbers = properties.scene_of(bed), tuple(fingertips_of(bed))
+    scene, tips, poses = properties.scene_of(bed), fingertips_of(bed), bridge.poses(bed)
+    for stroke in session.strokes[:1]:
+        scene = suit_scene(scene, stroke)
+    fingers, numbers = find_ellipsoids(scene), tuple(tips)
+    if fingers != tuple(map(bridge.finger_of, tips.values())):
+        for tip, finger in zip(tips.values(), fingers, strict=True):
+            bridge.resize_fingertip(tip, finger)
+        bridge.move_fingertips(bed, poses, fingers)
     if scene == session.scene and numbers == session.numbers:
         return session, ""
-    changed, words = sculpting.change_scene(session, scene, numbers, bridge.poses(bed))
+    changed, words = sculpting.change_scene(session, scene, numbers, poses)
     # A take is of one scene: what was recorded under the former one is not lost.
     ended = len(session.strokes) - len(changed.strokes)
     dropped = (
@@ -311,6 +325,4 @@ def _take_settings(bed: Object, session: Running) -> tuple[Running, str]:
         else ""
     )
     words = ". ".join(filter(None, (words or dropped, takes.keep_recording(bed, session))))
-    for tip, finger in zip(fingertips_of(bed).values(), find_ellipsoids(scene), strict=True):
-        bridge.resize_fingertip(tip, finger)
     return changed, words

@@ -4,6 +4,7 @@ The mouse goes sideways, or a value is typed; outlines on the pins show it at tr
 """
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,6 @@ from bl_operators.presets import AddPresetBase  # type: ignore[import-not-found]
 from .. import bridge
 from ..compat import Area, Context, Event, Menu, Object, Operator, OperatorProperties, bpy
 from ..core.base.arrays import Floats
-from ..core.base.errors import DigiclayError
 from ..core.model.fingertip import Fingertip
 from ..core.surface.pointing import find_contact_outline
 from ..live.beds import Use, find_obstacle
@@ -145,7 +145,8 @@ class AdjustMixin(Drawing):
             return
         settings = brush.tool_settings(context)
         depth = 1e-3 * settings.depth if settings else DEEPEST
-        rims = self.outlines(bridge.finger_of(tip), bridge.pose(tip)[3:], depth, self._shown())
+        finger = devices.read_finger(devices.find_first(bed))
+        rims = self.outlines(finger, bridge.pose(tip)[3:], depth, self._shown())
         places = [
             tool.close(np.column_stack([rim, np.zeros(len(rim))]) + self.center) for rim in rims
         ]
@@ -296,6 +297,20 @@ def fingers(entries: Menu, context: Context) -> None:
         entries.layout.operator(TakeFinger.bl_idname, text=kind.label).kind = name
 
 
+@menu("DIGICLAY_MT_pie_brushes", "Brush")
+def pie_brushes(entries: Menu, context: Context) -> None:
+    """Brushes of the Press tool."""
+    pie, settings = entries.layout.menu_pie(), brush.tool_settings(context)
+    if settings is None:
+        return
+    first, last = [item[0] for item in brush.BRUSH_ITEMS[:7]], brush.BRUSH_ITEMS[7:]
+    for name in first:
+        pie.prop_enum(settings, "brush", name)
+    column = pie.column()
+    for name, *_ in last:
+        column.prop_enum(settings, "brush", name)
+
+
 @action(
     "digiclay.press_brush",
     "Brush Preset",
@@ -303,20 +318,13 @@ def fingers(entries: Menu, context: Context) -> None:
     no_finger,
     options=("UNDO", "INTERNAL"),
     filepath=bpy.props.StringProperty(subtype="FILE_PATH", options={"SKIP_SAVE"}),
-    menu_idname=bpy.props.StringProperty(default="DIGICLAY_MT_brushes", options={"SKIP_SAVE"}),
 )
 def apply_brush(operator: Operator, context: Context) -> None:
     """Set fingertip, brush, stroke and symmetry of the Press tool to those of a preset"""
     settings: OperatorProperties = brush.tool_settings(context)
-    before = {name: getattr(settings, name) for name in brush.list_settings(settings)}
-    for name in before:  # a preset need not name those that have their defaults
-        settings.property_unset(name)
-    try:
-        bpy.ops.script.execute_preset(filepath=operator.filepath, menu_idname=operator.menu_idname)
-    except RuntimeError as error:  # what Blender says of the file
-        for name, value in before.items():
-            setattr(settings, name, value)
-        raise DigiclayError(str(error).removeprefix("Error: ").strip()) from None
+    file = Path(operator.filepath)
+    brush.apply_preset(settings, brush.read_preset(file, settings))
+    BrushMenu.bl_label = bpy.path.display_name(file.name)
 
 
 class BrushMenu(bpy.types.Menu):

@@ -18,7 +18,9 @@ class PressSettings:
         items=brush.BRUSH_ITEMS,
         default="LOWER",
         translation_context="Brush",
+        update=brush.take_brush,
     )
+    former: text("Former Brush", default="LOWER", options={"HIDDEN"})
     depth: millimeters(
         "Depth",
         4e-3,
@@ -124,3 +126,11 @@ class PressSettings:
         "The fingertip leans with the pen, by up to 60 degrees, until the stroke ends",
         default=True,
     )
+
+
+for _name in brush.OWN:
+    _setting = PressSettings.__annotations__[_name]
+    _hidden = _setting.function(**_setting.keywords | {"options": {"HIDDEN"}})
+    PressSettings.__annotations__ |= {
+        brush.own_name(_name, each.value): _hidden for each in brush.BRUSH_WORDS
+    }

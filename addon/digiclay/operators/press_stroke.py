@@ -16,6 +16,7 @@ from ..press.pointer import begin_button, read_event
 from ..sessions import running, sculpting
 from ..sessions.running import find_stroke, last_place
 from ..sessions.sculpting import change_stroke, queue_stroke
+from ..settings import devices
 from ..settings.declared import title
 from ..strokes.falloff import Falloff
 from ..strokes.stroke import (
@@ -83,12 +84,14 @@ class Press(PressSettings, Modal, Operator):
         # it.
         self.uid, self.grid, self.canvas = session.uid, target.grid, target.canvas.copy()
         self.full = 1e-3 * getattr(self, brush.amount_name(self.kind))
+        self.strength = brush.read_own(self, "strength", self.kind)
         self.pressure, self.lean = 1.0, (0.0, 0.0)
         self.button = begin_button(event.value, (event.type_prev, event.value_prev))
         self._feel(context, target.bed, event)
         self.lagged = place = float(target.point[0]), float(target.point[1])
         depth, share = self._amount()
         images = brush.find_images(self)
+        options |= devices.read_sizes(target.bed)
         stroke = start(0, *place, depth, images, self.kind, share, self.lean, **options)
         session, self.number = queue_stroke(session, stroke)
         running.put(session)
@@ -227,6 +230,7 @@ def open_session(
     falloff: Falloff = Falloff.DEVICE,
 ) -> running.Running | None:
     """Return the session of a bed for a stroke, started if there is none; or report why it cannot be."""
+    brush.take_finger(context, bed)
     try:
         if running.find(bed) is None:
             context.view_layer.objects.active = bed
@@ -336,7 +340,8 @@ class PressShape(Drawing, Operator):
         """Show the length or the radius, and draw the path."""
         length = float(np.hypot(self.to[0] - self.start[0], self.to[1] - self.start[1]))
         self.words = localize(SHAPE_KEYS[self.shape], 1e3 * length)
-        ghost.plan(self.uid, _lay_stroke(brush.tool_settings(context), self._lay(), self.kind))
+        settings, bed = brush.tool_settings(context), brush.find_bed(context, self.uid)
+        ghost.plan(self.uid, _lay_stroke(settings, bed, self._lay(), self.kind))
         show_status(context, self.words)
         self.region.tag_redraw()
 
@@ -381,12 +386,14 @@ class PressLine(Polled, Operator):
         return _queue_path(self, context, target.bed, path, kind)
 
 
-def _lay_stroke(settings: OperatorProperties, path: Floats | list[Place], kind: Brush) -> Stroke:
+def _lay_stroke(
+    settings: OperatorProperties, bed: Object, path: Floats | list[Place], kind: Brush
+) -> Stroke:
     """Return the stroke along a path (k, 2), m, as the tool's settings have it."""
-    share = float(settings.strength)
+    share = float(brush.read_own(settings, "strength", kind))
     depth = 1e-3 * share * getattr(settings, brush.amount_name(kind))
     (x, y), images, stamp = path[0], brush.find_images(settings), brush.find_stamp(settings, kind)
-    options = brush.find_options(settings, kind)
+    options = brush.find_options(settings, kind) | devices.read_sizes(bed)
     return lay_path(start(0, x, y, depth, images, kind, share, stamp=stamp, **options), path)
 
 
@@ -394,7 +401,8 @@ def _queue_path(
     operator: Operator, context: Context, bed: Object, path: Floats | list[Place], kind: Brush
 ) -> Result:
     """Queue a path for the fingertip, as the tool's settings have it."""
-    stroke = _lay_stroke(brush.tool_settings(context), path, kind)
+    brush.take_finger(context, bed)
+    stroke = _lay_stroke(brush.tool_settings(context), bed, path, kind)
     session = open_session(operator, context, bed, kind, stroke.falloff)
     if session is None:
         return {"CANCELLED"}

@@ -1,5 +1,6 @@
 """Settings of the Press tool: brush, finger and presets, and the text beside the cursor."""
 
+import ast
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import astuple, dataclass
@@ -7,7 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from ..compat import Context, Event, Object, OperatorProperties, bpy
-from ..core.files.tables import Record
+from ..core.base.errors import DigiclayError, one_line
+from ..core.files.tables import Record, show_value
 from ..core.model.fingertip import Fingertip
 from ..core.shapes.fitting import list_shapes
 from ..core.shapes.heightmap import HeightMap
@@ -154,6 +156,8 @@ FINISH_ITEMS = (
         "of a millimeter rms, at single pins by several millimeters. Laboratory says by how much",
     ),
 )
+#: Settings that each brush has for itself, and where a bed has the fingertip of each.
+OWN, FINGER_OF = ("strength", "falloff", "combine"), "digiclay_brushes"
 PATH_ITEMS = (
     ("FREE", "Free", "Drag to draw the path"),
     ("LINE", "Line", "Drag from one end of the line to the other; it is formed on release"),
@@ -221,6 +225,50 @@ def bed_in_use(context: Context) -> Object | None:
     return seen[0] if len(seen) == 1 else None
 
 
+def own_name(name: str, brush: str) -> str:
+    """Return the name of the setting by which a brush has another one while it is not in hand."""
+    return f"{brush.lower()}_{name}"
+
+
+def read_own(settings: OperatorProperties, name: str, brush: Brush) -> Any:
+    """Return a setting that each brush has for itself; what Ctrl makes of it has its settings."""
+    if Brush(settings.brush) not in (brush, brush.inverse):
+        name = own_name(name, (brush if brush in BRUSH_WORDS else brush.inverse).value)
+    return getattr(settings, name)
+
+
+def take_brush(settings: OperatorProperties, context: Context) -> None:
+    """Bring back what the chosen brush has for itself, and store that of the one before."""
+    former, settings.former = settings.former, settings.brush
+    if former == settings.brush:
+        return
+    for name in OWN:
+        setattr(settings, own_name(name, former), getattr(settings, name))
+        setattr(settings, name, getattr(settings, own_name(name, settings.brush)))
+    bed = bed_in_use(context)
+    if bed is not None and tool_settings(context) is not None:
+        take_finger(context, bed, former)
+
+
+def take_finger(context: Context, bed: Object, former: str = "") -> None:
+    """Give a bed the fingertip that it had under the brush in hand, and store that of the one before.
+
+    `former`: that one, for a bed that has none stored; by default there was no other.
+    """
+    settings = tool_settings(context)
+    if settings is None or beds.find_obstacle(context, bed, beds.Use.CHANGE):
+        return
+    stored = bed.get(FINGER_OF)
+    fingers = stored.to_dict() if stored else {"brush": former or settings.brush}
+    if fingers["brush"] != settings.brush:
+        first = devices.find_first(bed)
+        fingers[fingers["brush"]] = astuple(devices.read_finger(first))
+        fingers["brush"] = settings.brush
+        if settings.brush in fingers:
+            devices.resize(first, Fingertip(*fingers[settings.brush]))
+        bed[FINGER_OF] = fingers
+
+
 def choose_brush(name: str, event: Event) -> Brush:
     """Return the brush of a stroke that an event begins: Shift smooths, Ctrl inverts the tool's brush."""
     brush = Brush.SMOOTH if event.shift else Brush(name)
@@ -241,7 +289,7 @@ def find_path(settings: OperatorProperties, brush: Brush) -> str:
 
 def find_falloff(settings: OperatorProperties, brush: Brush) -> Falloff:
     """Return the falloff of a brush, by the settings of the tool; Smooth has one in any case."""
-    falloff = Falloff(settings.falloff)
+    falloff = Falloff(read_own(settings, "falloff", brush))
     own = (brush, falloff) == (Brush.SMOOTH, Falloff.DEVICE)
     return Falloff.SMOOTH if own else falloff
 
@@ -292,18 +340,62 @@ DEFINES = (
     'settings = bpy.context.workspace.tools.from_space_view3d_mode("OBJECT").operator_properties('
     f'"{OPERATOR}")',
 )
+#: Name by which they have the fingertip.
+FINGER = "digiclay_finger"
 #: Folder with a folder ``presets``.
 HOME = str(Path(__file__).parents[1])
 
 
 def list_settings(settings: OperatorProperties) -> list[str]:
-    """Return the names of all settings of the tool."""
-    return [rna.identifier for rna in settings.bl_rna.properties if rna.identifier != "rna_type"]
+    """Return the names of all settings of the tool, the brush before those that come with it."""
+    return [
+        shown.identifier
+        for shown in settings.bl_rna.properties
+        if not shown.is_hidden and shown.identifier != "rna_type"
+    ]
+
+
+def read_preset(file: Path, settings: OperatorProperties) -> Record:
+    """Return what a preset sets. Raises DigiclayError for a file that is none."""
+    try:
+        lines = ast.parse(file.read_text(encoding="utf-8")).body
+        chosen = {
+            line.targets[0].attr: ast.literal_eval(line.value)
+            for line in lines
+            if isinstance(line, ast.Assign) and isinstance(line.targets[0], ast.Attribute)
+        }
+    except (OSError, ValueError, SyntaxError) as error:
+        raise DigiclayError(f"{file.name} cannot be read: {one_line(error)}") from None
+    unknown = chosen.keys() - {FINGER, *list_settings(settings)}
+    if unknown:
+        rule = "must be a setting of the Press tool"
+        raise DigiclayError(f"{file.name}: a key {rule} (got {show_value(min(unknown))}).")
+    return chosen
+
+
+def apply_preset(settings: OperatorProperties, chosen: Record) -> None:
+    """Give the tool the settings of a preset, and else its defaults. Raises DigiclayError."""
+    shown = settings.bl_rna.properties
+    names = list_settings(settings)
+    before = {name: getattr(settings, name) for name in {*shown.keys()} - {"rna_type"}}
+    try:
+        for name in names:
+            value = chosen.get(name, shown[name].default)
+            setattr(settings, name, value)
+        if FINGER in chosen:
+            name, value = FINGER, chosen[FINGER]
+            _take_finger(value)
+    except (DigiclayError, TypeError, ValueError):
+        settings.brush = before["brush"]
+        for each, former in before.items():
+            setattr(settings, each, former)
+        rule = "must be a value of that setting"
+        raise DigiclayError(f"Preset: {name} {rule} (got {show_value(value)}).") from None
 
 
 def preset_values(settings: OperatorProperties) -> list[str]:
     """Return what a preset keeps: the form of the fingertip, and every setting of the tool."""
-    return ["wm.digiclay_finger", *(f"settings.{name}" for name in list_settings(settings))]
+    return [f"wm.{FINGER}", *(f"settings.{name}" for name in list_settings(settings))]
 
 
 def register() -> None:

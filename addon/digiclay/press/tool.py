@@ -40,6 +40,7 @@ from .brush import (
     describe_queue,
     find_images,
     find_kind,
+    read_own,
 )
 from .pointer import HELD
 
@@ -177,8 +178,8 @@ def touch_outline(
     bed: Object, layout: Layout, middle: Floats, depth: float, brush: Brush = Brush.LOWER
 ) -> Floats:
     """Return the rim of what a brush would form at a place (2,), m, (k, 2), m."""
-    tip = fingertip_of(bed)
-    return middle + find_outline(bridge.finger_of(tip), bridge.pose(tip)[3:], depth, brush, layout)
+    finger, turn = devices.read_finger(devices.find_first(bed)), bridge.pose(fingertip_of(bed))[3:]
+    return middle + find_outline(finger, turn, depth, brush, layout)
 
 
 def find_outline(
@@ -223,7 +224,8 @@ def _draw_cursor(context: Context, tool: WorkSpaceTool, xy: tuple[int, int]) -> 
 
 def describe(bed: Object, settings: OperatorProperties) -> str:
     """Return what is shown beside the cursor: what the press does, and what the bed's session forms."""
-    words = describe_brush(bridge.finger_of(fingertip_of(bed)), *find_shown(bed, settings))
+    finger = devices.read_finger(devices.find_first(bed))
+    words = describe_brush(finger, *find_shown(bed, settings))
     if settings.project == aim.PLANE:
         words += localize("   Rest Plane")
     session = running.find(bed)
@@ -259,7 +261,11 @@ def find_shown(bed: Object, settings: OperatorProperties) -> tuple[Brush, float,
         if sample.share:
             return stroke.brush, sample.depth / sample.share, sample.share
     brush = choose_brush(settings.brush, HELD)
-    return brush, 1e-3 * getattr(settings, amount_name(brush)), settings.strength
+    return (
+        brush,
+        1e-3 * getattr(settings, amount_name(brush)),
+        read_own(settings, "strength", brush),
+    )
 
 
 def _trail(target: aim.Target) -> list[Floats]:
@@ -293,8 +299,8 @@ class PressTool(bpy.types.WorkSpaceTool):
     bl_label = "Press"
     bl_description = (
         "Press the fingertip into a bed of Digital Clay.\n"
-        "Drag to sculpt; Shift smooths; Ctrl inverts Lower and Raise; F, Shift F and Ctrl F set size, depth "
-        "or height, and strength; a pen presses by itself"
+        "Drag to sculpt; Shift smooths; Ctrl inverts Lower and Raise; F, Shift F and Ctrl F set size, "
+        "strength, and depth or height; a pen presses by itself"
     )
     bl_icon = str(Path(__file__).with_suffix("").with_name("press_tool"))
     bl_keymap = (
@@ -314,9 +320,15 @@ class PressTool(bpy.types.WorkSpaceTool):
             for kind in ("LEFT_CTRL", "RIGHT_CTRL", "LEFT_SHIFT", "RIGHT_SHIFT", "MOUSEMOVE")
         ),
         ("digiclay.press_size", {"type": "F", "value": "PRESS"}, None),
-        ("digiclay.press_depth", {"type": "F", "value": "PRESS", "shift": True}, None),
-        ("digiclay.press_strength", {"type": "F", "value": "PRESS", "ctrl": True}, None),
+        ("digiclay.press_strength", {"type": "F", "value": "PRESS", "shift": True}, None),
+        ("digiclay.press_depth", {"type": "F", "value": "PRESS", "ctrl": True}, None),
+        (
+            "wm.call_menu_pie",
+            {"type": "E", "value": "PRESS"},
+            {"properties": [("name", "DIGICLAY_MT_pie_brushes")]},
+        ),
         ("digiclay.press_base", {"type": "Y", "value": "PRESS"}, None),
+        ("digiclay.skin_toggle", {"type": "S", "value": "PRESS", "alt": True}, None),
         _scale_key("LEFT_BRACKET", 1.0 / 1.1),
         _scale_key("RIGHT_BRACKET", 1.1),
     )

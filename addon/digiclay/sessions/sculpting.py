@@ -24,7 +24,7 @@ from ..strokes.stroke import FINISHING, Brush, Stroke
 from ..strokes.sweep import SWEEPS, WHOLE, finish, order_all, sweep
 from ..strokes.tracking import find_tracking
 from ..ui_text import localize
-from .forming_device import find_device
+from .forming_device import find_device, is_resized, suit_scene
 from .restored_states import CHANGED, Numbers, change_fingers, fit_base, load_state
 from .running import Gesture, Running, find_stroke, list_pressing, match_poses, name_fingers
 
@@ -341,9 +341,10 @@ def change_scene(
         )
 
     plain = assemble(scene) if images else other.system
-    # The end of a stroke was formed with the former parameters: it cannot be restored.
+    # The end of a stroke that was formed with other parameters cannot be restored.
+    line = {} if is_resized(running.scene, scene) else {"stroke": ""}
     for name in ("gestures", "undone"):
-        some = (replace(gesture, stroke="") for gesture in getattr(running, name))
+        some = (replace(gesture, **line) for gesture in getattr(running, name))
         carried: dict[str, Any] = {name: tuple(some if numbers == was else map(change, some))}
         running = replace(running, **carried)
     if numbers != was:
@@ -452,6 +453,7 @@ def take_path(running: Running, count: int) -> tuple[Running, Floats, Orders | N
     """
     stroke = running.strokes[0]
     if stroke.height is None:
+        running, _ = change_scene(running, suit_scene(running.scene, stroke))
         running = replace(running, next_gesture=_mark(running), stroke_start=_mark(running))
         if stroke.brush not in WHOLE:
             tracking = (
@@ -480,9 +482,7 @@ def take_path(running: Running, count: int) -> tuple[Running, Floats, Orders | N
 
 def _advance(running: Running, stroke: Stroke, count: int) -> tuple[Stroke, Floats, Orders | None]:
     """Advance fingertips along a stroke; return it, the paths (k + 1, 7) or (k + 1, m, 7), and the orders."""
-    state = running.state
-    pose = running.pose
-    period = running.system.period
+    state, pose, period = running.state, running.pose, running.system.period
     device = find_device(running)
     if stroke.brush in WHOLE:
         return order_all(stroke, pose)

@@ -1,6 +1,7 @@
 """Device of a new bed as one valid scene; size of a bed's fingertip, and of the blister that follows it."""
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 from .. import bridge
 from ..compat import Context, Object, PropertyGroup, read_stored
@@ -179,6 +180,12 @@ def read_finger(settings: PropertyGroup) -> Fingertip:
     return Fingertip(**read(settings.fingertip, Fingertip, {}, "fingertip"))
 
 
+def read_sizes(bed: Object) -> dict[str, Any]:
+    """Return what press strokes on a bed are formed with: fingertip and blister, fields of `Stroke`."""
+    blister = Blister(**read(bed.digiclay.blister, Blister, {}, "blister"))
+    return {"finger": read_finger(find_first(bed)), "blister": blister}
+
+
 def read_size(settings: PropertyGroup) -> float:
     """Return the size of the fingertip of a bed's settings: how wide it is, m."""
     return 2.0 * read_finger(settings).width
@@ -273,7 +280,7 @@ def _scale_blister(settings: PropertyGroup, before: Fingertip, after: Fingertip)
     """Scale the blister with the width of the fingertip, no wider than the bed."""
     # One that the bed has limited remembers the width of the fingertip that it suits, so that a
     # palm and then a fingertip again leave it as it was.
-    blister = Blister(**read(settings.blister, Blister, {}, "blister"))
+    blister = read_sizes(settings.id_data)["blister"]
     layout = Layout(**read(settings.layout, Layout, {}, "layout"))
     limited = settings.blister_suits > 0.0 and fit_blister(
         scale_blister(blister, 1.01), layout

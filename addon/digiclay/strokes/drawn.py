@@ -3,12 +3,15 @@
 import json
 from collections.abc import Callable
 from dataclasses import astuple
-from operator import attrgetter
-from typing import Any
+from enum import Enum
+from functools import partial
+from typing import Any, TypeVar
 
 import numpy as np
 
 from ..core.base.errors import DigiclayError
+from ..core.control.blister import Blister
+from ..core.model.fingertip import Fingertip
 from ..core.shapes.heightmap import make_height_map
 from .falloff import Falloff
 from .stroke import (
@@ -22,6 +25,7 @@ from .stroke import (
     Stroke,
 )
 
+Part = TypeVar("Part", Blister, Fingertip)
 #: No stroke has a number as large, m or rad.
 LARGEST = 1e3
 
@@ -41,13 +45,25 @@ def _read_flag(value: Any) -> bool:
     return value
 
 
+def _read_part(kind: type[Part], values: list[Any]) -> Part:
+    """Return a part of all its values; a ValueError tells that they are none."""
+    return kind(**dict(zip(kind.__dataclass_fields__, values, strict=True)))
+
+
 #: Fields of a stroke that a line has where they are not those of older strokes, and their readers.
 FIELDS: dict[str, Callable[[Any], Any]] = {
     "falloff": Falloff,
     "combine": Combine,
     "limits": _read_limits,
     "as_left": _read_flag,
+    "finger": partial(_read_part, Fingertip),
+    "blister": partial(_read_part, Blister),
 }
+
+
+def _write(value: Any) -> Any:
+    """Return what JSON has for a value of a stroke: the word of a choice, the values of a part."""
+    return value.value if isinstance(value, Enum) else astuple(value)
 
 
 def dump(stroke: Stroke) -> str:
@@ -64,7 +80,7 @@ def dump(stroke: Stroke) -> str:
         stamp,
         *([more] if more else []),
     ]
-    return json.dumps(parts, default=attrgetter("value"))
+    return json.dumps(parts, default=_write)
 
 
 def load(line: str) -> Stroke | None:

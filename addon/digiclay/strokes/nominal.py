@@ -65,6 +65,13 @@ class Device:
     #: (n,), heights that strokes count from, m; None: from the surface.
     base: Floats | None = None
 
+    def suit(self, stroke: Stroke) -> "Device":
+        """Return the device with fingertip and blister of a stroke."""
+        if stroke.finger is None:
+            return self
+        blister = self.blister and (stroke.blister or self.blister)
+        return replace(self, finger=stroke.finger, blister=blister)
+
     @property
     def reach(self) -> float:
         """How far from the path pins are formed, m."""
@@ -385,9 +392,10 @@ def find_ghosts(
             same = [
                 ghost.nominal for ghost in former if ghost.has_grown(stroke, before, device.base)
             ]
-            nominal = same[0] if same else find_nominal(stroke, device, before)
+            suited = device.suit(stroke)
+            nominal = same[0] if same else find_nominal(stroke, suited, before)
             if nominal.count < len(stroke.samples):
-                nominal = extend(nominal, stroke, device)
+                nominal = extend(nominal, stroke, suited)
             ghosts.append(Ghost(stroke, nominal, device.base))
             height = nominal.height
     return tuple(ghosts)

@@ -15,6 +15,8 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 
 from ..core.base.arrays import Floats
+from ..core.control.blister import Blister
+from ..core.model.fingertip import Fingertip
 from ..core.shapes.heightmap import HeightMap
 from .falloff import Falloff
 from .tracking import Tracking
@@ -219,6 +221,9 @@ class Stroke:
     limits: tuple[float, float] = (-math.inf, math.inf)
     #: Whether what the finger and the method have formed stays, not brought to the nominal surface.
     as_left: bool = False
+    #: Fingertip that forms it, and the blister that follows; None: those of the scene.
+    finger: Fingertip | None = None
+    blister: Blister | None = None
     #: Whether the hand still draws.
     held: bool = True
     #: The stroke along each image alone, while fingertips go along several at once.

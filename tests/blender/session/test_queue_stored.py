@@ -6,14 +6,18 @@ from functools import partial
 import bpy
 import numpy as np
 import pytest
+from digiclay import bridge
 from digiclay.core.session import live_session
 from digiclay.live import beds, handlers, tick
+from digiclay.roles import fingertip_of
 from digiclay.sessions import running
 from digiclay.sessions.sculpting import change_stroke, queue_stroke
+from digiclay.settings import devices
 from digiclay.strokes.stamps import load_stamp
 from digiclay.strokes.stroke import Brush, Combine, lay_path, make_images, start
 
 from tests.assemble import assert_near
+from tests.blender.at_hand import new_bed
 from tests.blender.session.live import FLOAT32, exact, only_bed, shown, started, undone
 
 #: Rows of the strokes, mm, and where they begin and end.
@@ -301,3 +305,52 @@ def test_a_queue_somebody_has_broken_is_none(bed, junk):
     bed[beds.QUEUE] = junk
     started(bed)
     assert running.find(bed).strokes == ()
+
+
+#: Sizes of the fingertip, mm, chosen before each of three strokes and after the last.
+CHOSEN = (8.0, 16.0, 12.0, 20.0)
+
+
+def size_shown():
+    """Return the width of the fingertip that is drawn, mm."""
+    return 2e3 * bridge.finger_of(fingertip_of(only_bed())).width
+
+
+def height_of_tip():
+    """Return the height of the fingertip's lowest point, m."""
+    return bridge.poses(only_bed())[0, 2]
+
+
+def form_with_sizes(clock, queued):
+    """Return the heights (n,), m, that three strokes leave, each of a size of its own."""
+    bed = new_bed(rows=13, columns=13)
+    handlers.watch()
+    begin(bed)
+    for y, size in zip(ROWS, CHOSEN, strict=False):
+        devices.set_size(bed.digiclay, 1e-3 * size)
+        draw(y, **devices.read_sizes(bed))
+        if not queued:
+            form(clock)
+    devices.set_size(bed.digiclay, 1e-3 * CHOSEN[-1])
+    seen = {}
+    while (session := running.find(bed)).strokes:
+        clock.tick()
+        seen.setdefault(session.finished_strokes, size_shown())
+    assert list(seen.values()) == (pytest.approx(CHOSEN[:3], rel=1e-5) if queued else [])  # 32 bits
+    # The fingertip has the size chosen last, and its lowest point is where it was.
+    low = running.find(bed).pose[2]
+    clock.tick(3)
+    assert size_shown() == pytest.approx(CHOSEN[-1], rel=1e-5)
+    assert height_of_tip() == pytest.approx(low, abs=1e-6)
+    return exact(bed)
+
+
+def test_strokes_are_formed_and_shown_with_the_fingertip_that_they_were_drawn_with(
+    clock, monkeypatch
+):
+    monkeypatch.setattr(live_session, "find_spare", lambda *given: 1e9)  # a stroke a tick
+    formed = [form_with_sizes(clock, queued) for queued in (False, True)]
+    np.testing.assert_array_equal(*formed)
+    down = (40e-3 - formed[0]).reshape(13, 13)
+    # Pins that only give way do so up to a force: 1.1 mm less than the fingertip comes down.
+    assert (down[[10, 6, 2], 6] > 1.8e-3).all()
