@@ -1,10 +1,5 @@
 """The Press tool: where the mouse points, size and presets of the brush, and strokes that a script plays."""
 
-import ast
-import importlib
-import sys
-from pathlib import Path
-
 import bpy
 import digiclay
 import numpy as np
@@ -14,14 +9,14 @@ from digiclay.core.base.errors import DigiclayError
 from digiclay.core.model.fingertip import Fingertip
 from digiclay.core.model.layout import make_grid
 from digiclay.core.scene.assembly import assemble
-from digiclay.live import beds, handlers
-from digiclay.operators.press_adjust import AdjustStrength, BrushMenu
+from digiclay.live import beds
+from digiclay.operators.press_adjust import AdjustStrength
 from digiclay.press import aim, brush, tool
 from digiclay.press.brush import FINGERS, find_kind
 from digiclay.roles import fingertip_of
 from digiclay.sessions import running
 from digiclay.settings import devices, properties
-from digiclay.strokes.stroke import Brush, Combine
+from digiclay.strokes.stroke import Brush
 
 from tests.assemble import assert_near
 from tests.blender.at_hand import in_the_view, new_bed
@@ -283,228 +278,6 @@ def test_each_preset_finger_can_be_simulated_and_is_undone_in_one_step(paper, ki
     assert lengths(bpy.context.object)[0] == pytest.approx(30.0)
 
 
-SHIPPED = Path(brush.HOME, "presets", brush.SUBFOLDER)
-
-
-@pytest.fixture
-def settings(extension, tmp_path, monkeypatch):
-    """The settings of the tool in hand, over a bed; the user's own presets are in a folder of their own."""
-    monkeypatch.setenv("BLENDER_USER_SCRIPTS", str(tmp_path))
-    new_bed()
-    with in_the_view():
-        bpy.ops.wm.tool_set_by_id(name=brush.TOOL)
-        yield brush.tool_settings(bpy.context)
-
-
-def apply(name):
-    """Apply a preset as its entry in the menu does."""
-    (folder,) = [Path(path) for path in bpy.utils.preset_paths(brush.SUBFOLDER)][-1:]
-    file = next(path for path in (SHIPPED / f"{name}.py", folder / f"{name}.py") if path.is_file())
-    bpy.ops.digiclay.press_brush(filepath=str(file))
-    assert BrushMenu.bl_label == bpy.path.display_name(file.stem)
-
-
-@pytest.mark.parametrize("file", sorted(SHIPPED.glob("*.py")), ids=lambda file: file.stem)
-def test_each_preset_sets_a_known_finger_and_every_setting(settings, file):
-    shown = settings.bl_rna.properties
-    wanted = {name: shown[name].default for name in brush.list_settings(settings)}
-    lines = [
-        line.split(" = ") for line in file.read_text().splitlines() if line.startswith("settings.")
-    ]
-    wanted |= {name.removeprefix("settings."): ast.literal_eval(value) for name, value in lines}
-    settings.brush, settings.depth, settings.height, settings.strength = "LEVEL", 9.0, 9.0, 0.5
-    settings.symmetry, settings.path, settings.stabilizer, settings.pressure_curve = (
-        "XY",
-        "LINE",
-        9.0,
-        "SOFT",
-    )
-    settings.use_pressure = settings.use_tilt = False
-    assert str(SHIPPED) in bpy.utils.preset_paths(brush.SUBFOLDER)
-    bpy.context.object.digiclay.size = 40.0
-    apply(file.stem)
-    assert find_kind(devices.read_finger(bpy.context.object.digiclay)) in FINGERS.values()
-    assert {name: getattr(settings, name) for name in wanted} == wanted
-
-
-#: What a preset that cannot be applied contains, and what is said of it.
-SPOILT = [
-    ("settings.dept = 3.0", "spoilt.py: a key must be a setting of the Press tool (got 'dept')"),
-    ('settings.brush = "RAIS"', "brush must be a value of that setting (got 'RAIS')"),
-    ('settings.brush = "RAISE"\nsettings.depth = "deep"', "depth must be a value"),
-    ('settings.brush = "RAISE"\nwm.digiclay_finger = (0.0, 1.0, 1.0)', "digiclay_finger must be"),
-    ("wm.digiclay_finger = (5.0,)", "digiclay_finger must be"),
-    ("settings.depth = open('x')", "spoilt.py cannot be read: malformed"),
-    ("settings.depth = nan", "spoilt.py cannot be read: malformed"),
-    ("settings.depth = ", "spoilt.py cannot be read: invalid syntax"),
-    ("\x00", "spoilt.py cannot be read: source code"),
-    (None, "spoilt.py cannot be read"),
-]
-
-
-@pytest.mark.parametrize("content, said", SPOILT, ids=[str(row[0]) for row in SPOILT])
-def test_a_preset_that_cannot_be_applied_is_told_of_in_one_line_and_changes_nothing(
-    settings, tmp_path, content, said
-):
-    settings.depth, settings.symmetry, settings.strength = 7.5, "XY", 0.3
-    names = {*settings.bl_rna.properties.keys()} - {"rna_type"}
-    before = {name: getattr(settings, name) for name in names}
-    file = tmp_path / "spoilt.py"
-    if content is not None:
-        file.write_text(content)
-    with pytest.raises(RuntimeError) as caught:
-        bpy.ops.digiclay.press_brush(filepath=str(file))
-    line = str(caught.value).strip()
-    assert said in line
-    assert len(line.splitlines()) == 1
-    assert len(line) < 400
-    assert {name: getattr(settings, name) for name in names} == before
-    assert bpy.context.object.digiclay.size == pytest.approx(16.0, rel=1e-6)  # 32 bits
-
-
-#: Brush, its strength, and the size of its fingertip, mm, chosen one after the other.
-CHOSEN = [("LOWER", 0.3, 12.0), ("RAISE", 0.8, 24.0), ("SMOOTH", 0.1, 40.0)]
-
-
-def test_each_brush_has_a_strength_and_a_fingertip_of_its_own(settings):
-    bed = bpy.context.object
-    for name, strength, size in CHOSEN:
-        settings.brush = name
-        assert settings.strength == 1.0, f"{name} has not been set"
-        settings.strength, bed.digiclay.size = strength, size
-    finger = devices.read_finger(bed.digiclay)
-    for name, strength, size in (*CHOSEN, *CHOSEN):
-        settings.brush = name
-        shown = settings.strength, bed.digiclay.size, lengths(bed)[0]
-        assert shown == pytest.approx((strength, size, size), rel=1e-5), name  # 32 bits
-        assert bridge.finger_of(fingertip_of(bed)).width == pytest.approx(5e-4 * size, rel=1e-5)
-        # Shift smooths with the strength of Smooth, Ctrl inverts with that of the brush.
-        assert brush.read_own(settings, "strength", Brush.SMOOTH) == pytest.approx(0.1)
-        for kind in (Brush(name), Brush(name).inverse):
-            assert brush.read_own(settings, "strength", kind) == pytest.approx(strength)
-    # The form comes back bit for bit, the blister but for the rounding of 32 bits.
-    assert devices.read_finger(bed.digiclay) == finger
-    settings.brush = "LEVEL"  # not used yet: its fingertip is the present one
-    assert (settings.strength, bed.digiclay.size) == (1.0, pytest.approx(40.0))
-
-
-def test_a_bed_that_comes_into_use_later_gets_the_fingertip_of_the_brush_when_it_is_pressed(
-    settings,
-):
-    first = bpy.context.object
-    settings.brush = "RAISE"
-    first.digiclay.size = 24.0
-    bpy.ops.mesh.digital_clay_add(rows=6, columns=6)
-    other = bpy.context.object
-    other.digiclay.size = 10.0
-    settings.brush = "LOWER"
-    assert [bed.digiclay.size for bed in (first, other)] == pytest.approx([24.0, 10.0])
-    brush.take_finger(bpy.context, first)
-    assert first.digiclay.size == pytest.approx(16.0)
-    settings.brush = "RAISE"
-    brush.take_finger(bpy.context, first)
-    assert first.digiclay.size == pytest.approx(24.0)
-
-
-def test_a_file_keeps_what_each_brush_has(extension, tmp_path):
-    new_bed()
-    with in_the_view():
-        bpy.ops.wm.tool_set_by_id(name=brush.TOOL)
-        settings = brush.tool_settings(bpy.context)
-        for name, strength, size in CHOSEN:
-            settings.brush = name
-            settings.strength, bpy.context.object.digiclay.size = strength, size
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "brushes.blend"))
-    bpy.ops.wm.read_homefile(use_factory_startup=True)
-    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "brushes.blend"))
-    with in_the_view():
-        opened = brush.tool_settings(bpy.context)
-        for name, strength, size in CHOSEN:
-            opened.brush = name
-            shown = opened.strength, bpy.context.object.digiclay.size
-            assert shown == pytest.approx((strength, size), rel=1e-5), name  # 32 bits
-
-
-def test_no_key_of_blender_s_in_object_mode_is_taken_outside_the_tool():
-    presets = bpy.utils.resource_path("LOCAL")
-    sys.path.append(str(Path(presets, "scripts", "presets", "keyconfig", "keymap_data")))
-    try:
-        blender_default = importlib.import_module("blender_default")
-    finally:
-        sys.path.pop()
-    # What Blender looks through in a 3D view in Object Mode.
-    looked = (
-        "Object Mode",
-        "Object Non-modal",
-        "3D View",
-        "3D View Generic",
-        "Window",
-        "Screen Editing",
-    )
-    taken = {
-        (event["type"], *(bool(event.get(key)) for key in ("ctrl", "shift", "alt", "oskey")))
-        for name, _, content in blender_default.generate_keymaps(blender_default.Params())
-        if name in looked
-        for _, event, *_ in content["items"]
-    }
-    keys = [
-        (key, *(bool(held.get(name)) for name in ("ctrl", "shift", "alt", "oskey")))
-        for _, _, key, held in handlers.KEYS
-    ]
-    assert ("S", False, False, True, False) in taken, "Alt S clears the scale"
-    assert taken.isdisjoint(keys)
-
-
-def test_a_saved_preset_brings_back_what_was_set_and_is_removed(settings, tmp_path):
-    settings.depth, settings.symmetry, settings.path = 7.5, "XY", "RING"
-    bpy.context.object.digiclay.size = 11.0
-    bpy.ops.digiclay.press_brush_save(name="Of my own")
-    (saved,) = [
-        file
-        for path in bpy.utils.preset_paths(brush.SUBFOLDER)
-        for file in Path(path).glob("Of_my_own.py")
-    ]
-    assert saved.is_relative_to(tmp_path)
-    settings.depth, settings.symmetry, settings.path = 2.0, "NONE", "FREE"
-    bpy.context.object.digiclay.size = 30.0
-    bpy.ops.digiclay.press_brush(filepath=str(saved))
-    assert (settings.depth, settings.symmetry, settings.path) == (7.5, "XY", "RING")
-    assert bpy.context.object.digiclay.size == pytest.approx(11.0, abs=1e-3)
-    bpy.ops.digiclay.press_brush_save(name="Of_my_own", remove_name=True)
-    assert not saved.exists()
-    bpy.ops.wm.tool_set_by_id(name="builtin.select_box")
-    assert not bpy.ops.digiclay.press_brush.poll()
-
-
-@pytest.mark.parametrize(
-    "kind, values, combine, limits",
-    [
-        (Brush.RAISE, {}, Combine.HIGHEST, None),
-        (Brush.LOWER, {}, Combine.LOWEST, None),
-        (Brush.RAISE, {"accumulate": True}, Combine.USUAL, None),
-        (Brush.RAISE, {"combine": "LOWEST"}, Combine.HIGHEST, None),
-        (Brush.LEVEL, {}, Combine.USUAL, None),
-        (Brush.IMPRINT, {"combine": "REPLACE"}, Combine.REPLACE, None),
-        (Brush.SMOOTH, {"combine": "ADD"}, Combine.USUAL, None),
-        (Brush.STAMP, {"use_limit": True}, Combine.USUAL, (-10e-3, 10e-3)),
-        (
-            Brush.LOWER,
-            {"use_limit": True, "limit_low": 5.0, "limit_high": -2.0},
-            Combine.LOWEST,
-            (-2e-3, 5e-3),
-        ),
-    ],
-)
-def test_a_stroke_combines_and_is_limited_as_the_tool_is_set(
-    settings, kind, values, combine, limits
-):
-    for name, value in values.items():
-        setattr(settings, name, value)
-    options = brush.find_options(settings, kind)
-    assert options["combine"] is combine
-    assert options.get("limits") == (limits and pytest.approx(limits))
-
-
 PRESS = "[[stroke]]\ndepth = 0.003\nwidth = 0.012\nmoves = [[0, -0.006, 0], [0.2, 0.006, 0]]\n"
 
 
@@ -539,21 +312,6 @@ def test_creases_are_cut_and_flattened_without_a_touch(small, tmp_path, kind, de
     low, high = deepest
     row = depths(small)[4, 4:7]
     assert low < row.max() - (row.min() if kind == "flatten" else 0.0) < high
-
-
-def test_a_falloff_of_the_tool_is_that_of_its_brush_and_smooth_has_one(settings):
-    kinds = Brush.RAISE, Brush.SMOOTH, Brush.ERASE
-    assert [brush.find_falloff(settings, kind).name for kind in kinds] == [
-        "DEVICE",
-        "SMOOTH",
-        "DEVICE",
-    ]
-    settings.falloff = "SPHERE"  # of the brush in hand, Lower, and of its inverse
-    assert [brush.find_falloff(settings, kind).name for kind in kinds] == [
-        "SPHERE",
-        "SMOOTH",
-        "DEVICE",
-    ]
 
 
 @pytest.mark.parametrize(
