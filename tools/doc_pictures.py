@@ -117,9 +117,7 @@ def cut_guide(folder: Path) -> None:
 
 def draw_pins(folder: Path) -> None:
     """Draw the bed at the last touch of the paper's session."""
-    run = folder / "run"
-    carry_out("run", "ridge_mound_valley", "--out", run, "--render", "--no-errors", "--quiet")
-    save_jpeg(run / "pins.png", "pins.jpg")
+    save_jpeg(draw_instant(folder, "ridge_mound_valley", "1600x1000", "mode"), "pins.jpg")
 
 
 def draw_session(folder: Path) -> None:
@@ -147,12 +145,13 @@ def draw_film(folder: Path) -> None:
     save_jpeg(frame, "film.jpg")
 
 
-def draw_instant(folder: Path, name: str, size: str) -> Path:
+def draw_instant(folder: Path, name: str, size: str, color: str = "neutral") -> Path:
     """Draw a scene at its instant of `INSTANTS`, or at its last touch; return the picture."""
     run, drawn = folder / "run", folder / "drawn.png"
     carry_out("run", name, "--out", run, "--no-errors", "--quiet")
     instant = ("--time", str(INSTANTS[name])) if name in INSTANTS else ()
-    carry_out("render", run, *instant, "--size", size, "--out", drawn, "--quiet")
+    looks = ("--size", size, "--color", color, "--quiet")
+    carry_out("render", run, *instant, *looks, "--out", drawn)
     return drawn
 
 
@@ -163,7 +162,7 @@ def draw_hands(folder: Path, name: str) -> None:
 
 def draw_sample(folder: Path, name: str) -> None:
     """Draw a sample scene for the table of all."""
-    save_jpeg(draw_instant(folder, name, "640x400"), f"samples/{name}.jpg", 70, BESIDE)
+    save_jpeg(draw_instant(folder, name, "640x400", "mode"), f"samples/{name}.jpg", 70, BESIDE)
 
 
 def draw_hand_film(folder: Path) -> None:

@@ -100,7 +100,7 @@ def looks_like(pixels, mode):
 def test_a_film_shows_the_rows_in_their_colors_at_its_rate(tmp_path, history):
     before, told = inventory(), list[tuple[int, int]]()
     history["total_force"][:] = 0.3
-    looks = Film(**SMALL, arrows=False)
+    looks = Film(**SMALL, color="mode", arrows=False)
     path = render(
         history, tmp_path / "a film.mp4", looks, set_point=0.3, progress=lambda *at: told.append(at)
     )
@@ -145,7 +145,7 @@ def test_a_turntable_turns_once_and_shows_no_fingertip(tmp_path, history):
     # One half of the bed is blue: its middle goes round.
     history["mode"][-1] = np.where(history["position"][:, 0] > 0.0, Mode.HOLD, Mode.REST)
     instant = Instant.of(history, -1)
-    pictures = filmed(instant, tmp_path / "turn.mp4", Turntable(**SMALL, frames=4))
+    pictures = filmed(instant, tmp_path / "turn.mp4", Turntable(**SMALL, color="mode", frames=4))
     assert len(pictures) == 4
     across = []
     for picture in pictures:

@@ -70,6 +70,8 @@ def test_an_older_bed_is_colored_by_force_under_the_former_names():
     shown_as = found.digiclay_display
     shown_as.color, shown_as.top_force = "force", 0.5
     assert (shown_as.color, view.read_setting(found, TOP_FORCE, 0.0)) == ("force", 0.5)
+    shown_as.color = "neutral"  # which these have not
+    assert shown_as.color == "force"
     names = set(found.modifiers["Pins"].node_group.interface.items_tree.keys())
     assert {"Colour by Force", "Top Colour at (N)"} <= names
 

@@ -44,9 +44,8 @@ def bed_in(mode):
 
 @pytest.mark.parametrize("mode", [Mode.HOLD, Mode.FROZEN])
 def test_a_still_has_the_size_asked_for_and_its_pins_the_color_of_their_mode(mode, tmp_path):
-    out = still.render_still(
-        bed_in(mode), tmp_path / "pins.png", Still(width=WIDTH, height=HEIGHT, samples=2)
-    )
+    look = Still(width=WIDTH, height=HEIGHT, samples=2, color="mode")
+    out = still.render_still(bed_in(mode), tmp_path / "pins.png", look)
     assert out.read_bytes().startswith(b"\x89PNG")
     pixels = read_picture(out)
     assert pixels.shape == (HEIGHT, WIDTH, 3)
@@ -58,10 +57,19 @@ def test_a_still_has_the_size_asked_for_and_its_pins_the_color_of_their_mode(mod
     assert of_the_hue(pins, COLORS[other]) < 20
 
 
+def test_a_still_is_neutral_by_default_without_a_legend_and_the_bed_in_its_middle(tmp_path):
+    look = Still(width=WIDTH, height=HEIGHT, samples=2)
+    pixels = read_picture(still.render_still(bed_in(Mode.HOLD), tmp_path / "pins.png", look))
+    assert of_the_hue(pixels, COLORS[Mode.HOLD]) < 20
+    # Nothing is written where a legend would be; the dark housing is as far from either side.
+    dark = np.flatnonzero((pixels.max(axis=2) < 0.2).any(axis=0))
+    assert dark[0] == pytest.approx(WIDTH - 1 - dark[-1], abs=3)
+
+
 def test_the_legend_names_the_modes_present_in_the_palette_that_the_open_file_wears(tmp_path):
     other = palettes.PALETTES["tol_muted"][Mode.HOLD]
     for seen, unseen in ((COLORS[Mode.HOLD], other), (other, COLORS[Mode.HOLD])):
-        look = Still(width=WIDTH, height=HEIGHT, samples=2)
+        look = Still(width=WIDTH, height=HEIGHT, samples=2, color="mode")
         legend = read_picture(still.render_still(bed_in(Mode.HOLD), tmp_path / "pins.png", look))[
             :, : WIDTH // 5
         ]

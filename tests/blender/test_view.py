@@ -165,6 +165,8 @@ def test_every_pin_wears_the_color_of_its_level_of_force(bed, formed):
     assert len(set(level_of(formed.force))) == 13
     view.write_setting(bed, TOP_FORCE, 2.0)
     assert drawn_pins(bed)[1] == [f"force_{level:02d}" for level in level_of(formed.force, 2.0)]
+    view.color_by(bed, "neutral")
+    assert (set(drawn_pins(bed)[1]), view.shows_force(bed)) == ({"rest"}, False)
     view.color_by(bed, "mode")
     assert drawn_pins(bed)[1] == [Mode(int(code)).name.lower() for code in formed.mode]
     bed.modifiers.clear()
@@ -264,6 +266,10 @@ def test_the_properties_are_the_settings_of_the_geometry_nodes(clay):
     assert view.read_setting(clay, ARROW_LENGTH, 0.0) == 250.0
     view.color_by(clay, "mode")
     assert shown.color == "mode"
+    shown.color = "neutral"
+    assert (view.read_coloring(clay), shown.color) == ("neutral", "neutral")
+    shown.color = "mode"
+    assert (view.read_coloring(clay), shown.color) == ("mode", "mode")
     # A bed without its nodes has nothing to set and says nothing.
     clay.modifiers.clear()
     shown.color, shown.arrows, shown.top_force, shown.arrow_length = "force", True, 0.5, 250.0

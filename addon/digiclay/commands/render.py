@@ -49,7 +49,7 @@ OPTIONS: Options = {
     "--out FILE": (Path, "output file; default: in the run folder"),
     "--size WxH": (size, "default 1600x1000; 960x600 for films"),
     "--engine": (ENGINES, "default cycles; workbench for films"),
-    "--color": (COLORS, "quantity shown by the colors of the pins; default: mode"),
+    "--color": (COLORS, "quantity shown by the colors of the pins; default: neutral"),
     # Scripts written for older versions have it so.
     "--colour": {"dest": "color", "choices": COLORS, "help": SUPPRESS},
     "--arrows": {

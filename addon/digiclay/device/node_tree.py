@@ -31,8 +31,8 @@ CASE, SOURCES = "Housing", "Sources"
 
 #: Pins pushed below the deck keep this much of their length, rather than turning upside down.
 LEAST_STRETCH = 0.02
-#: Names of the settings: colors by force, and arrows.
-COLOR_BY_FORCE, TOP_FORCE = "Color by Force", "Top Color at (N)"
+#: Names of the settings: colors by force, one color for all pins, and arrows.
+COLOR_BY_FORCE, TOP_FORCE, NEUTRAL = "Color by Force", "Top Color at (N)", "Neutral Color"
 ARROWS, ARROW_LENGTH = "Force Arrows", "Arrow Length (mm/N)"
 #: Names of the settings: what is seen (0 automatic, 1 pins, 2 skin, 3 both), which skin, whether
 #: the pins are too small in the views for "automatic" to draw them, and whether the skin is tinted
@@ -171,6 +171,7 @@ def bed_nodes(sources: Sources, deck: float, length: float, unit: float) -> Node
     choice = node(tree, "GeometryNodeCollectionInfo", parts, name=SOURCES)
     level = _level_of_force(tree, settings.outputs[TOP_FORCE], len(Mode))
     mode = attribute(tree, "mode", "INT")
+    look = switch(tree, "INT", settings.outputs[COLOR_BY_FORCE], mode, level)
     instances = node(
         tree,
         "GeometryNodeInstanceOnPoints",
@@ -178,7 +179,7 @@ def bed_nodes(sources: Sources, deck: float, length: float, unit: float) -> Node
             "Points": cells,
             "Instance": choice.outputs["Instances"],
             "Pick Instance": True,
-            "Instance Index": switch(tree, "INT", settings.outputs[COLOR_BY_FORCE], mode, level),
+            "Instance Index": switch(tree, "INT", settings.outputs[NEUTRAL], look, int(Mode.REST)),
             "Scale": _stretch(tree, deck, length),
         },
     )
@@ -197,6 +198,7 @@ def bed_nodes(sources: Sources, deck: float, length: float, unit: float) -> Node
 #: What each bed may choose for itself: name, type, default, description.
 SETTINGS = (
     (COLOR_BY_FORCE, "Bool", False, "Color the pins by force, not by mode"),
+    (NEUTRAL, "Bool", False, "Color all pins as those at rest"),
     (TOP_FORCE, "Float", heat.TOP, "Force of the last color, in N"),
     (ARROWS, "Bool", False, "Draw the force on each pin as an arrow onto its top"),
     (ARROW_LENGTH, "Float", LENGTH, "Length of the arrow of 1 N, in mm of the device"),

@@ -32,11 +32,12 @@ from ..core.engine.system import System
 from ..roles import BED, HOUSING, ROLE, fingertips_of
 from . import parts
 from .instant import Instant
-from .node_tree import ARROWS, CASE, COLOR_BY_FORCE, FAR, FORM, SOURCES, bed_nodes
+from .node_tree import ARROWS, CASE, COLOR_BY_FORCE, FAR, FORM, NEUTRAL, SOURCES, bed_nodes
 
 #: What the color of a pin can tell; and forms of a bed in view: its pins, a live skin over them, or
 #: both. In the order of the numbers in the settings of the geometry nodes.
-COLORINGS, FORMS = ("mode", "force"), ("automatic", "pins", "skin", "both")
+COLORINGS = ("mode", "force", "neutral")
+FORMS = ("automatic", "pins", "skin", "both")
 #: Where a bed keeps the form that it had before its skin was toggled, until a form is chosen.
 BEFORE = "digiclay_form_before"
 #: Name of the bed's modifier.
@@ -161,13 +162,23 @@ def write_setting(bed: Object, name: str, value: Any) -> None:
 
 
 def color_by(bed: Object, what: str) -> None:
-    """Color the pins by one of `COLORINGS`: what they do, or the force on them."""
-    write_setting(bed, COLOR_BY_FORCE, bool(COLORINGS.index(what)))
+    """Color the pins by one of `COLORINGS`: what they do, the force on them, or all alike."""
+    neutral = what == "neutral"
+    if neutral or has_setting(bed, NEUTRAL):
+        write_setting(bed, NEUTRAL, neutral)
+    write_setting(bed, COLOR_BY_FORCE, what == "force")
+
+
+def read_coloring(bed: Object) -> str:
+    """Return one of `COLORINGS`; "mode" for a bed without its geometry nodes."""
+    if read_setting(bed, NEUTRAL, False):
+        return "neutral"
+    return "force" if read_setting(bed, COLOR_BY_FORCE, False) else "mode"
 
 
 def shows_force(bed: Object) -> bool:
     """Return whether the colors of the pins show the force on them."""
-    return bool(read_setting(bed, COLOR_BY_FORCE, False))
+    return read_coloring(bed) == "force"
 
 
 def show_arrows(bed: Object, on: bool) -> None:

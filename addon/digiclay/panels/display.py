@@ -21,6 +21,7 @@ from ..device.node_tree import (
     FORM,
     LENGTH,
     MEMBRANE,
+    NEUTRAL,
     REALIZE,
     TINT,
     TOP_FORCE,
@@ -38,6 +39,7 @@ from .base import LABORATORY, Sidebar, draw_property, panel
 COLORINGS = (
     ("mode", "Mode", "Color the pins by what they do"),
     ("force", "Force", "Color the pins by the force on them"),
+    ("neutral", "Neutral", "Color all pins alike, as those at rest"),
 )
 FORMS = (
     ("automatic", "Automatic", "Pins, or the skin where pins are smaller than about 8 pixels"),
@@ -81,7 +83,9 @@ def _in_nodes(
 
 
 def _color(bed: Object, code: int) -> None:
-    view.color_by(bed, COLORINGS[code][0])
+    what = COLORINGS[code][0]
+    if what != "neutral" or view.has_setting(bed, NEUTRAL):  # older files have none
+        view.color_by(bed, what)
     _write_forces(bed)
 
 
@@ -123,7 +127,8 @@ class Display(bpy.types.PropertyGroup):
         "Color",
         "Quantity shown by the color of a pin",
         items=COLORINGS,
-        **_in_nodes(COLOR_BY_FORCE, 0, _color),
+        get=lambda display: view.COLORINGS.index(view.read_coloring(display.id_data)),
+        set=_in_nodes(COLOR_BY_FORCE, 0, _color)["set"],
     )
     top_force: number(
         "Top Color at (N)",

@@ -129,7 +129,7 @@ def stage_film(
     height = history["height"][used]
     first = Instant.of(history, int(rows[0]), **sizes)
     with stage_bed("Digital Clay Film", first, looks, float(height.min())) as (scene, bed):
-        left, right, below, above = stage.MARGINS
+        left, right, below, above = stage.choose_margins(bed)
         front = stage.set_up(
             scene,
             bed,

@@ -17,8 +17,9 @@ from .legend import Front, write_force_legend, write_mode_legend
 AZIMUTH, ELEVATION = math.radians(-62.0), math.radians(43.0)
 LENS, SENSOR = 62.0, 36.0
 Margins = tuple[float, float, float, float]
-#: Parts of the picture's width or height kept free: left, right, below, above.
-MARGINS = (0.25, 0.03, 0.05, 0.05)
+#: Parts of the picture's width or height kept free: left, right, below, above; beside a legend,
+#: and without one.
+MARGINS, BARE = (0.25, 0.03, 0.05, 0.05), (0.05, 0.05, 0.05, 0.05)
 #: sRGB of the floor.
 FLOOR = (0.80, 0.81, 0.82)
 
@@ -30,22 +31,30 @@ def set_up(
     *,
     points: Floats | None = None,
     modes: Sequence[Mode] | None = None,
-    margins: Margins = MARGINS,
+    margins: Margins | None = None,
 ) -> Front:
-    """Put camera, lights, floor and legend about a bed at the origin; return the plane before the camera."""
+    """Put camera, lights, floor and legend about a bed at the origin; return the plane before the camera.
+
+    Margins are those of `choose_margins` unless given.
+    """
     points = outline(bed) if points is None else points
     floor = float(points[:, 2].min())
     span = float(np.ptp(points, axis=0).max())
-    camera = _camera(scene, points, margins)
+    camera = _camera(scene, points, margins or choose_margins(bed))
     if scene.render.engine == "CYCLES":
         _floor(scene, floor, 60.0 * span)
     _lights(scene)
     front = Front.before(scene, camera, half_frame(scene))
     if view.shows_force(bed):
         write_force_legend(front)
-    else:
+    elif view.read_coloring(bed) == "mode":
         write_mode_legend(front, instant.modes if modes is None else modes)
     return front
+
+
+def choose_margins(bed: Object) -> Margins:
+    """Return what is kept free about a bed: room for a legend where its colors need one."""
+    return BARE if view.read_coloring(bed) == "neutral" else MARGINS
 
 
 def camera_place(points: Floats, axes: Floats, low: Floats, high: Floats) -> Floats:

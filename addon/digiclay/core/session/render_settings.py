@@ -16,7 +16,7 @@ from ..files.formats import is_whole_picture
 
 #: Render engines, and quantities that color the pins.
 ENGINES = ("cycles", "workbench")
-COLORS = ("mode", "force")
+COLORS = ("neutral", "mode", "force")
 #: Most frames: more are a typing error, as an hour of film has 90 000.
 MOST_FRAMES = 100_000
 
@@ -32,7 +32,9 @@ class Picture(Parameters):
     )
     samples: int = quantity(6, "samples per pixel (cycles)", at_least=1, at_most=65536)
     color: str = quantity(
-        "mode", "whether pins show their control mode or the force on them", choices=COLORS
+        "neutral",
+        "whether pins are all alike, or show their control mode or the force",
+        choices=COLORS,
     )
     arrows: bool = quantity(False, "whether arrows show the force on each pin")
 
