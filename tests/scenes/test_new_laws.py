@@ -268,7 +268,7 @@ REFUSED = (
 )
 #: Rows of the list of arrangements, and what is found of them.
 NEW = {
-    "wide": ('Arrangement(1.5, 0.0, "Wide rows")', ["0.51", "61", "8", "4", "[61, 71, 59, 49]"]),
+    "wide": ('Arrangement(1.5, 0.0, "Wide rows")', ["0.51", "61", "8", "6", "[61, 71, 59, 49]"]),
     "close": (
         'Arrangement(0.7, 0.5, "Close rows")',
         ["0.238", "61", "6", "6", "[61, 72, 71, 59, 49, 50]"],
