@@ -22,8 +22,8 @@ UNEVEN = 1e-3
 #: A bed scaled to less than this can be neither seen nor inverted.
 SMALLEST_SCALE = 1e-6
 
-#: Matrices of fingertips that differ by less, in Blender units, stand alike on a palm: they are
-#: float32.
+#: Matrices of fingertips that differ by less, in units of their bed, stand alike on a palm: they
+#: are float32.
 STRAY = 1e-4
 #: Where an empty keeps the semi-axes of its finger, m.
 AXES = "digiclay_axes"
@@ -125,7 +125,7 @@ def move_fingertips(
         stood = np.array(above.matrix_world if above else np.eye(4))
         if role == PALM and len(tips) == sum(tip.parent == above for tip in every.values()):
             ways = [whole @ pose @ np.linalg.pinv(tip.matrix_world) for tip, pose in tips]
-            if np.ptp(ways, axis=0).max() < STRAY:
+            if np.ptp(ways, axis=0).max() < STRAY * np.linalg.norm(whole[:3, 0]):
                 stood = ways[0] @ stood
                 above.matrix_world = stood.T.tolist()
         for tip, place in tips:

@@ -277,8 +277,14 @@ def test_a_copy_of_a_palm_alone_is_another_hand():
     assert_near(poses[6:, :3] - poses[1:6, :3], [[0.0, 0.05, 0.0]] * 5, 1e-6)
 
 
-def test_poses_are_given_to_a_hand_by_its_palm_where_it_moves_as_one_and_else_by_its_fingertips():
+# In a scene in millimeters, beside its origin, matrices have 0.1 µm of the device, as they have near it.
+@pytest.mark.parametrize("scale, place", [(1.0, (0.0, 0.0, 0.0)), (100.0, (900.0, -800.0, 300.0))])
+def test_poses_are_given_to_a_hand_by_its_palm_where_it_moves_as_one_and_else_by_its_fingertips(
+    scale, place
+):
     bed = with_hand()
+    bed.scale, bed.location, bed.rotation_euler = (scale,) * 3, place, (0.3, -0.2, 1.0)
+    looked()
     palm, wanted = palms()[0], bridge.poses(bed)
     own = [tuple(tip.location) for tip in palm.children]
     fingers = [bridge.finger_of(tip) for tip in fingertips_of(bed).values()]

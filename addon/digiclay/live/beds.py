@@ -82,7 +82,7 @@ def blocking_reason(context: Context, bed: Object, pins: int | None = None) -> s
             return localize(
                 "{} has no finite location: clear its location, or undo that, to go on", tip.name
             )
-        if abs(np.linalg.det(matrix[:3, :3])) < 1e-12:
+        if abs(np.linalg.det(matrix[:3, :3])) < 1e-12 * bridge.uniform(bed) ** 3:
             return localize("{} is scaled to nothing: clear its scale to go on", tip.name)
     return ""
 

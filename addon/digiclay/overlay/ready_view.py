@@ -18,6 +18,9 @@ SPACE = 0.04
 #: Distances tried, in nearest ones, until a bed is whole from above too: within as much of the
 #: view.
 FARTHER, ABOVE = (1.0, 1.05, 1.1, 1.15, 1.2, 1.25), 0.95
+#: Distances from the eye at which a view begins, at least and at most, and ends, at least, as shares
+#: of that of what it turns about: enough to orbit and zoom, not so much that surfaces flicker.
+CLIP = 1e-4, 0.05, 10.0
 #: Least square of the level part of a view's direction that is divided by: from above there is
 #: none.
 LEVEL = 0.01
@@ -94,6 +97,11 @@ def frame(context: Context, bed: Object) -> None:
         looking.view_distance = eye[2] - (0.0 if parallel else depth)
         if (lens * (half + np.abs(aside + depth * back)[:2]) < ABOVE * looking.view_distance).all():
             break
+    # A bed can be larger or smaller than the factory file's view shows, as in millimeters.
+    space = area.spaces.active
+    nearest, near, far = (share * looking.view_distance for share in CLIP)
+    space.clip_start = min(max(space.clip_start, nearest), near)
+    space.clip_end = max(space.clip_end, far)
     looking.update()
     detail.follow()
 

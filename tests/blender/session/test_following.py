@@ -132,14 +132,17 @@ def test_a_session_in_a_playback_has_the_path_that_a_bake_has(bed, clock, how):
     assert len(running.find(bed).recording.path) == len(path) + 20  # 0.1 s by the wall's clock
 
 
-def test_two_beds_go_on_at_once_and_one_turned_moved_and_scaled_forms_like_the_other(bed, clock):
+@pytest.mark.parametrize("scale", [2.0, 100.0, 1e-5])
+def test_two_beds_go_on_at_once_and_one_turned_moved_and_scaled_forms_like_the_other(
+    bed, clock, scale
+):
     started(bed)
     bpy.ops.mesh.digital_clay_add(rows=13, columns=13)
     other = bpy.context.object
     other.location, other.rotation_euler, other.scale = (
-        (3.0, -2.0, 1.0),
+        (1.5 * scale, -scale, 0.5 * scale),
         (0.4, 0.0, 0.7),
-        (2.0, 2.0, 2.0),
+        (scale,) * 3,
     )
     started(other)
     press(other, clock)
@@ -147,7 +150,7 @@ def test_two_beds_go_on_at_once_and_one_turned_moved_and_scaled_forms_like_the_o
     turned = exact(other)
     clock.tick()  # 45 ticks are whole periods: both beds see the path in the same phase
     press(bed, clock)
-    # The matrices are float32: some 1e-7 of 3 units, at 0.1 m a unit.
+    # The matrices are float32: some 1e-7 of 1.5 units of the bed, at 0.1 m a unit.
     assert_near(turned, exact(bed), 2e-5)
     assert len(running.list_sessions()) == 2
 
