@@ -178,7 +178,7 @@ def test_the_ghost_of_a_queue_counts_from_the_base_that_the_queue_sets():
     # The same path on another base is found anew; on the same one it stays.
     kept = find_ghosts(strokes[:1], device(), FLAT)
     assert find_ghosts(strokes[:1], device(OTHER), FLAT, kept)[0].nominal is not kept[0].nominal
-    same = replace(device(), base=kept[0].base)
+    same = replace(device(), base=kept[0].device.base)
     assert find_ghosts(strokes[:1], same, FLAT, kept)[0].nominal is kept[0].nominal
 
 

@@ -14,6 +14,7 @@ from digiclay.core.control.orders import (
     order_periods,
     place,
     repeat_order,
+    share,
 )
 from digiclay.core.control.virtual_master import Master, Phase
 from digiclay.core.engine.simulation import begin
@@ -305,12 +306,14 @@ FAULTY = [
     "0 0 1e-2 101 0",
     "0 0 1e-2 -0.1 0",
     "0 0 1e-2 1 0.5",
-    "0 0 1e-2 1 7",
+    "0 0 1e-2 1 8",
     "0 0 1e-2 1 -1",
     f"1 0 0 0 {Verb.PLACE:d}",
     f"-1 0 0 0 {Verb.PLACE:d}",
     f"0.5 0 0 0 {Verb.PLACE:d}",
     f"nan 0 0 0 {Verb.PLACE:d}",
+    f"1 0 1e3 0 {Verb.SHARE:d}",
+    f"0.5 0 1e3 0 {Verb.SHARE:d}",
 ]
 SOUND = [
     f"0 0 0 0 {Verb.PLACE:d}",
@@ -331,6 +334,14 @@ def test_an_order_out_of_its_range_is_found(order):
     rows[1] = order.split()
     assert fault_in(rows).startswith("row 1 is [" if order in FAULTY else "")
     assert bool(fault_in(rows)) == (order in FAULTY)
+
+
+@pytest.mark.parametrize("wrong", [np.nan, -0.1, 1.1, np.inf])
+def test_shares_of_locks_are_from_0_to_1(wrong):
+    orders = share(np.linspace(0.0, 1.0, 9))
+    assert find_fault(orders, 1, 9, 80e-3) == ""
+    orders.surfaces[0][3] = wrong
+    assert find_fault(orders, 1, 9, 80e-3) == "surface 0 has shares that are not from 0 to 1"
 
 
 @pytest.mark.parametrize("shape", [(0, 5), (2, 5), (3, 4), (15,)])

@@ -15,6 +15,7 @@ from digiclay.core.engine.state import State
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.toml_table import resolve
 from digiclay.core.session.snapshot import START, dump, flatten, load, rebuild, transfer_heights
+from numpy.testing import assert_array_equal
 from numpy.typing import NDArray
 
 from tests.assemble import path
@@ -54,7 +55,8 @@ def packed_parts(state):
     rest = (state.period, state.peak, held.near, held.reach, held.control, held.peak, held.until)
     kept = []
     memory = flatten(state.memory, kept)
-    return [*(array.tobytes() for array in (*arrays, *kept)), *rest, memory]
+    locks = None if state.locks is None else state.locks.tobytes()
+    return [*(array.tobytes() for array in (*arrays, *kept)), *rest, memory, locks]
 
 
 RISING = {"shape": {"file": "ripple", "rise": "10 mm"}}
@@ -193,13 +195,36 @@ def test_pins_at_their_ends_are_taken_up_and_a_memory_of_no_number_of_the_world_
     state.rows[system.cell.lag_rows, :2] = state.rows[system.rows.commands, :2] = -1.0, 1.0
     assert same(load(system, dump(system, state)), state)
     # A field that is added to a state must be added to what is kept, and to `packed_parts`.
-    assert set(State._fields) == {"period", "rows", "modes", "aged", "peak", "active", "memory"}
+    fields = {"period", "rows", "modes", "aged", "peak", "active", "memory", "locks"}
+    assert set(State._fields) == fields
     system = system_of("hybrid")
     state = run(system, begin(system), 70)
     # Pulp of Method III: the logarithm is NaN.
     state.active.block[system.rows.controlled, 1] = -1e91
     with pytest.raises(StateError, match="no state can have"):
         load(system, dump(system, state))
+
+
+LOCKS = np.linspace(0.0, 0.9, 99)
+
+
+@pytest.mark.parametrize(
+    "locks, sound",
+    [
+        (LOCKS, True),
+        *((np.where(LOCKS > 0.5, wrong, LOCKS), False) for wrong in (np.nan, -0.1, 1.0, np.inf)),
+        (LOCKS[1:], False),
+        (0 * LOCKS.astype(int), False),
+    ],
+)
+def test_shares_of_locks_are_kept_and_refused_where_they_are_none(locks, sound):
+    system, data = kept()
+    stored = dump(system, load(system, data)._replace(locks=locks))
+    if sound:
+        assert_array_equal(load(system, stored).locks, locks)
+        return
+    with pytest.raises(StateError, match="no state can have"):
+        load(system, stored)
 
 
 def test_heights_are_carried_over_to_other_parts_within_the_stroke():

@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 
-from ..core.base.modes import Mode
 from ..core.scene.schema import Scene
 from ..device.instant import find_ellipsoid
 from ..strokes.nominal import Device
@@ -14,10 +13,10 @@ from .running import Running
 def find_device(running: Running) -> Device:
     """Return what forms the strokes of a session."""
     scene, system = running.scene, running.system
-    locked, actuator = running.state.mode() == Mode.LOCKED, system.cell.actuator
+    shares, actuator = running.state.shares(), system.cell.actuator
     parts = system.grid, find_ellipsoid(scene), find_blister(scene), actuator.stroke
-    mask = locked if locked.any() else None
-    return Device(*parts, mask, actuator.rest_height, running.base)
+    locks = shares if shares.any() else None
+    return Device(*parts, locks, actuator.rest_height, running.base)
 
 
 def suit_scene(scene: Scene, stroke: Stroke) -> Scene:

@@ -17,11 +17,12 @@ from ..core.session import accuracy, live_session, recent_trace, snapshot
 from ..core.session.live_session import Moment
 from ..device.instant import CLEARANCE
 from ..strokes import drawn
+from ..strokes.locks import AT_ONCE, await_locks, order_at_once
 from ..strokes.motion import begin as begin_stroke
 from ..strokes.motion import follow, follow_images
 from ..strokes.pose import turn_image
-from ..strokes.stroke import FINISHING, Brush, Stroke
-from ..strokes.sweep import SWEEPS, WHOLE, finish, order_all, sweep
+from ..strokes.stroke import FINISHING, RETURNING, Brush, Stroke
+from ..strokes.sweep import SWEEPS, finish, sweep
 from ..strokes.tracking import find_tracking
 from ..ui_text import localize
 from .forming_device import find_device, is_resized, suit_scene
@@ -455,7 +456,7 @@ def take_path(running: Running, count: int) -> tuple[Running, Floats, Orders | N
     if stroke.height is None:
         running, _ = change_scene(running, suit_scene(running.scene, stroke))
         running = replace(running, next_gesture=_mark(running), stroke_start=_mark(running))
-        if stroke.brush not in WHOLE:
+        if stroke.brush not in AT_ONCE:
             tracking = (
                 None if stroke.brush in SWEEPS else find_tracking(running.scene, running.system)
             )
@@ -463,15 +464,15 @@ def take_path(running: Running, count: int) -> tuple[Running, Floats, Orders | N
     running = _give_fingers(running, len(stroke.parts))
     stroke, path, orders = _advance(running, stroke, count)
     path = path.reshape(len(path), -1, 7)
-    left = (stroke, *running.strokes[1:])
-    running = replace(running, strokes=left)
+    if stroke.done:
+        stroke = await_locks(stroke, find_device(running))
+    running = replace(running, strokes=(stroke, *running.strokes[1:]))
     if stroke.done:
         end = stroke.samples[-1]
-        finished = running.finished_strokes + 1
         running = replace(
             running,
-            strokes=left[1:],
-            finished_strokes=finished,
+            strokes=running.strokes[1:],
+            finished_strokes=running.finished_strokes + 1,
             last_place=(end.x, end.y),
             correction=stroke.correction,
         )
@@ -484,12 +485,12 @@ def _advance(running: Running, stroke: Stroke, count: int) -> tuple[Stroke, Floa
     """Advance fingertips along a stroke; return it, the paths (k + 1, 7) or (k + 1, m, 7), and the orders."""
     state, pose, period = running.state, running.pose, running.system.period
     device = find_device(running)
-    if stroke.brush in WHOLE:
-        return order_all(stroke, pose)
-    arrived = stroke.phase == FINISHING and live_session.has_arrived(state)
-    if stroke.brush in SWEEPS and not stroke.placed:
+    if stroke.brush in AT_ONCE:
+        return order_at_once(stroke, device, state.row(0), pose)
+    arrived = stroke.phase in (FINISHING, RETURNING) and live_session.has_arrived(state)
+    if stroke.brush in SWEEPS and not stroke.placed and stroke.phase != RETURNING:
         return sweep(stroke, device, SWEEPS[stroke.brush], pose, count, period, arrived=arrived)
-    if stroke.phase == FINISHING:
+    if stroke.phase in (FINISHING, RETURNING):
         return finish(stroke, device, state.row(0), pose, count, period, arrived=arrived)
     if stroke.parts:
         pressing = list_pressing(running)

@@ -50,6 +50,14 @@ def _read_part(kind: type[Part], values: list[Any]) -> Part:
     return kind(**dict(zip(kind.__dataclass_fields__, values, strict=True)))
 
 
+def _read_pins(values: Any) -> tuple[int, ...]:
+    """Return numbers of pins; a ValueError tells that they are none."""
+    pins = tuple(values)
+    if not all(type(pin) is int and pin >= 0 for pin in pins):
+        raise ValueError(values)
+    return pins
+
+
 #: Fields of a stroke that a line has where they are not those of older strokes, and their readers.
 FIELDS: dict[str, Callable[[Any], Any]] = {
     "falloff": Falloff,
@@ -58,6 +66,7 @@ FIELDS: dict[str, Callable[[Any], Any]] = {
     "as_left": _read_flag,
     "finger": partial(_read_part, Fingertip),
     "blister": partial(_read_part, Blister),
+    "pins": _read_pins,
 }
 
 

@@ -344,7 +344,7 @@ def _reach(stroke: Stroke, device: Device, reached: int) -> Stroke:
     """Return the stroke with its fingertip at a sample, which may begin another pass."""
     if returns(stroke, stroke.first, reached, device.finger.width):
         assert stroke.height is not None
-        ground = find_nominal(stroke, device, stroke.height, reached).height
+        ground = find_nominal(stroke, device, stroke.height, reached).full
         stroke = replace(stroke, ground=ground, first=reached)
     return replace(stroke, reached=reached)
 

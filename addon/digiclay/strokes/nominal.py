@@ -9,6 +9,7 @@ shows of a stroke at once, and what the valves drive the pins to after the finge
 
 import math
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import pairwise
 from typing import Any
 
@@ -23,7 +24,7 @@ from ..core.surface.pointing import find_ground_height
 from .falloff import Falloff, evaluate
 from .pose import lean_finger, turn_image
 from .smoothing import flatten, smooth
-from .stroke import STAMPS, Brush, Combine, Image, Place, Sample, Stroke, needs_blister
+from .stroke import LOCKS, STAMPS, Brush, Combine, Image, Place, Sample, Stroke, needs_blister
 
 #: A path that comes nearer to itself than the fingertip is wide, after so many widths, is a new
 #: pass.
@@ -58,8 +59,9 @@ class Device:
     blister: Blister | None
     #: Highest place of a pin's top, m.
     highest: float
-    #: (n,), pins that nothing moves; None: none are locked.
-    locked: Flags | None = None
+    #: (n,), shares by which pins are locked: nothing moves those of 1, and brushes the others by what
+    #: is left; None: none are.
+    locks: Floats | None = None
     #: Height of pins at rest, m.
     rest: float = 0.0
     #: (n,), heights that strokes count from, m; None: from the surface.
@@ -71,6 +73,16 @@ class Device:
             return self
         blister = self.blister and (stroke.blister or self.blister)
         return replace(self, finger=stroke.finger, blister=blister)
+
+    @cached_property
+    def shares(self) -> Floats:
+        """Shares by which pins are locked, (n,)."""
+        return np.zeros(self.grid.count) if self.locks is None else self.locks
+
+    @cached_property
+    def locked(self) -> Flags | None:
+        """Which pins nothing moves, (n,); None: none are locked."""
+        return None if self.locks is None else self.locks == 1.0
 
     @property
     def reach(self) -> float:
@@ -119,6 +131,12 @@ class Device:
         high = -math.inf if stroke.combine is Combine.LOWEST else min(high, self.highest)
         return np.clip(formed, np.minimum(before, low), np.maximum(before, high))
 
+    def hold_back(self, before: Floats, height: Floats) -> Floats:
+        """Return heights (n,), m, of which each pin makes the share of the way that its lock leaves it."""
+        if self.locks is None:
+            return height
+        return np.where(self.locks > 0.0, height + self.locks * (before - height), height)
+
     def find_level(self, stroke: Stroke, image: Image, before: Floats) -> float | None:
         """Return the height, m, that a stroke levels to: of pins (n,), m, at its first place; else None."""
         first = stroke.samples[0]
@@ -130,9 +148,11 @@ class Device:
 class Nominal:
     """Nominal surface of a stroke, as far as its path is drawn."""
 
-    #: (n,), before the stroke; from which the depth of its present pass counts; that it leaves, m.
+    #: (n,), before the stroke; from which the depth of its present pass counts; to which it brings
+    #: pins that are not locked in part; that it leaves, m.
     before: Floats
     ground: Floats
+    full: Floats
     height: Floats
     #: (n,), pins about the path.
     near: Flags
@@ -148,11 +168,17 @@ def find_nominal(
 ) -> Nominal:
     """Return the nominal surface of a stroke, or of its first samples, on pins at heights (n,), m."""
     near = np.zeros(before.size, np.bool_)
-    return extend(Nominal(before, before, before, near), stroke, device, count)
+    return extend(Nominal(before, before, before, before, near), stroke, device, count)
 
 
 def extend(nominal: Nominal, stroke: Stroke, device: Device, count: int | None = None) -> Nominal:
     """Return a nominal surface with all samples of its stroke, or its first ones, for all images."""
+    nominal = _extend(nominal, stroke, device, count)
+    return replace(nominal, height=device.hold_back(nominal.before, nominal.full))
+
+
+def _extend(nominal: Nominal, stroke: Stroke, device: Device, count: int | None) -> Nominal:
+    """Return what a stroke forms where no pin is locked in part; see `extend`."""
     end = len(stroke.samples) if count is None else count
     if stroke.brush in STAMPS:
         return _stamp(nominal, stroke, device)
@@ -160,11 +186,11 @@ def extend(nominal: Nominal, stroke: Stroke, device: Device, count: int | None =
         return _brush(nominal, stroke, device, end)
     if device.blister is None and needs_blister(stroke.brush, stroke.falloff):
         return replace(nominal, count=end)
-    height, near = nominal.height.copy(), nominal.near.copy()
-    nominal = replace(nominal, height=height, near=near)
+    full, near = nominal.full.copy(), nominal.near.copy()
+    nominal = replace(nominal, full=full, near=near)
     for index in range(nominal.count, end):
         if returns(stroke, nominal.first, index, device.finger.width):
-            nominal = replace(nominal, ground=height.copy(), first=index)
+            nominal = replace(nominal, ground=full.copy(), first=index)
         for image in stroke.images:
             _mark(nominal, stroke, device, image, index)
     return replace(nominal, count=end)
@@ -206,7 +232,7 @@ def _mark(nominal: Nominal, stroke: Stroke, device: Device, image: Image, index:
             cells = cells[~device.locked[cells]]
         counted = device.find_start(stroke, nominal.ground)[cells]
         ground = counted if level is None else nominal.ground[cells]
-        now = nominal.height[cells]
+        now = nominal.full[cells]
         if device.blister is None:
             under = find_undersides(device, stroke, image, row[part + 1].lean, end, cells)
             change = tops[part + 1] + under - ground
@@ -229,7 +255,16 @@ def _mark(nominal: Nominal, stroke: Stroke, device: Device, image: Image, index:
         else:
             farther = np.abs(change) > np.abs(gone) + TIE
         formed = device.combine(stroke, nominal.before[cells], ground + change)
-        nominal.height[cells] = np.where(farther, formed, now)
+        nominal.full[cells] = np.where(farther, formed, now)
+
+
+def weigh_path(stroke: Stroke, device: Device) -> Floats:
+    """Return the effect of a brush in the ring on each pin, (images, n)."""
+    weight = np.zeros((len(stroke.images), device.grid.count))
+    for row, image in zip(weight, stroke.images, strict=True):
+        for index in range(len(stroke.samples)):
+            _weigh(row, stroke, device, image, index)
+    return weight
 
 
 def _brush(nominal: Nominal, stroke: Stroke, device: Device, end: int) -> Nominal:
@@ -239,7 +274,7 @@ def _brush(nominal: Nominal, stroke: Stroke, device: Device, end: int) -> Nomina
     for index in range(nominal.count, end):
         if returns(stroke, nominal.first, index, device.finger.width):
             nominal = _shape(nominal, stroke, device)
-            nominal = replace(nominal, ground=nominal.height, first=index, weight=weight.copy())
+            nominal = replace(nominal, ground=nominal.full, first=index, weight=weight.copy())
         assert nominal.weight is not None
         for row, image in zip(nominal.weight, stroke.images, strict=True):
             _weigh(row, stroke, device, image, index)
@@ -255,7 +290,7 @@ def _weigh(weight: Floats, stroke: Stroke, device: Device, image: Image, index: 
     cells = device.grid.disc(0.5 * (start[0] + end[0]), 0.5 * (start[1] + end[1]), reach)
     distance, share = _measure(device.grid, cells, start, end)
     named = evaluate(RING[stroke.brush] if falloff is Falloff.DEVICE else falloff, distance, radius)
-    first, full = last.share, sample.share
+    first, full = (1.0, 1.0) if stroke.brush in LOCKS else (last.share, sample.share)
     if stroke.brush in (Brush.CREASE, Brush.CREST):
         first, full = last.depth, sample.depth
     weight[cells] = np.maximum(weight[cells], named * (first + share * (full - first)))
@@ -270,6 +305,8 @@ def _shape(nominal: Nominal, stroke: Stroke, device: Device) -> Nominal:
     most = weight.max(axis=0)
     if stroke.brush is Brush.SMOOTH:
         height = smooth(grid, ground, most, find_radius(device.finger, grid.layout))
+    elif stroke.brush in LOCKS:
+        height = ground
     elif stroke.brush is Brush.ERASE:
         height = ground + most * (device.rest - ground)
     elif stroke.brush is Brush.FLATTEN:
@@ -280,7 +317,7 @@ def _shape(nominal: Nominal, stroke: Stroke, device: Device) -> Nominal:
         height = ground + (most if stroke.brush is Brush.CREST else -most)
     near = nominal.near | (most > 0.0)
     height = device.combine(stroke, nominal.before, height)
-    return replace(nominal, height=height, near=near)
+    return replace(nominal, full=height, near=near)
 
 
 def find_frame(stroke: Stroke, device: Device) -> Place:
@@ -319,7 +356,7 @@ def _stamp(nominal: Nominal, stroke: Stroke, device: Device) -> Nominal:
     height = height + (1.0 if stroke.brush is Brush.STAMP else -1.0) * last.depth * rise
     formed = device.combine(stroke, nominal.before, height)
     height = np.where(rise > 0.0, formed, nominal.before)
-    return replace(nominal, height=height, near=rise > 0.0)
+    return replace(nominal, full=height, near=rise > 0.0)
 
 
 def _between(first: Sample, last: Sample, share: float) -> Sample:
@@ -359,12 +396,14 @@ class Ghost:
 
     stroke: Stroke
     nominal: Nominal
-    #: Base that it was found on.
-    base: Floats | None
+    #: What it was found with.
+    device: Device
 
-    def has_grown(self, stroke: Stroke, before: Floats, base: Floats | None) -> bool:
+    def has_grown(self, stroke: Stroke, before: Floats, device: Device) -> bool:
         """Tell whether a stroke, on pins at heights (n,), m, is this one drawn on."""
-        if stroke.from_base and self.base is not base:
+        if stroke.from_base and self.device.base is not device.base:
+            return False
+        if not np.array_equal(self.device.shares, device.shares):
             return False
         former, count = self.stroke, self.nominal.count
         same = (
@@ -389,13 +428,11 @@ def find_ghosts(
             device = replace(device, base=height)
         if stroke.brush in LIMITS or stroke.placed:
             before = height if stroke.height is None else stroke.height
-            same = [
-                ghost.nominal for ghost in former if ghost.has_grown(stroke, before, device.base)
-            ]
+            same = [ghost.nominal for ghost in former if ghost.has_grown(stroke, before, device)]
             suited = device.suit(stroke)
             nominal = same[0] if same else find_nominal(stroke, suited, before)
             if nominal.count < len(stroke.samples):
                 nominal = extend(nominal, stroke, suited)
-            ghosts.append(Ghost(stroke, nominal, device.base))
+            ghosts.append(Ghost(stroke, nominal, device))
             height = nominal.height
     return tuple(ghosts)

@@ -27,8 +27,10 @@ Coordinate = TypeVar("Coordinate", float, Floats)
 #: What the fingertip does: it waits for its turn, goes above the path's first place, presses there,
 #: rises with the blister (if its brush has one), goes along the path, leaves it, waits above until
 #: the valves have driven the pins to what the stroke is to leave; and the end. An image yields to
-#: one before it that is too near: its fingertip lifts, and waits above.
+#: one before it that is too near: its fingertip lifts, and waits above. RETURNING: it waits until
+#: pins that are locked in part are back by their shares.
 WAITING, ABOVE, PRESSING, RISING, DRAGGING, LEAVING, FINISHING, DONE, YIELDING = range(9)
+RETURNING = 9
 #: Deepest press, and least one, m; also the greatest and the least height of a raise.
 DEEPEST, SHALLOWEST = 30e-3, 0.1e-3
 
@@ -110,6 +112,11 @@ class Brush(Enum):
     CREST = "CREST"
     FLATTEN = "FLATTEN"
     SET_BASE = "SET_BASE"
+    LOCK_PINS = "LOCK_PINS"
+    UNLOCK_PINS = "UNLOCK_PINS"
+    GROW_LOCKS = "GROW_LOCKS"
+    SHRINK_LOCKS = "SHRINK_LOCKS"
+    BLUR_LOCKS = "BLUR_LOCKS"
 
     @property
     def inverse(self) -> Brush:
@@ -128,15 +135,15 @@ class Brush(Enum):
 
 
 #: Brushes without a strength.
-LOCKS = (Brush.LOCK, Brush.UNLOCK, Brush.INVERT_LOCKS, Brush.CLEAR_LOCKS)
+LOCKS = tuple(brush for brush in Brush if "LOCK" in brush.value)
 #: Brushes that put a shape onto the surface, up or down.
 STAMPS = (Brush.STAMP, Brush.IMPRINT)
 #: Brushes that press nothing: the valves bring the pins to their nominal surface.
 PLACED = (*STAMPS, Brush.CREASE, Brush.CREST, Brush.FLATTEN)
 #: Brushes that can be swept along the path by the valves, as they are without a falloff, or placed.
-SWEPT = (Brush.SMOOTH, Brush.ERASE)
+SWEPT = (Brush.SMOOTH, Brush.ERASE, Brush.LOCK, Brush.UNLOCK)
 #: Brushes that work in the ring.
-RINGED = (*SWEPT, Brush.LOCK, Brush.UNLOCK, *PLACED[2:])
+RINGED = (*SWEPT, *PLACED[2:])
 INVERSES = {
     Brush.LOWER: Brush.RAISE,
     Brush.LOCK: Brush.UNLOCK,
@@ -219,6 +226,8 @@ class Stroke:
     #: rest.
     combine: Combine = Combine.USUAL
     limits: tuple[float, float] = (-math.inf, math.inf)
+    #: Pins that it locks or unlocks, those within its limits; None: all.
+    pins: tuple[int, ...] | None = None
     #: Whether what the finger and the method have formed stays, not brought to the nominal surface.
     as_left: bool = False
     #: Fingertip that forms it, and the blister that follows; None: those of the scene.

@@ -12,7 +12,8 @@ from dataclasses import replace
 import numpy as np
 
 from ..core.base.arrays import Floats
-from ..core.control.orders import FARTHEST, ORDER, Orders, Verb, place, repeat_order
+from ..core.control.orders import ORDER, Orders, Verb, place, repeat_order
+from .locks import LEAST_CHANGE, find_return, order_at_once
 from .motion import DESCEND, DRAG, cross, drag, find_safe
 from .nominal import Device, Nominal, find_nominal, find_radius
 from .stroke import (
@@ -21,7 +22,9 @@ from .stroke import (
     DRAGGING,
     FINISHING,
     LEAVING,
+    LOCKS,
     PRESSING,
+    RETURNING,
     Brush,
     Correction,
     Stroke,
@@ -37,16 +40,10 @@ SWEEPS = {
     Brush.LOCK: Verb.LOCK,
     Brush.UNLOCK: Verb.UNLOCK,
 }
-#: Brushes that tell all pins something, at once, or note how they stand: verb and radius, m.
-WHOLE = {
-    Brush.INVERT_LOCKS: (Verb.INVERT, FARTHEST),
-    Brush.CLEAR_LOCKS: (Verb.UNLOCK, FARTHEST),
-    Brush.SET_BASE: (Verb.SMOOTH, 0.0),
-}
 #: Time that a stroke takes beside its path, s: to come, press, rise and leave.
 BESIDE = 0.4
-#: Least change of a pin that the valves are to make, m; and what pins that stand move within a look.
-LEAST_CHANGE, STILL = 1e-7, 10e-6
+#: What pins that stand move within a look, m.
+STILL = 10e-6
 
 
 def sweep(
@@ -90,13 +87,6 @@ def sweep(
     return stroke, np.array(path), Orders(np.array(rows, np.float64).reshape(-1, ORDER))
 
 
-def order_all(stroke: Stroke, pose: Floats) -> tuple[Stroke, Floats, Orders]:
-    """Tell all pins of the bed what the brush of a stroke does, and end it; returns as `sweep`."""
-    verb, radius = WHOLE[stroke.brush]
-    order = repeat_order(1, verb, radius=radius)
-    return replace(stroke, phase=DONE), np.array([pose, pose]), Orders(order)
-
-
 def _dwell(stroke: Stroke, periods: int) -> Stroke:
     """Return a stroke of the valves a control period on at an end of its path, where it stays so many."""
     stroke = replace(stroke, waited=stroke.waited + 1)
@@ -119,6 +109,12 @@ def finish(
 
     Those of a stroke that is finished as left are waited for, unless the valves alone form it.
     """
+    if stroke.brush in LOCKS:
+        return order_at_once(stroke, device, now, pose)
+    if stroke.phase == RETURNING:
+        back = find_return(stroke, device, now) if stroke.finish is None else stroke.finish
+        stroke = replace(stroke, finish=back)
+        return _wait(stroke, pose, count, period, place(1, back), arrived=arrived)
     if stroke.as_left and not stroke.placed:
         return _settle(stroke, device, now, pose, count, period)
     surface, before = stroke.finish, stroke.height
@@ -157,7 +153,8 @@ def _settle(
     stroke, path, orders = _wait(stroke, pose, count, period, none, arrived=stands)
     if stroke.done:
         nominal = find_nominal(stroke, device, before)
-        stroke = replace(stroke, correction=_compare(nominal, now, made=False))
+        left = device.hold_back(before, now)
+        stroke = replace(stroke, correction=_compare(nominal, left, made=False), finish=None)
     return stroke, path, orders
 
 

@@ -17,6 +17,9 @@ ERASE
 LOCK, UNLOCK, INVERT
     Pins in the disc get, lose or toggle the mode LOCKED: their valves are shut, whatever is
     commanded.
+SHARE
+    Pins get the shares of a surface, whose number is in column x: 1 locks a pin, 0 unlocks it, less
+    than 1 locks it in part, which only brushes obey.
 PLACE
     Pins go to the heights of a surface, whose number is in column x; NaN: the pin is not driven.
 
@@ -69,9 +72,12 @@ class Verb(IntEnum):
     UNLOCK = 4
     INVERT = 5
     PLACE = 6
+    SHARE = 7
 
 
-LOCKING = (Verb.LOCK, Verb.UNLOCK, Verb.INVERT)
+LOCKING = (Verb.LOCK, Verb.UNLOCK, Verb.INVERT, Verb.SHARE)
+#: Those with the number of a surface.
+SURFACED = (Verb.PLACE, Verb.SHARE)
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,6 +114,11 @@ def repeat_order(
 def place(periods: int, surface: Floats) -> Orders:
     """Return the orders that drive pins to a surface (n,), m, for `periods`; NaN: not driven."""
     return Orders(repeat_order(periods, Verb.PLACE), (surface,))
+
+
+def share(shares: Floats) -> Orders:
+    """Return the order of one period that locks pins by shares (n,), from 0 to 1."""
+    return Orders(repeat_order(1, Verb.SHARE, radius=FARTHEST), (shares,))
 
 
 def add_verbs(rows: Floats) -> Floats:
@@ -235,6 +246,8 @@ class LockingControl(Around):
     verb: Verb
     disc: Disc | None = None
     """Pins to be locked or unlocked; None: locked pins do not change."""
+    shares: Floats | None = None
+    """(n,): Shares by which all pins are locked from now on; None: another verb."""
 
     def locate(self, memory: Memory, touched: Measurement) -> tuple[Memory, Disc | None]:
         """Request the disc, and the method's; see `Controller`."""
@@ -256,11 +269,24 @@ class LockingControl(Around):
         locked: Flags = seen.mode == LOCKED
         if self.disc is None:
             return locked
+        if self.shares is not None:
+            return self.shares.take(seen.cells) == 1.0
         x, y, radius = self.disc
         inside = measure_square(x, y, seen.quadratic_basis) <= radius**2
         if self.verb is Verb.INVERT:
             return locked ^ inside
         return locked | inside if self.verb is Verb.LOCK else locked & ~inside
+
+    def find_locks(self, grid: Grid, locks: Floats | None) -> Floats | None:
+        """Return the shares of pins locked in part, (n,), after the period; see `State.locks`."""
+        if self.shares is not None:
+            partly = np.where(self.shares < 1.0, self.shares, 0.0)
+            return partly if partly.any() else None
+        if locks is None or self.disc is None:
+            return locks
+        rest = locks.copy()
+        rest[grid.disc(*self.disc)] = 0.0
+        return rest
 
     def _mask(self, seen: Measurement) -> Measurement:
         """Return the measurement for a method without locks."""
@@ -311,7 +337,8 @@ def order_periods(
         elif radius == 0.0:
             yield held
         elif verb in LOCKING:
-            yield LockingControl(method, actuator, verb, disc)
+            shares = orders.surfaces[int(x)] if verb is Verb.SHARE else None
+            yield LockingControl(method, actuator, verb, disc, shares)
         elif verb is Verb.ERASE:
             change = partial(
                 erase, strength * period / ERASING, actuator.rest_height, exact.dead_band
@@ -332,13 +359,17 @@ def find_fault(orders: Orders, periods: int, pins: int, stroke: float) -> str:
     x, _, radius, strength, verb = rows.T
     good = (np.abs(rows) <= FARTHEST).all(axis=1) & ((radius == 0.0) | (radius >= SMALLEST))
     good &= (strength >= 0.0) & (strength <= STRONGEST) & np.isin(verb, list(Verb))
-    good &= (verb != Verb.PLACE) | np.isin(x, np.arange(len(orders.surfaces)))
+    good &= ~np.isin(verb, SURFACED) | np.isin(x, np.arange(len(orders.surfaces)))
     if not good.all():
         return f"row {int(good.argmin())} is {rows[good.argmin()].tolist()}"
+    shares = x[verb == Verb.SHARE]
     for number, surface in enumerate(orders.surfaces):
         if surface.shape != (pins,) or surface.dtype != np.float64:
             return f"surface {number} is an array of the shape {surface.shape} of {surface.dtype}"
-        wrong = surface[~(np.isnan(surface) | ((surface >= 0.0) & (surface <= stroke)))]
+        if number in shares and not ((surface >= 0.0) & (surface <= 1.0)).all():
+            return f"surface {number} has shares that are not from 0 to 1"
+        top = 1.0 if number in shares else stroke
+        wrong = surface[~(np.isnan(surface) | ((surface >= 0.0) & (surface <= top)))]
         if wrong.size:
             return f"surface {number} has the height {wrong[0]:g} m"
     return ""

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.arrays import Cells, Floats
-from ..base.modes import REST
+from ..base.modes import LOCKED, REST
 from ..model.control_interface import Commands, Measurement
 from ..model.layout import Discs
 
@@ -199,11 +199,20 @@ class State(NamedTuple):
     active: ActiveSet
     memory: Any
     """The controller's memory."""
+    locks: Floats | None = None
+    """(n,): Shares below 1 by which pins are locked in part, 0 of all others; None: no pin is."""
 
     def end_period(self, memory: Any) -> State:
         """Return the state one control period later, with the controller's memory."""
         return State(
-            self.period + 1, self.rows, self.modes, self.aged, self.peak, self.active, memory
+            self.period + 1,
+            self.rows,
+            self.modes,
+            self.aged,
+            self.peak,
+            self.active,
+            memory,
+            self.locks,
         )
 
     def row(self, index: int) -> Floats:
@@ -223,6 +232,11 @@ class State(NamedTuple):
         values = self.modes.copy()
         values.reshape(-1)[self.active.flat] = self.active.mode
         return values
+
+    def shares(self) -> Floats:
+        """Return the shares by which pins are locked, (n,), from 0 to 1."""
+        locks = 0.0 if self.locks is None else self.locks
+        return np.where(self.mode() == LOCKED, 1.0, locks)
 
     def copy(self) -> State:
         """Return a state that shares with this one no array that a step changes."""

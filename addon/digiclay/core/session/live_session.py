@@ -12,7 +12,7 @@ import numpy as np
 
 from ..base.arrays import Floats
 from ..base.modes import BLISTER, LOCKED
-from ..control.orders import ORDER, Orders, Verb, order_periods
+from ..control.orders import ORDER, SURFACED, LockingControl, Orders, order_periods
 from ..engine.simulation import advance, trace_fingers
 from ..engine.state import State
 from ..engine.system import System
@@ -159,7 +159,9 @@ def simulate_path(
     if orders is not None or locked:
         systems = _order(system, orders or Orders(np.zeros((len(fingers), ORDER))), locked=locked)
     for system, finger in zip(systems, fingers, strict=True):
-        state = advance(system, state, finger)
+        state, controller = advance(system, state, finger), system.controller
+        if isinstance(controller, LockingControl):
+            state = state._replace(locks=controller.find_locks(system.grid, state.locks))
         yield state
 
 
@@ -236,7 +238,7 @@ class Recording:
         if orders is not None:
             given[:] = orders.rows
             surfaces, numbers = _add_surfaces(surfaces, orders.surfaces)
-            placed = given[:, 4] == Verb.PLACE
+            placed = np.isin(given[:, 4], SURFACED)
             given[placed, 0] = numbers[given[placed, 0].astype(np.intp)]
         return replace(self, rows=rows, count=end, surfaces=surfaces)
 
@@ -261,7 +263,7 @@ class Recording:
     def _first(self, count: int) -> Recording:
         """Return the first rows of the recording."""
         rows = self.rows[1:count, ORDERS]
-        needed = int(rows[rows[:, 4] == Verb.PLACE, 0].max(initial=-1.0)) + 1
+        needed = int(rows[np.isin(rows[:, 4], SURFACED), 0].max(initial=-1.0)) + 1
         return replace(
             self, count=count, saved=min(self.saved, count), surfaces=self.surfaces[:needed]
         )

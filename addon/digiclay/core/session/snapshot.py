@@ -121,6 +121,7 @@ def dump(system: System, state: State) -> bytes:
     active, rows = state.active, system.rows
     arrays: list[Array] = []
     memory = flatten(state.memory, arrays)
+    locks = None if state.locks is None else flatten(state.locks, arrays)
     values = state.rows, state.modes, state.aged, active.cells, active.block, active.mode
     body = [
         np.ascontiguousarray(array, kind)
@@ -151,6 +152,7 @@ def dump(system: System, state: State) -> bytes:
             "until": active.until,
         },
         "memory": memory,
+        **({"locks": locks} if locks else {}),
         "thin": thin,
         "arrays": [[array.dtype.str, list(array.shape)] for array in arrays],
     }
@@ -187,7 +189,8 @@ def load(system: System, data: bytes) -> State:
     )
     memory = rebuild(system.controller.begin(), header["memory"], stored.memory)
     bed = arrays["rows"], arrays["modes"], arrays["aged"]
-    return State(header["period"], *bed, header["peak"], active, memory)
+    locks = stored.arrays.get("locks")
+    return State(header["period"], *bed, header["peak"], active, memory, locks)
 
 
 def count_fingers(data: bytes) -> int:
@@ -252,6 +255,8 @@ def _read(data: bytes) -> Snapshot:
         stored = Snapshot(header, dict(zip(ARRAYS, arrays, strict=False)), arrays[len(ARRAYS) :])
         for name, bits in zip(thin, stored.memory[len(stored.memory) - len(thin) :], strict=True):
             stored.arrays[name] = _fill(stored.arrays[name], bits, whole[name])
+        if "locks" in header:
+            stored.arrays["locks"] = stored.memory[header["locks"]["array"]]
         # An empty memory is None; a missing one is damage.
         sound = (
             "memory" in header and gathered["near"] <= taken and all(map(math.isfinite, numbers))
@@ -290,7 +295,7 @@ def _read_arrays(
 def _is_sound(stored: Snapshot, count: int) -> bool:
     """Return whether the values of the arrays are those of a state."""
     arrays = stored.arrays
-    cells = arrays["cells"]
+    cells, locks = arrays["cells"], arrays.get("locks", np.zeros(count))
     return bool(
         all((np.abs(arrays[name]) < LARGEST).all() for name in ("rows", "aged", "block"))
         and all(
@@ -298,6 +303,9 @@ def _is_sound(stored: Snapshot, count: int) -> bool:
         )
         and ((cells >= 0) & (cells < count)).all()
         and np.unique(cells).size == cells.size
+        and locks.shape == (count,)
+        and locks.dtype == np.float64
+        and ((locks >= 0.0) & (locks < 1.0)).all()
     )
 
 
@@ -363,7 +371,7 @@ def change_fingers(
     # What is pressed and what still moves goes on.
     chosen = replace(fresh.active, cells=state.active.cells, near=state.active.near)
     bed = State(state.period, rows, state.modes, state.aged, float(rows[0].max()), chosen, memory)
-    return bed._replace(active=system.selection.take(bed, chosen))
+    return bed._replace(active=system.selection.take(bed, chosen), locks=state.locks)
 
 
 def _take_fingers(into: Floats, of: Floats, former: int, origins: Sequence[int | None]) -> None:

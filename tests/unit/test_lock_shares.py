@@ -1,0 +1,244 @@
+"""Pins locked in part: how brushes set and change their shares, and how far other brushes move such pins."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from digiclay.core.base.modes import Mode
+from digiclay.core.control.orders import share
+from digiclay.core.model.fingertip import LEVEL
+from digiclay.core.model.layout import Layout, make_grid
+from digiclay.core.scene.toml_table import resolve
+from digiclay.core.session.live_session import follow_path
+from digiclay.core.session.snapshot import dump, load
+from digiclay.core.session.take import replay
+from digiclay.device.instant import find_ellipsoid
+from digiclay.recorded.takes import read_recording
+from digiclay.sessions import sculpting
+from digiclay.sessions.forming_device import find_device
+from digiclay.sessions.sculpting import queue_stroke
+from digiclay.strokes import drawn
+from digiclay.strokes.falloff import Falloff, evaluate
+from digiclay.strokes.locks import find_locks
+from digiclay.strokes.nominal import Device, find_ghosts, find_nominal, find_radius
+from digiclay.strokes.stamps import load_stamp
+from digiclay.strokes.stroke import Brush, Combine, lay_path, make_images, start
+from numpy.testing import assert_array_equal
+
+from tests.assemble import assert_near, replayed
+from tests.hand import heights
+from tests.strokes import finish
+
+REST, SIZE = 40e-3, 21
+LINE = ((-18e-3, 0.0), (18e-3, 0.0))
+#: Shares of pins by their columns: locked at the right, not at the left.
+SHARES = np.tile(np.linspace(0.0, 1.0, SIZE).round(2), SIZE)
+
+
+def lay(brush, places=LINE, amount=6e-3, **more):
+    return replace(lay_path(start(0, *places[0], amount, brush=brush), places), **more)
+
+
+def begin(method="hybrid"):
+    tables = {"layout": {"rows": SIZE, "columns": SIZE}, "control": {"method": method}}
+    above = np.array([0.0, 0.0, 46e-3, *LEVEL])
+    return sculpting.begin_session(1, "Bed", resolve(tables), above)[0]
+
+
+def form(session, *strokes):
+    for stroke in strokes:
+        session, _ = queue_stroke(session, stroke)
+    return finish(session)
+
+
+def shares(session):
+    return session.state.shares()
+
+
+# A bed of 3 by 5 pins whose middle one is locked, or all but that one.
+def device_of(arrangement, locks):
+    grid = make_grid(Layout(3, 5, 3e-3, arrangement))
+    finger = find_ellipsoid(resolve({}))
+    return Device(grid, finger, None, 80e-3, np.asarray(locks, float), REST)
+
+
+ONE = np.eye(15)[7]
+
+
+@pytest.mark.parametrize(
+    "arrangement, beside",
+    [
+        ("aligned", (2, 6, 8, 12)),
+        ("staggered", (2, 3, 6, 8, 12, 13)),
+        ("hexagonal", (2, 3, 6, 8, 12, 13)),
+    ],
+)
+def test_locks_grow_shrink_and_blur_by_the_pins_beside_each(arrangement, beside):
+    around, flat = [7, *beside], np.zeros(15)
+
+    def change(brush, locks):
+        return find_locks(lay(brush), device_of(arrangement, locks), flat)
+
+    grown = change(Brush.GROW_LOCKS, ONE)
+    assert sorted(np.flatnonzero(grown)) == sorted(around)
+    assert_array_equal(change(Brush.SHRINK_LOCKS, grown), ONE)
+    assert_array_equal(change(Brush.SHRINK_LOCKS, 1.0 - ONE), 1.0 - grown)
+    blurred = change(Brush.BLUR_LOCKS, ONE)
+    assert_near(blurred, grown / len(around), 1e-15)
+    # What is locked all about stays locked, at the edges of the bed too.
+    assert_array_equal(change(Brush.BLUR_LOCKS, np.ones(15)), np.ones(15))
+    assert_near(change(Brush.INVERT_LOCKS, blurred), 1.0 - blurred, 1e-15)
+    assert_array_equal(change(Brush.CLEAR_LOCKS, blurred), flat)
+
+
+HEIGHTS = np.linspace(-7e-3, 7e-3, 15)
+
+
+@pytest.mark.parametrize(
+    "brush, keys, chosen",
+    [
+        (Brush.LOCK_PINS, {"pins": (0, 3)}, (0, 3)),
+        (Brush.LOCK_PINS, {"pins": ()}, ()),
+        (Brush.LOCK_PINS, {"pins": (14, 99)}, (14,)),  # of a bed that had more
+        (Brush.LOCK_PINS, {}, range(15)),
+        (Brush.LOCK_PINS, {"limits": (5e-3, np.inf)}, (12, 13, 14)),
+        (Brush.LOCK_PINS, {"limits": (-np.inf, -5e-3)}, (0, 1, 2)),
+        (Brush.LOCK_PINS, {"limits": (5e-3, np.inf), "pins": (0, 13)}, (13,)),
+        (Brush.UNLOCK_PINS, {"limits": (5e-3, np.inf)}, (12, 13, 14)),
+        (Brush.UNLOCK_PINS, {"pins": (3,)}, (3,)),
+    ],
+)
+def test_pins_are_locked_by_number_and_by_height(brush, keys, chosen):
+    device = device_of("aligned", np.full(15, 0.25))
+    wanted = np.full(15, 0.25)
+    wanted[list(chosen)] = float(brush is Brush.LOCK_PINS)
+    assert_array_equal(find_locks(lay(brush, **keys), device, REST + HEIGHTS), wanted)
+
+
+@pytest.mark.parametrize("falloff", list(Falloff)[1:])
+def test_lock_has_the_falloff_of_its_ring_and_unlock_leaves_what_that_does_not_take(falloff):
+    path, images = ((3e-3, 0.0), (12e-3, 0.0)), make_images("Y", 2, (0.0, 9e-3))
+    weak = {"falloff": falloff, "images": images}
+    stroke = lay(Brush.LOCK, path, **weak)
+    # A strength that the header does not show counts for nothing.
+    stroke = replace(stroke, samples=tuple(replace(at, share=0.3) for at in stroke.samples))
+    session = form(begin(), stroke)
+    x, y = session.system.grid.x, session.system.grid.y
+    distance = np.min([np.hypot(x - x.clip(3e-3, 12e-3), y - at) for at in (0.0, 18e-3)], axis=0)
+    radius = find_radius(find_ellipsoid(session.scene), session.scene.layout)
+    wanted = evaluate(falloff, distance, radius)
+    assert_near(shares(session), wanted, 1e-12)
+    assert_array_equal(session.state.mode() == Mode.LOCKED, wanted == 1.0)
+    half = form(session, lay(Brush.UNLOCK, path, **weak))
+    assert_near(shares(half), np.minimum(wanted, 1.0 - wanted), 1e-12)
+
+
+@cache
+def hollow():
+    """Return a session with a hole."""
+    return form(begin(), lay(Brush.LOWER))
+
+
+def begin_hollow(locks=SHARES):
+    """Return that session with pins locked by shares, to go on with."""
+    session = replace(hollow(), state=hollow().state.copy())
+    path = np.tile(session.poses, (2, 1, 1))
+    session = follow_path(session, path, share(locks), session.tick)
+    return replace(session, snapshot=dump(session.system, session.state))
+
+
+CROSS = ((-12e-3, -9e-3), (12e-3, 9e-3))
+CASES = {
+    "lower": lay(Brush.LOWER, CROSS),
+    "lower, sphere": lay(Brush.LOWER, CROSS, falloff=Falloff.SPHERE),
+    "lower to a limit": lay(Brush.LOWER, CROSS, limits=(-7e-3, 0.0)),
+    "raise": lay(Brush.RAISE, CROSS, amount=9e-3),
+    "raise to the higher one": lay(Brush.RAISE, CROSS, combine=Combine.HIGHEST),
+    "raise, back and forth": lay(Brush.RAISE, (*CROSS, CROSS[0]), accumulate=True),
+    "level": lay(Brush.LEVEL, CROSS),
+    "stamp": lay(Brush.STAMP, CROSS, stamp=load_stamp("dome")),
+    "crease": lay(Brush.CREASE, CROSS),
+    "flatten": lay(Brush.FLATTEN, CROSS),
+    "erase": lay(Brush.ERASE, CROSS, falloff=Falloff.SHARP),
+    "smooth": lay(Brush.SMOOTH, CROSS, falloff=Falloff.SMOOTH),
+}
+
+
+@pytest.mark.parametrize("stroke", CASES.values(), ids=CASES)
+def test_what_a_brush_is_to_leave_of_a_pin_is_the_share_that_its_lock_leaves(stroke):
+    before, device = heights(hollow()), find_device(begin_hollow())
+    stroke = replace(stroke, number=1)
+    bare = find_nominal(stroke, replace(device, locks=1.0 * (SHARES == 1.0)), before)
+    held = find_nominal(stroke, device, before)
+    assert np.abs(bare.height - before)[SHARES > 0.5].max() > 0.2e-3
+    assert_array_equal(held.height[SHARES == 1.0], before[SHARES == 1.0])
+    assert_near(held.height, before + (1.0 - SHARES) * (bare.height - before), 1e-15)
+    assert_array_equal(held.near, bare.near)
+    # Its ghost is that of the locks as they are.
+    (ghost,) = find_ghosts((stroke,), device, before)
+    again = find_ghosts((stroke,), replace(device, locks=SHARES.copy()), before, (ghost,))
+    assert again[0].nominal is ghost.nominal
+    (other,) = find_ghosts((stroke,), replace(device, locks=None), before, (ghost,))
+    assert_array_equal(other.nominal.height, find_nominal(stroke, other.device, before).height)
+
+
+HALF = 0.5 * (SHARES > 0.5)
+FORMED = [
+    pytest.param(lay(Brush.RAISE, CROSS, amount=9e-3), SHARES, id="a finger, to the nominal form"),
+    pytest.param(lay(Brush.LOWER, CROSS, as_left=True), HALF, id="a finger, as it leaves them"),
+    pytest.param(lay(Brush.ERASE, CROSS), HALF, id="valves that erase"),
+    pytest.param(lay(Brush.SMOOTH, CROSS), HALF, id="valves that smooth"),
+]
+
+
+@pytest.mark.parametrize("stroke, locks", FORMED)
+def test_pins_locked_in_part_stand_at_their_share_when_a_stroke_is_done(stroke, locks):
+    before, held = heights(hollow()), sculpting.set_recording(begin_hollow(locks), True)
+    bare, done = form(begin_hollow(0.0 * locks), stroke), form(held, stroke)
+    moved = np.abs(heights(bare) - before)
+    assert min(moved[locks > 0.4].max(), moved[locks < 0.4].max()) > 0.5e-3
+    # The valves bring pins to within a micrometer of their heights.
+    assert_near(heights(done), before + (1.0 - locks) * (heights(bare) - before), 2e-6)
+    assert_array_equal(shares(done), locks)
+    assert replayed(read_recording(done))
+    assert_array_equal(heights(sculpting.rewind(done)), before)
+
+
+@pytest.mark.parametrize("brush", [Brush.BLUR_LOCKS, Brush.GROW_LOCKS, Brush.CLEAR_LOCKS])
+def test_a_change_of_locks_is_an_undo_step_in_takes_and_stored_with_the_bed(brush):
+    held = sculpting.set_recording(begin_hollow(), True)
+    done = form(held, lay(brush))
+    assert len(done.gestures) == len(held.gestures) + 1
+    assert np.abs(shares(done) - SHARES).max() > 0.01
+    assert replayed(read_recording(done))
+    assert_array_equal(shares(sculpting.rewind(done)), SHARES)
+    assert_array_equal(load(done.system, done.snapshot).shares(), shares(done))
+    # A finger may be added.
+    two = sculpting.change_scene(
+        done, done.scene.with_fingers(2), (1, 2), np.repeat(done.poses, 2, axis=0)
+    )
+    assert_array_equal(shares(two[0]), shares(done))
+    more = form(done, lay(Brush.INVERT_LOCKS), lay(Brush.BLUR_LOCKS))
+    for session in (more, sculpting.rewind(more)):
+        *_, last = replay(read_recording(session))
+        assert_array_equal(last.shares(), shares(session))
+
+
+def test_lock_and_unlock_as_the_valves_sweep_them_take_off_shares():
+    session = form(begin_hollow(HALF), lay(Brush.UNLOCK))
+    x, y = session.system.grid.positions.T
+    under = (np.abs(y) < 2e-3) & (np.abs(x) < 20e-3)
+    assert (shares(session)[under] == 0.0).all()
+    assert (shares(form(session, lay(Brush.LOCK)))[under] == 1.0).all()
+    assert (shares(session) == HALF).any()
+
+
+def test_a_line_of_a_stroke_keeps_its_pins_and_none_that_are_wrong():
+    for pins in (None, (), (3, 0, 440)):
+        stroke = lay(Brush.LOCK_PINS, pins=pins)
+        assert drawn.load(drawn.dump(stroke)).pins == pins
+    assert "pins" not in drawn.dump(lay(Brush.LOCK_PINS))
+    line = drawn.dump(lay(Brush.LOCK_PINS, pins=(3,)))
+    for wrong in ("[-1]", "[1.5]", "[true]", '["3"]', "3", "[[3]]", "[null]", "[NaN]"):
+        assert drawn.load(line.replace("[3]", wrong)) is None
