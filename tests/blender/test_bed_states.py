@@ -73,6 +73,7 @@ ELSEWHERE = {
     "digiclay.press_brush_save",
     "digiclay.press_base",
     "digiclay.press_center",
+    "digiclay.press_curves",
     "digiclay.press_keys",
     "digiclay.press_locks_invert",
     "digiclay.press_locks_clear",

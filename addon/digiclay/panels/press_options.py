@@ -6,7 +6,7 @@ from typing import Any
 
 from ..compat import Context, OperatorProperties, UILayout, bpy
 from ..press.brush import tool_settings
-from ..press.tool import draw_presets
+from ..press.tool import draw_curves, draw_presets
 from .base import declare
 
 
@@ -64,6 +64,7 @@ def stroke_options(column: UILayout, settings: OperatorProperties) -> None:
         column.prop(settings, "limit_low")
         column.prop(settings, "limit_high")
     column.prop(settings, "finish")
+    draw_curves(column)
 
 
 @popover("DIGICLAY_PT_press_pen", "Pen")

@@ -167,6 +167,13 @@ def draw_presets(layout: UILayout) -> None:
     row.operator("digiclay.press_brush_save", text="", icon="REMOVE").remove_active = True
 
 
+def draw_curves(layout: UILayout) -> None:
+    """Draw what forms strokes along curves, and stamps filled ones. `layout` bpy.types.UILayout."""
+    layout.operator("digiclay.press_curves", icon="CURVE_DATA").fill = False
+    row = layout.operator("digiclay.press_curves", text="Stamp Filled Curves", icon="CURVE_NCIRCLE")
+    row.fill = True
+
+
 def _number(layout: UILayout, owner: OperatorProperties, name: str, units: float) -> None:
     """Draw a number no wider than it needs."""
     row = layout.row(align=True)

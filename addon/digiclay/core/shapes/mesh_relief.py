@@ -115,7 +115,7 @@ class ShapeMesh:
     def tops(self, grid: Grid, at: Placement) -> Tops:
         """Return the highest hit of each pin's ray, and where it passes through more than one layer."""
         none = np.empty(0, np.bool_)
-        hits = [*self._hits(grid, at), (np.empty(0, np.intp), np.empty(0), none, none)]
+        hits = [*self.hits(grid, at), (np.empty(0, np.intp), np.empty(0), none, none)]
         cell, z, over, up = (np.concatenate(parts) for parts in zip(*hits, strict=True))
         hit = np.zeros(grid.count, np.bool_)
         hit[cell[over]] = True
@@ -141,7 +141,7 @@ class ShapeMesh:
         value, hole = fill_holes(grid, value, missing)
         return Tops(value, covered | hole, overhang & ~hole, int(np.count_nonzero(hole)))
 
-    def _hits(
+    def hits(
         self, grid: Grid, at: Placement
     ) -> Iterator[tuple[NDArray[np.intp], Floats, Flags, Flags]]:
         """Yield cells whose rays hit or narrowly miss a triangle: height, whether hit, whether from above."""

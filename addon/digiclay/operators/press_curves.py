@@ -1,0 +1,214 @@
+"""Strokes along curves, texts and Grease Pencil strokes, and stamps of what is filled."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import chain
+
+import numpy as np
+
+from ..bridge import SCALE
+from ..compat import (
+    ID,
+    Context,
+    Menu,
+    NodeTree,
+    Object,
+    Operator,
+    OperatorProperties,
+    bpy,
+)
+from ..core.base.arrays import TIE, Floats
+from ..core.base.errors import ParameterError, one_line
+from ..core.shapes.mesh_relief import ShapeMesh
+from ..exchange.shape_show import read_relief
+from ..live import beds
+from ..press import aim, brush, tool
+from ..sessions.sculpting import queue_stroke
+from ..settings.declared import flag
+from ..strokes.curve_paths import clip_to_bed, divide_lines, join_edges, measure_length
+from ..strokes.stamps import cut_stamp
+from ..strokes.stroke import STAMPS, Brush
+from ..ui_text import localize
+from .action import Result, action
+from .poll_messages import Need, no_finger, no_view
+from .press_stroke import lay_stroke, open_session
+
+#: Objects with lines, and those of them that Blender can fill.
+LINED, FILLED = ("CURVE", "FONT", "CURVES", "GREASEPENCIL", "GPENCIL"), ("CURVE", "FONT")
+#: Coordinates of a line are smaller, m.
+LARGEST = 1e3
+#: Brushes by which filled shapes are stamped.
+CUT = {Brush.RAISE: Brush.STAMP, Brush.LOWER: Brush.IMPRINT, Brush.STAMP: Brush.STAMP}
+#: What stands in a report of names at most, characters.
+NAMES = 100
+
+
+def list_curves(context: Context) -> list[Object]:
+    """Return the selected objects with lines."""
+    return [thing for thing in context.selected_objects if thing.type in LINED]
+
+
+no_curves = Need(
+    lambda context: not list_curves(context), "Select curves, texts or Grease Pencil strokes"
+)
+
+
+def read_lines(context: Context, thing: Object, bed: Object) -> list[Floats]:
+    """Return the lines of an object, with its modifiers, (k, 2), m, in the space of a bed."""
+    if thing.type == "GPENCIL":
+        lines = list(_read_layers(context, thing, bed))
+    else:
+        lines = _read_edges(context, thing, bed)
+    for line in lines:
+        bad = np.flatnonzero(~(np.abs(line) < LARGEST).all(axis=1))
+        if bad.size:
+            rule = "must be finite, and less than 1000 m of the device from the bed"
+            raise ParameterError(thing.name, "points", rule, f"{line[bad[0]].tolist()}")
+    return lines
+
+
+def _read_edges(context: Context, thing: Object, bed: Object) -> list[Floats]:
+    """Return the lines of an object by geometry nodes, which take them from any kind."""
+    name, made = thing.name, list[ID]()
+    try:
+        if thing.type in FILLED:
+            thing = thing.copy()
+            thing.data = thing.data.copy()
+            made += [thing, thing.data]
+            _bare(thing.data)
+            context.scene.collection.objects.link(thing)
+        mesh, tree = bpy.data.meshes.new("Lines"), _make_tree(thing)
+        carrier = bpy.data.objects.new("Lines", mesh)
+        made += [carrier, mesh, tree]
+        carrier.matrix_world = bed.matrix_world
+        carrier.modifiers.new("Lines", "NODES").node_group = tree
+        context.scene.collection.objects.link(carrier)
+        evaluated = carrier.evaluated_get(context.evaluated_depsgraph_get())
+        mesh = evaluated.to_mesh()
+        if len(mesh.polygons):
+            rule = "must be lines, not the surface that its modifiers make of them"
+            raise ParameterError(name, "modifiers", rule, f"{len(mesh.polygons)} faces")
+        places, edges = (
+            np.empty(3 * len(mesh.vertices), np.float32),
+            np.empty(2 * len(mesh.edges), np.int32),
+        )
+        mesh.vertices.foreach_get("co", places)
+        mesh.edges.foreach_get("vertices", edges)
+        evaluated.to_mesh_clear()
+    finally:
+        bpy.data.batch_remove(made)
+    flat = places.reshape(-1, 3)[:, :2].astype(np.float64) / SCALE
+    return join_edges(flat, edges.reshape(-1, 2).astype(np.int64))
+
+
+def _bare(curve: ID) -> None:
+    """Leave of a curve or text what has no face."""
+    if curve.dimensions == "2D":
+        curve.fill_mode = "NONE"
+    curve.extrude = curve.bevel_depth = 0.0
+    curve.bevel_object = None
+
+
+def _make_tree(thing: Object) -> NodeTree:
+    """Return geometry nodes that make edges of an object's lines, in the space of what they are on."""
+    tree = bpy.data.node_groups.new("Lines", "GeometryNodeTree")
+    tree.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
+    source = tree.nodes.new("GeometryNodeObjectInfo")
+    source.transform_space = "RELATIVE"
+    source.inputs["Object"].default_value = thing
+    last = source.outputs["Geometry"]
+    first = ["GeometryNodeGreasePencilToCurves"] if thing.type == "GREASEPENCIL" else []
+    for kind in (*first, "GeometryNodeRealizeInstances", "GeometryNodeCurveToMesh"):
+        node = tree.nodes.new(kind)
+        tree.links.new(last, node.inputs[0])
+        last = node.outputs[0]
+    tree.links.new(last, tree.nodes.new("NodeGroupOutput").inputs[0])
+    return tree
+
+
+def _read_layers(context: Context, thing: Object, bed: Object) -> Iterator[Floats]:
+    """Yield the lines of a Grease Pencil object of Blender 4.2, (k, 2), m."""
+    matrix = np.array(bed.matrix_world.inverted() @ thing.matrix_world)
+    for layer in thing.evaluated_get(context.evaluated_depsgraph_get()).data.layers:
+        if layer.hide or layer.active_frame is None:
+            continue
+        for stroke in layer.active_frame.strokes:
+            places = np.array([(*point.co, 1.0) for point in stroke.points]).reshape(-1, 4)
+            line = (places @ matrix.T)[:, :2] / SCALE
+            yield np.concatenate([line, line[:1]]) if stroke.use_cyclic else line
+
+
+def _read_filled(context: Context, thing: Object, bed: Object) -> ShapeMesh:
+    """Return the faces of a filled object in the space of a bed, m."""
+    hint = "Only texts and closed 2D curves with a fill mode can be filled."
+    if thing.type not in FILLED:
+        raise ParameterError(thing.name, "fill", "must be a curve or a text", thing.type, hint)
+    try:
+        return read_relief(thing, bed, context.evaluated_depsgraph_get())
+    except ParameterError as error:
+        raise ParameterError(thing.name, "fill", error.rule, error.value, hint) from None
+
+
+def _is_cut(lines: list[Floats], parts: list[Floats]) -> bool:
+    """Return whether parts of lines are not all of them."""
+    return not parts or measure_length(parts) < measure_length(lines) - TIE
+
+
+@action(
+    "digiclay.press_curves",
+    "Form along Curves",
+    no_view.reworded("Curves are formed in a 3D view"),
+    no_curves,
+    no_finger,
+    options=("UNDO",),
+    fill=flag("Fill", "Stamp the filled texts and 2D curves instead, with an edge", default=False),
+)
+def form_curves(operator: Operator, context: Context) -> Result | None:
+    """Queue strokes of the brush along the selected curves, texts and Grease Pencil strokes"""
+    if brush.tool_settings(context) is None:
+        tool.take_up(context)
+    settings: OperatorProperties = brush.tool_settings(context)
+    bed, kind, things = brush.bed_in_use(context), Brush(settings.brush), list_curves(context)
+    brush.take_finger(context, bed)
+    context.view_layer.update()
+    grid, _ = aim.read_surface(bed)
+    if operator.fill:
+        if kind not in CUT:
+            rule = "must be Raise, Lower or Stamp to fill curves"
+            raise ParameterError("Press", "brush", rule, brush.LABELS[kind])
+        stamp, path = cut_stamp([_read_filled(context, thing, bed) for thing in things], grid)
+        if not stamp.values.any():
+            raise ParameterError("Curves", "fill", "must lie over the bed", "none of it does")
+        strokes = [replace(lay_stroke(settings, bed, path, kind, stamp), brush=CUT[kind])]
+        words = localize("Stamp queued")
+    else:
+        if kind in STAMPS:
+            rule = "must be another one along curves"
+            raise ParameterError("Press", "brush", rule, brush.LABELS[kind], "Or choose Fill.")
+        lines = {thing.name: read_lines(context, thing, bed) for thing in things}
+        parts = {name: clip_to_bed(group, grid) for name, group in lines.items()}
+        paths = divide_lines([*chain(*parts.values())])
+        # A closed path that accumulates would count at its end from what it has formed.
+        strokes = [
+            replace(lay_stroke(settings, bed, path, kind), accumulate=False) for path in paths
+        ]
+        words = localize("Strokes queued: {}, {:.3g} m", len(paths), measure_length(paths))
+        left = [name for name, group in lines.items() if _is_cut(group, parts[name])]
+        if left:
+            names = one_line(", ".join(left), NAMES)
+            words += localize("; not over the bed, or not all of it: {}", names)
+    session = open_session(operator, context, bed, strokes[0].brush, strokes[0].falloff)
+    if session is None:
+        return {"CANCELLED"}
+    for stroke in strokes:
+        session, _ = queue_stroke(session, stroke)
+    beds.put(session)
+    operator.report({"INFO"}, words)
+    return None
+
+
+def entry(menu: Menu, context: Context) -> None:
+    """Offer them in the Object menu where there is a bed to form."""
+    if brush.bed_in_use(context) is not None:
+        menu.layout.separator()
+        tool.draw_curves(menu.layout)
