@@ -160,6 +160,8 @@ def script(blender):
     note(blender, "selected")
     middle = on_the_screen(blender, 0.0, 0.0)
     yield from levels_of_detail(blender)
+    # The key is one of the tool's.
+    blender.call(bpy.ops.wm.tool_set_by_id, name="digiclay.press_tool")
     for name in ("alt s", "alt s again"):
         yield from done(blender, hand(to(middle), "key alt+s"))
         note(blender, name)
