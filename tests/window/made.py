@@ -1,9 +1,17 @@
-"""Things that recorded strokes form, beside what was intended; their pictures."""
+"""Things that recorded strokes form, as left and nominal, beside what was intended.
 
+`python -m tests.window.made DIR` draws the pictures of the gallery and writes its table, gallery.csv.
+"""
+
+import csv
+import sys
 import time
 from dataclasses import dataclass, replace
+from functools import cached_property
 from math import cos, radians, sin
+from pathlib import Path
 
+import bpy
 import numpy as np
 from digiclay.core.base.arrays import Floats
 from digiclay.core.model.fingertip import LEVEL
@@ -18,10 +26,11 @@ from digiclay.roles import fingertip_of
 from digiclay.sessions.running import Running
 from digiclay.sessions.sculpting import begin_session
 from digiclay.settings.devices import BEDS, FIRST, make_scene
+from mathutils import Vector
 from PIL import Image, ImageDraw, ImageFont
 
 from tests.window.hand_strokes import DRAWN
-from tests.window.intended import find_relief
+from tests.window.intended import THINGS, find_relief
 
 
 def move(strokes, angle, shift):
@@ -76,11 +85,16 @@ def play(scene, strokes):
     return Played(session, session.state.row(0) - rest, force, time, strokes)
 
 
+#: Pins that are nearer to rest are not of a form, m.
+FLAT = 1e-5
+
+
 @dataclass(frozen=True, eq=False)
 class Made:
     """Thing made on the bed for which its strokes were drawn."""
 
-    title: str
+    name: str
+    bed: str
     played: Played
     intended: Floats
     """(n,): Heights of the pins above rest, m."""
@@ -99,10 +113,33 @@ class Made:
         intended = self.intended - self.intended.mean()
         return float(self.played.formed @ intended / (intended @ intended))
 
-    @property
-    def error(self):
-        """Root of the mean square of formed less intended heights, m."""
-        return float(np.sqrt(np.mean((self.played.formed - self.intended) ** 2)))
+    @cached_property
+    def left(self):
+        """What the same strokes leave when no valve brings pins to the nominal surface."""
+        strokes = tuple(replace(one, finish="as_left") for one in self.played.strokes)
+        return play(make_bed(self.bed), strokes).formed
+
+    def compare(self, height, other):
+        """Return rms over the pins of the form, and the largest difference of heights (n,), mm."""
+        form = np.maximum(np.abs(self.played.formed), np.abs(self.intended)) > FLAT
+        error = 1e3 * np.abs(height - other)
+        return float(np.sqrt(np.mean(error[form] ** 2))), float(error.max())
+
+    def measure(self):
+        """Return the row of the gallery's table."""
+        formed = self.played.formed
+        rms, largest = self.compare(formed, self.intended)
+        left_rms, left_largest = self.compare(self.left, formed)
+        return {
+            "thing": self.name,
+            "hand_s": self.hand,
+            "formed_s": self.played.time,
+            "force_N": self.played.force,
+            "nominal_rms_mm": rms,
+            "nominal_largest_mm": largest,
+            "left_rms_mm": left_rms,
+            "left_largest_mm": left_largest,
+        }
 
 
 def make(name):
@@ -113,7 +150,7 @@ def make(name):
     spent = time.process_time() - started
     intended = find_relief(name, *played.session.system.grid.positions.T)
     hand = sum(stroke.moves[-1][0] for stroke in recorded.strokes)
-    return Made(recorded.name, played, intended, hand, spent)
+    return Made(name, recorded.bed, played, intended, hand, spent)
 
 
 #: Size of one of the two pictures, pixels, and samples a pixel.
@@ -122,30 +159,58 @@ WIDTH, HEIGHT, SAMPLES = 640, 500, 6
 TURN, MARGINS = radians(28.0), (0.04, 0.04, 0.05, 0.12)
 #: How far the housing ends below the lowest pin, m.
 CLEAR = 1e-3
+#: Quality of the JPEGs; the thing that is drawn large, its size, pixels, and samples a pixel.
+QUALITY, FIRST_THING, FIRST_PICTURE = 84, "coin", (1100, 700, 16)
 #: Size of the letters, pixels, their distance from the corner, and their color.
 LETTERS, INSET, INK = 20, (16, 12), (26, 31, 38)
 
 
 def draw_made(made, out):
-    """Draw a thing as it was formed and as it was intended, side by side, as a JPEG."""
-    formed, intended = made.played.formed, made.intended
-    lowest = min(float(formed.min()), float(intended.min()))
+    """Draw a thing with its nominal finish and as left, side by side, as a JPEG."""
+    rms, largest = made.compare(made.left, made.played.formed)
+    shown = {"nominal": made.played.formed}
+    shown[f"as left: {rms:.1f} mm rms, {largest:.1f} mm at most"] = made.left
+    lowest = min(float(relief.min()) for relief in shown.values())
     whole = Image.new("RGB", (2 * WIDTH, HEIGHT))
     pen = ImageDraw.Draw(whole)
-    shown = {f"formed, correlation {made.correlation:.3f}": formed, "intended": intended}
-    for number, (words, relief) in enumerate(shown.items()):
-        file = out.with_suffix(".png")
-        draw_relief(made.played.session.scene, relief, lowest, file)
-        whole.paste(Image.open(file).convert("RGB"), (number * WIDTH, 0))
-        file.unlink()
-        corner = number * WIDTH + INSET[0], INSET[1]
-        pen.text(corner, f"{made.title}: {words}", INK, ImageFont.load_default(LETTERS))
-    whole.save(out, quality=90)
-
-
-def draw_relief(scene, relief, lowest, out):
-    """Draw the skin over pins at heights above rest, (n,), m, as a PNG, without fingertip; lowest of both."""
     looks = Still(width=WIDTH, height=HEIGHT, engine="cycles", samples=SAMPLES)
+    for number, (words, relief) in enumerate(shown.items()):
+        drawn = draw_relief(made.played.session.scene, relief, lowest, looks, out)
+        whole.paste(drawn, (number * WIDTH, 0))
+        corner = number * WIDTH + INSET[0], INSET[1]
+        pen.text(corner, words, INK, ImageFont.load_default(LETTERS))
+    whole.save(out, quality=QUALITY, optimize=True)
+
+
+def draw_first(made, out):
+    """Draw a thing in the light of a window beside it, large, as a JPEG."""
+    width, height, samples = FIRST_PICTURE
+    looks = Still(width=width, height=height, engine="cycles", samples=samples)
+    relief = made.played.formed
+    drawn = draw_relief(
+        made.played.session.scene, relief, float(relief.min()), looks, out, light_by_window
+    )
+    drawn.save(out, quality=QUALITY, optimize=True)
+
+
+def light_by_window(scene, span):
+    """Replace the sun of a scene by a low window, on the left of a bed so wide, and darken the sky."""
+    sun = next(thing for thing in scene.objects if thing.type == "LIGHT")
+    bpy.data.objects.remove(sun)
+    data = bpy.data.lights.new("Window", "AREA")
+    data.shape, data.size, data.size_y = "RECTANGLE", 1.6 * span, 1.0 * span
+    data.energy, data.color = 220.0 * span**2, (1.0, 0.93, 0.84)
+    window = bpy.data.objects.new(data.name, data)
+    window.location = -2.6 * span, 1.5 * span, 1.1 * span
+    aim = Vector((0.0, 0.0, 0.0)) - window.location
+    window.rotation_euler = aim.to_track_quat("-Z", "Y").to_euler()
+    scene.collection.objects.link(window)
+    sky = next(node for node in scene.world.node_tree.nodes if node.type == "BACKGROUND")
+    sky.inputs["Strength"].default_value = 0.22
+
+
+def draw_relief(scene, relief, lowest, looks, out, light=None):
+    """Return the picture of the skin over pins at heights above rest, (n,), m, without fingertip."""
     rest = Instant.at_rest(scene.layout, scene.actuator)
     instant = replace(rest, height=rest.height + relief)
     floor = scene.actuator.rest_height + lowest - CLEAR
@@ -158,4 +223,37 @@ def draw_relief(scene, relief, lowest, out):
         points = stage.outline(bed)
         below = points[points[:, 2] <= points[: len(relief), 2].max()]  # without the fingertip
         stage.set_up(drawn, bed, instant, points=below, modes=(), margins=MARGINS)
-        render_picture(drawn, out, out)
+        if light is not None:
+            light(drawn, float(np.ptp(below[:, 0])))
+        file = out.with_suffix(".png")
+        render_picture(drawn, file, out)
+    with Image.open(file) as opened:
+        picture = opened.convert("RGB")
+    file.unlink()
+    return picture
+
+
+def main(folder):
+    """Draw all things, one of them large, and write their table."""
+    folder.mkdir(parents=True, exist_ok=True)
+    rows = []
+    for name in THINGS:
+        made = make(name)
+        draw_made(made, folder / f"made_{name}.jpg")
+        if name == FIRST_THING:
+            draw_first(made, folder / "gallery.jpg")
+        rows.append({key: form(value) for key, value in made.measure().items()})
+        print(*rows[-1].values(), f"CPU {made.spent:.1f} s", flush=True)
+    with (folder / "gallery.csv").open("w", encoding="utf-8", newline="") as file:
+        writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(rows)
+
+
+def form(value):
+    """Return a value of the table as text; a micrometer is below what other processors change."""
+    return value if isinstance(value, str) else f"{value:.3f}"
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))

@@ -1,11 +1,10 @@
 """Things made by recorded strokes of the Press tool are what was intended, even, alike, and soon formed."""
 
+import csv
 import math
-import os
 from dataclasses import replace
 from functools import partial
 from itertools import product
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,27 +13,36 @@ from digiclay.sessions.running import find_stroke
 from digiclay.sessions.sculpting import change_stroke, follow_finger, queue_stroke
 from digiclay.strokes.stroke import draw, lay_ring, start
 
+from tests.window.hand_strokes import DRAWN
 from tests.window.intended import THINGS, find_distance
-from tests.window.made import begin, draw_made, make, make_bed, move, play
+from tests.window.made import begin, make, make_bed, move, play
 
 TIMES = {"r_lowered": 6.0, "r_raised": 7.0, "spiral": 7.0, "ring": 5.0, "leaf": 12.0, "lines": 15.0}
+#: The table of the gallery, and things that are also formed as left: the quickest.
+TABLE = DRAWN.with_name("results") / "gallery.csv"
+STORED = {
+    row["thing"]: row for row in csv.DictReader(TABLE.read_text(encoding="utf-8").splitlines())
+}
+LEFT = ("letter_a", "r_raised", "ring")
+#: It has three digits; what processors differ in is less, mm.
+ROUNDED = 1e-3
 
 
 @pytest.mark.parametrize("name", THINGS)
 def test_a_thing_made_by_recorded_strokes_is_what_was_intended(name):
     made = make(name)
-    if pictures := os.environ.get("DIGICLAY_SCREENSHOTS"):
-        Path(pictures).mkdir(parents=True, exist_ok=True)
-        draw_made(made, Path(pictures) / f"made_{name}.jpg")
-        print(
-            f"{made.title}: hand {made.hand:.1f} s, formed {made.played.time:.1f} s, CPU {made.spent:.1f} s"
-        )
-        print(f"{made.played.force:.2f} N, rms {1e3 * made.error:.2f} mm, {made.correlation:.3f}")
     assert made.correlation >= 0.96
     # A relief of another height would correlate as well.
     assert 0.95 <= made.slope <= 1.05
     assert made.played.time <= TIMES.get(name, 20.0)
     assert made.played.force <= 1.0
+    stored, (rms, largest) = STORED[name], made.compare(made.played.formed, made.intended)
+    assert rms == pytest.approx(float(stored["nominal_rms_mm"]), abs=ROUNDED)
+    assert largest == pytest.approx(float(stored["nominal_largest_mm"]), abs=ROUNDED)
+    if name in LEFT:
+        rms, largest = made.compare(made.left, made.played.formed)
+        assert rms == pytest.approx(float(stored["left_rms_mm"]), abs=ROUNDED)
+        assert largest == pytest.approx(float(stored["left_largest_mm"]), abs=ROUNDED)
 
 
 #: Rows and columns of the bed of the cases.
