@@ -275,3 +275,5 @@ def choose(blender, stroke):
     settings.path, settings.symmetry = stroke.path.upper(), stroke.symmetry.upper()
     settings.radial, settings.depth = stroke.radial, 1e3 * stroke.depth
     settings.height = 1e3 * stroke.height
+    # Things of the gallery were drawn on the surface, when there was no base.
+    settings.accumulate = stroke.accumulate or stroke.combine == "usual"

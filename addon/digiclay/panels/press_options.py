@@ -5,8 +5,10 @@ from functools import wraps
 from typing import Any
 
 from ..compat import Context, OperatorProperties, UILayout, bpy
-from ..press.brush import tool_settings
+from ..press.brush import EXTREMES, tool_settings
 from ..press.tool import draw_curves, draw_presets
+from ..strokes.nominal import LIMITS
+from ..strokes.stroke import COMBINATIONS, LOCKS, STAMPS, Brush
 from .base import declare
 
 
@@ -37,13 +39,14 @@ def popover(idname: str, label: str) -> Callable[[Callable[[UILayout, Context], 
 
 @popover("DIGICLAY_PT_press_stroke", "Stroke")
 def stroke_options(column: UILayout, settings: OperatorProperties) -> None:
-    """Path, stabilizer and symmetry of a stroke."""
+    """Path, symmetry and form of a stroke; gray is what its brush does without."""
+    brush = Brush(settings.brush)
     draw_presets(column)  # a narrow header has them here alone
+    column.separator()
     column.prop(settings, "path")
-    row = column.column()
-    row.enabled = settings.path == "FREE"
-    row.prop(settings, "stabilizer")
+    _draw(column, settings, "stabilizer", enabled=settings.path == "FREE")
     column.prop(settings, "project")
+    column.separator()
     column.prop(settings, "symmetry")
     if settings.symmetry == "RADIAL":
         column.prop(settings, "radial")
@@ -55,25 +58,33 @@ def stroke_options(column: UILayout, settings: OperatorProperties) -> None:
     # From a popover an operator would be called in the header.
     column.operator_context = "INVOKE_REGION_WIN"
     column.operator("digiclay.press_center", icon="PIVOT_CURSOR")
-    column.prop(settings, "falloff")
-    column.prop(settings, "accumulate")
+    column.separator()
+    _draw(column, settings, "falloff", enabled=brush not in STAMPS)
+    _draw(column, settings, "accumulate", enabled=brush not in (*LOCKS, *STAMPS))
+    _draw(column, settings, "combine", enabled=brush in COMBINATIONS and brush not in EXTREMES)
     column.operator("digiclay.press_base", icon="FILE_REFRESH")
-    column.prop(settings, "combine")
+    column.separator()
     column.prop(settings, "use_limit")
     if settings.use_limit:
         column.prop(settings, "limit_low")
         column.prop(settings, "limit_high")
-    column.prop(settings, "finish")
+    _draw(column, settings, "finish", enabled=brush in LIMITS)
+    column.separator()
     draw_curves(column)
+
+
+def _draw(column: UILayout, settings: OperatorProperties, name: str, *, enabled: bool) -> None:
+    """Draw a setting, gray unless it is of use."""
+    row = column.column()
+    row.enabled = enabled
+    row.prop(settings, name)
 
 
 @popover("DIGICLAY_PT_press_pen", "Pen")
 def pen_options(column: UILayout, settings: OperatorProperties) -> None:
     """Effects of a pen's pressure and tilt."""
     column.prop(settings, "use_pressure")
-    row = column.column()
-    row.enabled = settings.use_pressure
-    row.prop(settings, "pressure_curve")
+    _draw(column, settings, "pressure_curve", enabled=settings.use_pressure)
     column.prop(settings, "use_tilt")
 
 

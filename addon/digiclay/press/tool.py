@@ -154,7 +154,7 @@ def draw_header(context: Context, layout: UILayout, settings: OperatorProperties
         )
     layout.popover("DIGICLAY_PT_press_stroke", text="Stroke" if wide else "", icon="CURVE_BEZCURVE")
     layout.popover("DIGICLAY_PT_press_pen", text="Pen" if wide else "", icon="STYLUS_PRESSURE")
-    if wide:
+    if wide and brush not in STAMPS:  # that has no room for them
         draw_presets(layout)
     layout.operator("digiclay.skin_toggle", text="", icon="SURFACE_DATA")
 

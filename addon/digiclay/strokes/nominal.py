@@ -23,8 +23,19 @@ from ..core.shapes.request import Placement
 from ..core.surface.pointing import find_ground_height
 from .falloff import Falloff, evaluate
 from .pose import lean_finger, turn_image
-from .smoothing import flatten, smooth
-from .stroke import LOCKS, STAMPS, Brush, Combine, Image, Place, Sample, Stroke, needs_blister
+from .smoothing import flatten, slant, smooth
+from .stroke import (
+    LOCKS,
+    SHALLOWEST,
+    STAMPS,
+    Brush,
+    Combine,
+    Image,
+    Place,
+    Sample,
+    Stroke,
+    needs_blister,
+)
 
 #: A path that comes nearer to itself than the fingertip is wide, after so many widths, is a new
 #: pass.
@@ -40,6 +51,8 @@ RING = {
     Brush.CREASE: Falloff.SHARP,
     Brush.CREST: Falloff.SHARP,
     Brush.FLATTEN: Falloff.SMOOTH,
+    Brush.SMOOTH: Falloff.SMOOTH,
+    Brush.ERASE: Falloff.CONSTANT,
 }
 #: Least radius of the ring, in pitches: below one a pin has no neighbor in it.
 LEAST = 2.0
@@ -99,6 +112,13 @@ class Device:
         section: Floats = self.blister.evaluate_profile(distance).clip(0.0, 1.0)
         section[distance > radius] = 0.0
         return section
+
+    def find_steepest(self, falloff: Falloff) -> float:
+        """Return the slope of a flank from pin to pin where the stroke is 1 m high."""
+        assert self.blister is not None
+        pitch, flat = self.grid.layout.pitch, self.blister.flat_radius
+        distance = np.arange(flat, self.blister.radius + pitch, pitch)
+        return float(np.abs(np.diff(self.find_section(falloff, distance))).max()) / pitch
 
     def find_surface(self, height: Floats, x: float, y: float) -> float:
         """Return the height of a surface (n,), m, under the middle of the fingertip at a place, m."""
@@ -161,6 +181,8 @@ class Nominal:
     #: How many samples of the path are in it, and the first one of the present pass.
     count: int = 0
     first: int = 0
+    #: The surface with steps in place of flanks; None: there are no such flanks.
+    stepped: "Nominal | None" = None
 
 
 def find_nominal(
@@ -186,6 +208,7 @@ def _extend(nominal: Nominal, stroke: Stroke, device: Device, count: int | None)
         return _brush(nominal, stroke, device, end)
     if device.blister is None and needs_blister(stroke.brush, stroke.falloff):
         return replace(nominal, count=end)
+    nominal = nominal.stepped or nominal
     full, near = nominal.full.copy(), nominal.near.copy()
     nominal = replace(nominal, full=full, near=near)
     for index in range(nominal.count, end):
@@ -193,7 +216,26 @@ def _extend(nominal: Nominal, stroke: Stroke, device: Device, count: int | None)
             nominal = replace(nominal, ground=full.copy(), first=index)
         for image in stroke.images:
             _mark(nominal, stroke, device, image, index)
-    return replace(nominal, count=end)
+    return _slant(replace(nominal, count=end), stroke, device)
+
+
+def _slant(nominal: Nominal, stroke: Stroke, device: Device) -> Nominal:
+    """Return the surface with flanks where Lower would leave steps across a ridge, or Raise in a valley.
+
+    They are as steep as those of a stroke from there to its depth or height.
+    """
+    base, before, formed = device.base, nominal.before, nominal.full
+    if base is None or device.blister is None or not stroke.from_base:
+        return nominal
+    down = -1.0 if stroke.brush is Brush.RAISE else 1.0
+    beyond = float((down * (before - base))[nominal.near].max(initial=0.0))
+    if beyond < SHALLOWEST:
+        return nominal
+    whole = beyond + max(sample.depth for sample in stroke.samples)
+    most = float(np.abs(formed - before).max(initial=whole))
+    slope = most * device.find_steepest(stroke.falloff)
+    full = down * slant(device.grid, down * formed, down * before, slope)
+    return replace(nominal, full=full, near=nominal.near | (full != formed), stepped=nominal)
 
 
 def returns(stroke: Stroke, first: int, index: int, width: float) -> bool:
@@ -222,12 +264,13 @@ def _mark(nominal: Nominal, stroke: Stroke, device: Device, image: Image, index:
         device.find_top(stroke, point, at, nominal.ground, level)
         for point, at in zip(row, places, strict=True)
     ]
-    reach = device.reach + 0.5 * length / parts
+    half = 0.5 * length / parts
     low, high = LIMITS[stroke.brush]
     low = 0.0 if stroke.combine is Combine.HIGHEST else low
     high = 0.0 if stroke.combine is Combine.LOWEST else high
     for part, (start, end) in enumerate(pairwise(places)):
-        cells = device.grid.disc(0.5 * (start[0] + end[0]), 0.5 * (start[1] + end[1]), reach)
+        middle = 0.5 * (start[0] + end[0]), 0.5 * (start[1] + end[1])
+        cells = device.grid.disc(*middle, device.reach + half)
         if device.locked is not None:
             cells = cells[~device.locked[cells]]
         counted = device.find_start(stroke, nominal.ground)[cells]
@@ -236,8 +279,10 @@ def _mark(nominal: Nominal, stroke: Stroke, device: Device, image: Image, index:
         if device.blister is None:
             under = find_undersides(device, stroke, image, row[part + 1].lean, end, cells)
             change = tops[part + 1] + under - ground
+            reached = change < 0.0
         else:
             distance, share = _measure(device.grid, cells, start, end)
+            reached = distance <= device.reach
             section = device.find_section(stroke.falloff, distance)
             if level is None:
                 full = tops[part] + share * (tops[part + 1] - tops[part]) - ground
@@ -255,7 +300,7 @@ def _mark(nominal: Nominal, stroke: Stroke, device: Device, image: Image, index:
         else:
             farther = np.abs(change) > np.abs(gone) + TIE
         formed = device.combine(stroke, nominal.before[cells], ground + change)
-        nominal.full[cells] = np.where(farther, formed, now)
+        nominal.full[cells] = np.where(farther & reached, formed, now)
 
 
 def weigh_path(stroke: Stroke, device: Device) -> Floats:

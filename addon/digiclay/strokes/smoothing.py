@@ -1,4 +1,4 @@
-"""Heights that Smooth and Flatten leave of a surface, by a weight per pin. No Blender."""
+"""Heights that Smooth and Flatten leave of a surface, and flanks where it would have steps. No Blender."""
 
 import math
 
@@ -42,6 +42,21 @@ def smooth(grid: Grid, height: Floats, weight: Floats, radius: float) -> Floats:
     low = -bound(beside, limit, np.where(fixed, -height, np.inf))
     high = bound(beside, limit, np.where(fixed, height, np.inf))
     return np.where(fixed, height, bound(beside, limit, spread).clip(low, high))
+
+
+def slant(grid: Grid, formed: Floats, before: Floats, slope: float) -> Floats:
+    """Return the highest heights (n,), m, up to `formed` that are no steeper than a slope.
+
+    The surface `before` stays as steep as it is, and so does what is formed of it.
+    """
+    beside = grid.layout.find_neighbors(corners=True)
+    beside = np.where(beside < 0, np.arange(grid.count)[:, None], beside)
+    length = np.hypot(grid.x[beside] - grid.x[:, None], grid.y[beside] - grid.y[:, None])
+    limit = np.maximum(slope * length, np.abs(before[beside] - before[:, None]))
+    changed = formed != before
+    inside = changed[beside] & changed[:, None]
+    limit = np.maximum(limit, np.where(inside, np.abs(formed[beside] - formed[:, None]), 0.0))
+    return bound(beside, limit, formed)
 
 
 def bound(beside: Cells, limit: Floats, values: Floats) -> Floats:

@@ -140,7 +140,7 @@ LOCKS = tuple(brush for brush in Brush if "LOCK" in brush.value)
 STAMPS = (Brush.STAMP, Brush.IMPRINT)
 #: Brushes that press nothing: the valves bring the pins to their nominal surface.
 PLACED = (*STAMPS, Brush.CREASE, Brush.CREST, Brush.FLATTEN)
-#: Brushes that can be swept along the path by the valves, as they are without a falloff, or placed.
+#: Brushes that the valves sweep along the path, or place where they have a falloff or limits.
 SWEPT = (Brush.SMOOTH, Brush.ERASE, Brush.LOCK, Brush.UNLOCK)
 #: Brushes that work in the ring.
 RINGED = (*SWEPT, *PLACED[2:])
@@ -157,6 +157,10 @@ def needs_blister(brush: Brush, falloff: Falloff = Falloff.DEVICE) -> bool:
     """Return whether the blister of the device has to follow the fingertip."""
     shaped = brush is Brush.LOWER and falloff is not Falloff.DEVICE
     return shaped or brush in (Brush.RAISE, Brush.LEVEL)
+
+
+#: Limits of a stroke that has none, m.
+UNLIMITED = (-math.inf, math.inf)
 
 
 class Combine(Enum):
@@ -225,7 +229,7 @@ class Stroke:
     #: What it leaves where something is formed, and the lowest and the highest that it forms, m above
     #: rest.
     combine: Combine = Combine.USUAL
-    limits: tuple[float, float] = (-math.inf, math.inf)
+    limits: tuple[float, float] = UNLIMITED
     #: Pins that it locks or unlocks, those within its limits; None: all.
     pins: tuple[int, ...] | None = None
     #: Whether what the finger and the method have formed stays, not brought to the nominal surface.
@@ -311,7 +315,8 @@ class Stroke:
     @property
     def placed(self) -> bool:
         """Whether the valves alone bring the pins to its nominal surface."""
-        shaped = self.falloff is not Falloff.DEVICE
+        limited = self.limits != UNLIMITED and self.brush not in LOCKS
+        shaped = self.falloff is not Falloff.DEVICE or limited
         return self.brush in PLACED or (self.brush in SWEPT and shaped)
 
     @property
