@@ -238,7 +238,7 @@ def test_curves_become_strokes_of_the_brush_with_its_settings_and_one_undo_step(
     form(lay([(-10, 0), (10, 0)], [(0, -10), (0, 10), (0, 60)]), circle())
     done("Form along Curves")
     # 20 mm, up to the edge of the bed at 37.5 mm, and 2 pi 20 mm.
-    assert sorted(len(stroke.samples) for stroke in queue()) == [21, 49, 127]
+    assert sorted(len(stroke.samples) for stroke in queue()) == [21, 48, 127]
     for stroke in queue():
         assert (stroke.brush, stroke.combine) == (Brush.RAISE, Combine.HIGHEST)
         assert stroke.samples[0].depth == pytest.approx(4e-3)
@@ -290,9 +290,9 @@ REFUSED = {
         lambda: [place(lay([(0, 0), (9, 9)]), scale=(0.0, 0.0, 0.0))], {}, "must have a line",
     ),
     "not a number": (
-        lambda: [lay([(0, 0), (NAN, 9)])], {}, r"Lines\S*\.points must be finite, .* \(got \[nan",
+        lambda: [lay([(0, 0), (NAN, 9)])], {}, r"Lines\S*\.length must be finite, .* \(got nan m\)",
     ),
-    "far away": (lambda: [lay([(0, 0), (1e8, 9)])], {}, r"must be finite, and less than 1000 m"),
+    "endless": (lambda: [lay([(0, 0), (1e8, 9)])], {}, r"must be finite, and below 1000 m .*100000 m"),
     "too long": (
         lambda: [lay(*[[(-30, 0), (30, 0)]] * 167)], {}, r"length must be at most 10 m .*10\.02 m",
     ),

@@ -4,50 +4,49 @@ import numpy as np
 import pytest
 from digiclay.core.base.errors import ParameterError
 from digiclay.core.model.layout import Layout, make_grid
-from digiclay.strokes.curve_paths import (
-    clip_line,
-    clip_to_bed,
-    divide_line,
-    divide_lines,
-    join_edges,
-    measure_length,
-)
+from digiclay.strokes.curve_paths import divide_line, join_edges, lay_lines, refuse_paths
 
 from tests.assemble import assert_near, refused_in_a_line
 
-LOW, HIGH = np.array([-2.0, -1.0]), np.array([2.0, 1.0])
-SQUARE = [[-1, -0.5], [1, -0.5], [1, 0.5], [-1, 0.5], [-1, -0.5]]
-#: Lines, and their parts in the rectangle.
-CLIPPED = {
-    "inside": ([[-1, 0], [1, 0.5]], [[[-1, 0], [1, 0.5]]]),
-    "beside": ([[3, 0], [4, 0]], []),
-    "beside, along a side": ([[-2, 1.5], [2, 1.5]], []),
-    "along a side of the rectangle": ([[-3, 1], [3, 1]], [[[-2, 1], [2, 1]]]),
-    "across": ([[-4, 0], [4, 0]], [[[-2, 0], [2, 0]]]),
-    "past a corner": ([[1, 3], [4, 0]], []),
-    "out and in again": ([[0, 0], [0, 3], [1, 3], [1, 0]], [[[0, 0], [0, 1]], [[1, 1], [1, 0]]]),
-    "touching the side from inside": ([[-1, 0], [0, 1], [1, 0]], [[[-1, 0], [0, 1], [1, 0]]]),
-    "touching the side from outside": ([[-1, 2], [0, 1], [1, 2]], []),
-    "a place twice": ([[0, 0], [0, 0], [1, 0]], [[[0, 0], [0, 0], [1, 0]]]),
-    "closed, inside": (SQUARE, [SQUARE]),
+#: A bed of 27 mm by 15 mm.
+BED = make_grid(Layout(5, 9))
+SQUARE = [[-5, -5], [5, -5], [5, 5], [-5, 5], [-5, -5]]
+#: Lines, mm; the ends of their paths on the bed, mm; and whether these are all of the line.
+ON_BED = {
+    "inside": ([[-10, 0], [10, 0]], [[[-10, 0], [10, 0]]], True),
+    "beside": ([[20, 0], [40, 0]], [], False),
+    "up to the rims of its pins": ([[-13.5, 7.5], [13.5, 7.5]], [[[-13.5, 7.5], [13.5, 7.5]]], True),
+    "over its sides": ([[-40, 0], [40, 0]], [[[-13, 0], [13, 0]]], False),
+    "past a corner": ([[10, 20], [40, 0]], [], False),
+    "out and in": ([[0, 0], [0, 9], [5, 9], [5, 0]], [[[0, 0], [0, 7]], [[5, 7], [5, 0]]], False),
+    "a place twice": ([[0, 0], [0, 0], [10, 0]], [[[0, 0], [10, 0]]], True),
+    "without length": ([[0, 0], [0, 0]], [], False),
+    "closed, inside": (SQUARE, [[[-5, -5], [-5, -5]]], True),
     "closed, begun inside": (
-        [[0, 0], [3, 0], [3, 0.5], [0, 0.5], [0, 0]],
-        [[[2, 0.5], [0, 0.5], [0, 0], [2, 0]]],
+        [[0, 0], [20, 0], [20, 5], [0, 5], [0, 0]], [[[13, 5], [13, 0]]], False,
     ),
     "closed, begun outside": (
-        [[3, 0], [3, 0.5], [0, 0.5], [0, 0], [3, 0]],
-        [[[2, 0.5], [0, 0.5], [0, 0], [2, 0]]],
+        [[20, 0], [20, 5], [0, 5], [0, 0], [20, 0]], [[[13, 5], [13, 0]]], False,
     ),
-    "through the whole": ([[-1e6, -1e6], [1e6, 1e6]], [[[-1, -1], [1, 1]]]),
-}
+}  # fmt: skip
 
 
-@pytest.mark.parametrize("line, parts", CLIPPED.values(), ids=CLIPPED)
-def test_of_a_line_the_parts_on_the_bed_are_left(line, parts):
-    found = clip_line(np.array(line, float), LOW, HIGH)
-    assert len(found) == len(parts)
-    for part, wanted in zip(found, parts, strict=True):
-        assert_near(part, wanted, 1e-9)
+@pytest.mark.parametrize("line, ends, whole", ON_BED.values(), ids=ON_BED)
+def test_what_of_a_line_is_on_the_bed_is_a_path(line, ends, whole):
+    paths, all_of_it = lay_lines("Curve", [1e-3 * np.array(line, float)], BED)
+    assert all_of_it == whole
+    assert len(paths) == len(ends)
+    for path, wanted in zip(paths, ends, strict=True):
+        # Steps are a millimeter, unless that does not divide the length.
+        assert_near(1e3 * path[[0, -1]], wanted, 1e-5)
+        steps = np.hypot(*np.diff(path, axis=0).T)
+        assert 0.9e-3 < steps.min() <= steps.max() < 1.0001e-3
+
+
+@pytest.mark.parametrize("place", [[np.nan, 0.0], [np.inf, 0.0], [1e300, 0.0], [1001.0, 0.0]])
+def test_a_line_that_is_endless_is_refused_by_name(place):
+    with refused_in_a_line(ParameterError, r"Curve\.length must be finite, and below 1000 m"):
+        lay_lines("Curve", [np.zeros((2, 2)), np.array([[0.0, 0.0], place])], BED)
 
 
 EDGES = {
@@ -82,31 +81,24 @@ def test_many_places_become_few_on_the_same_circle_which_is_closed():
     angle = np.linspace(0.0, 2.0 * np.pi, 100_001)
     circle = 20e-3 * np.column_stack([np.cos(angle), np.sin(angle)])
     circle[-1] = circle[0]
-    (path,) = divide_lines(clip_to_bed([circle], make_grid(Layout())))
+    (path,), _ = lay_lines("Curve", [circle], make_grid(Layout()))
     assert len(path) == 1 + 126  # 2 pi 20 mm
     assert_near(path[-1], path[0], 0.0)
     assert_near(np.hypot(*path.T), 20e-3, 1e-8)
-    # A chord of a millimeter is 6 µm inside the circle.
-    assert measure_length([path]) == pytest.approx(2.0 * np.pi * 20e-3, rel=2e-4)
 
 
-def test_the_bed_ends_half_a_pitch_beyond_its_pins():
-    grid = make_grid(Layout(5, 9))
-    (part,) = clip_to_bed([np.array([[-1.0, 0.0], [1.0, 0.0]])], grid)
-    assert_near(part, [[-13.5e-3, 0.0], [13.5e-3, 0.0]], 1e-12)
-    assert clip_to_bed([np.zeros((1, 2)), np.zeros((2, 2)), np.ones((2, 2))], grid) == []
-
-
-ACROSS = np.array([[-30e-3, 0.0], [30e-3, 0.0]])
 REFUSED = {
     "none": ([], r"Curves must have a line over the bed \(got none\)"),
-    "longer than 10 m": ([ACROSS] * 167, r"length must be at most 10 m on the bed \(got 10.02 m\)"),
-    "more than 500": ([ACROSS / 100.0] * 501, r"lines must be at most 500 on the bed \(got 501\)"),
+    "longer than 10 m": (
+        [2501] * 3 + [2502],
+        r"length must be at most 10 m on the bed \(got 10\.001 m\)",
+    ),
+    "more than 500": ([2] * 501, r"lines must be at most 500 on the bed \(got 501\)"),
 }
 
 
-@pytest.mark.parametrize("lines, words", REFUSED.values(), ids=REFUSED)
-def test_no_line_and_one_too_many_are_refused(lines, words):
+@pytest.mark.parametrize("sizes, words", REFUSED.values(), ids=REFUSED)
+def test_no_path_and_one_too_many_are_refused(sizes, words):
     with refused_in_a_line(ParameterError, words):
-        divide_lines(lines)
-    assert len(divide_lines(lines[1:] or [ACROSS])) == max(1, len(lines) - 1)
+        refuse_paths([np.zeros((size, 2)) for size in sizes])
+    refuse_paths([np.zeros((size, 2)) for size in [size - 1 for size in sizes[1:]] or [1]])

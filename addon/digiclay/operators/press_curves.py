@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator
 from dataclasses import replace
-from itertools import chain
 
 import numpy as np
 
@@ -17,7 +16,7 @@ from ..compat import (
     OperatorProperties,
     bpy,
 )
-from ..core.base.arrays import TIE, Floats
+from ..core.base.arrays import Floats
 from ..core.base.errors import ParameterError, one_line
 from ..core.shapes.mesh_relief import ShapeMesh
 from ..exchange.shape_show import read_relief
@@ -25,7 +24,7 @@ from ..live import beds
 from ..press import aim, brush, tool
 from ..sessions.sculpting import queue_stroke
 from ..settings.declared import flag
-from ..strokes.curve_paths import clip_to_bed, divide_lines, join_edges, measure_length
+from ..strokes.curve_paths import join_edges, lay_lines, refuse_paths
 from ..strokes.stamps import cut_stamp
 from ..strokes.stroke import STAMPS, Brush
 from ..ui_text import localize
@@ -35,8 +34,6 @@ from .press_stroke import lay_stroke, open_session
 
 #: Objects with lines, and those of them that Blender can fill.
 LINED, FILLED = ("CURVE", "FONT", "CURVES", "GREASEPENCIL", "GPENCIL"), ("CURVE", "FONT")
-#: Coordinates of a line are smaller, m.
-LARGEST = 1e3
 #: Brushes by which filled shapes are stamped.
 CUT = {Brush.RAISE: Brush.STAMP, Brush.LOWER: Brush.IMPRINT, Brush.STAMP: Brush.STAMP}
 #: What stands in a report of names at most, characters.
@@ -55,16 +52,8 @@ no_curves = Need(
 
 def read_lines(context: Context, thing: Object, bed: Object) -> list[Floats]:
     """Return the lines of an object, with its modifiers, (k, 2), m, in the space of a bed."""
-    if thing.type == "GPENCIL":
-        lines = list(_read_layers(context, thing, bed))
-    else:
-        lines = _read_edges(context, thing, bed)
-    for line in lines:
-        bad = np.flatnonzero(~(np.abs(line) < LARGEST).all(axis=1))
-        if bad.size:
-            rule = "must be finite, and less than 1000 m of the device from the bed"
-            raise ParameterError(thing.name, "points", rule, f"{line[bad[0]].tolist()}")
-    return lines
+    legacy = thing.type == "GPENCIL"
+    return list((_read_layers if legacy else _read_edges)(context, thing, bed))
 
 
 def _read_edges(context: Context, thing: Object, bed: Object) -> list[Floats]:
@@ -88,10 +77,8 @@ def _read_edges(context: Context, thing: Object, bed: Object) -> list[Floats]:
         if len(mesh.polygons):
             rule = "must be lines, not the surface that its modifiers make of them"
             raise ParameterError(name, "modifiers", rule, f"{len(mesh.polygons)} faces")
-        places, edges = (
-            np.empty(3 * len(mesh.vertices), np.float32),
-            np.empty(2 * len(mesh.edges), np.int32),
-        )
+        places = np.empty(3 * len(mesh.vertices), np.float32)
+        edges = np.empty(2 * len(mesh.edges), np.int32)
         mesh.vertices.foreach_get("co", places)
         mesh.edges.foreach_get("vertices", edges)
         evaluated.to_mesh_clear()
@@ -149,11 +136,6 @@ def _read_filled(context: Context, thing: Object, bed: Object) -> ShapeMesh:
         raise ParameterError(thing.name, "fill", error.rule, error.value, hint) from None
 
 
-def _is_cut(lines: list[Floats], parts: list[Floats]) -> bool:
-    """Return whether parts of lines are not all of them."""
-    return not parts or measure_length(parts) < measure_length(lines) - TIE
-
-
 @action(
     "digiclay.press_curves",
     "Form along Curves",
@@ -185,15 +167,17 @@ def form_curves(operator: Operator, context: Context) -> Result | None:
         if kind in STAMPS:
             rule = "must be another one along curves"
             raise ParameterError("Press", "brush", rule, brush.LABELS[kind], "Or choose Fill.")
-        lines = {thing.name: read_lines(context, thing, bed) for thing in things}
-        parts = {name: clip_to_bed(group, grid) for name, group in lines.items()}
-        paths = divide_lines([*chain(*parts.values())])
+        paths, left = list[Floats](), list[str]()
+        for thing in things:
+            found, whole = lay_lines(thing.name, read_lines(context, thing, bed), grid)
+            paths += found
+            left += [] if whole else [thing.name]
+        refuse_paths(paths)
         # A closed path that accumulates would count at its end from what it has formed.
         strokes = [
             replace(lay_stroke(settings, bed, path, kind), accumulate=False) for path in paths
         ]
-        words = localize("Strokes queued: {}, {:.3g} m", len(paths), measure_length(paths))
-        left = [name for name, group in lines.items() if _is_cut(group, parts[name])]
+        words = localize("Strokes queued: {}", len(paths))
         if left:
             names = one_line(", ".join(left), NAMES)
             words += localize("; not over the bed, or not all of it: {}", names)
