@@ -52,8 +52,10 @@ def read_gltf(file):
 
 
 def by_gltf(path):
-    options = {"export_apply": True, "export_gn_mesh": True}
-    bpy.ops.export_scene.gltf(filepath=path + ".glb", use_selection=True, **options)
+    # Blender 4.2 cannot export instances of a selection.
+    for part in bpy.context.object.children_recursive:
+        bpy.data.objects.remove(part)
+    bpy.ops.export_scene.gltf(filepath=path + ".glb", export_apply=True, export_gn_mesh=True)
     return read_gltf(path + ".glb")
 
 
