@@ -78,6 +78,22 @@ def test_a_bed_of_another_file_comes_with_its_fingertip_and_nothing_else(tmp_pat
     assert_near(bridge.pose(fingertip_of(bed)), at, 1e-7)
 
 
+def test_pins_that_were_made_real_stay_in_the_scene_as_long_as_the_user_wants():
+    bed, counts = added(), []
+    bed.digiclay_display.form = "both"
+    bpy.ops.object.duplicates_make_real()
+    for step in (
+        lambda: done("Make Instances Real"),
+        lambda: duplicate(*beds()),
+        undone,
+        undone,
+        redone,
+    ):
+        step()
+        counts.append(len([one for one in bpy.context.scene.objects if one.get(ROLE) == "pin"]))
+    assert counts == [25, 25, 25, 0, 25]
+
+
 @pytest.mark.parametrize("by_hand", [True, False])
 def test_undo_stops_where_the_fingertip_of_a_copy_was_deleted(by_hand):
     copy = duplicate(added())

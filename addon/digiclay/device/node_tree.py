@@ -7,7 +7,7 @@ moves the pins: a session, a bake, undo. It needs no data of its own in a tick.
 from collections import Counter, defaultdict
 from collections.abc import Mapping
 
-from ..compat import Node, NodeInputs, NodeOutputs, NodeSocket, NodeTree, Object, bpy
+from ..compat import Collection, Node, NodeInputs, NodeOutputs, NodeSocket, NodeTree, Object, bpy
 from ..core.base.modes import Mode
 from . import heat
 from .parts import (
@@ -98,6 +98,17 @@ def finish(tree: NodeTree, geometry: NodeSocket) -> None:
         columns[each.name] = column
         rows[column] += 1
     tree.nodes.foreach_set("location", places)
+
+
+def list_sources(tree: NodeTree) -> tuple[set[Collection], set[Object]]:
+    """Return the collections that a tree draws, and the objects, also those in the collections."""
+    inputs = [
+        getattr(socket, "default_value", None) for node in tree.nodes for socket in node.inputs
+    ]
+    collections = {thing for thing in inputs if isinstance(thing, bpy.types.Collection)}
+    objects = {thing for thing in inputs if isinstance(thing, bpy.types.Object)}
+    objects.update(*(collection.objects for collection in collections))
+    return collections, objects
 
 
 def socket(tree: NodeTree, name: str, kind: str, default: Value, description: str) -> None:

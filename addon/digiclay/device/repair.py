@@ -35,7 +35,7 @@ from ..roles import (
 from ..settings import devices, properties
 from . import parts, view
 from .instant import Instant, find_ellipsoids
-from .node_tree import ARROWS
+from .node_tree import ARROWS, list_sources
 
 #: Marks what was hidden along with what it belongs to: only that is shown along with it again.
 HIDDEN = "digiclay_hidden"
@@ -102,6 +102,9 @@ def find_faults(known: frozenset[int], mended: frozenset[int] = frozenset()) -> 
     strewn = [
         thing for thing in shown if thing.session_uid not in known - mended and not thing.library
     ]
+    if strewn:  # a copy that Make Instances Real has made is the user's
+        drawn = set().union(*(list_sources(tree)[1] for tree in bpy.data.node_groups))
+        strewn = [thing for thing in strewn if thing in drawn or thing.get(ROLE) == BAKE]
     return Faults(bare, loose, left, strewn)
 
 

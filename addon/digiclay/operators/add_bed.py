@@ -19,6 +19,7 @@ from ..core.shapes.request import Shape
 from ..core.studies.job_table import embed_heights
 from ..device import palettes, repair, view
 from ..device.instant import Instant, find_ellipsoids, read
+from ..device.node_tree import list_sources
 from ..exchange import shape_show
 from ..live import beds
 from ..overlay.ready_view import find_view, frame, light
@@ -265,12 +266,7 @@ def _discard(tree: NodeTree) -> None:
     """Remove the nodes that drew pins, with the pins; a copy of the bed may still be drawn by them."""
     if tree.users:
         return
-    inputs = [
-        getattr(socket, "default_value", None) for node in tree.nodes for socket in node.inputs
-    ]
-    collections = {thing for thing in inputs if isinstance(thing, bpy.types.Collection)}
-    objects = {thing for thing in inputs if isinstance(thing, bpy.types.Object)}
-    objects.update(*(collection.objects for collection in collections))
+    collections, objects = list_sources(tree)
     bpy.data.batch_remove([tree, *collections])
     _remove(objects)
 
