@@ -21,6 +21,7 @@ from digiclay.core.session.live_session import (
     Clock,
     Recording,
     clamp_pose,
+    count_fitting,
     count_queue,
     find_spare,
     interpolate_path,
@@ -127,6 +128,21 @@ def test_the_periods_of_a_queue_leave_the_window_its_redraws(drawing, least, spe
         now += gone
     assert (spare, gone) == pytest.approx((spent, between), rel=0.05)
     assert clock.factor == pytest.approx(8 * spent / between, rel=0.05)
+
+
+@table(
+    "cost, spare, count",
+    {
+        "never measured": (0.0, 20e-3, 1),
+        "as many as fit": (3e-3, 20e-3, 6),
+        "one that will end later": (15e-3, 20e-3, 1),
+        "slower than a tick": (0.5, 20e-3, 1),
+        "no more than are simulated at a time": (1e-6, 20e-3, 16),
+        "no time at all": (3e-3, 0.0, 1),
+    },
+)
+def test_the_periods_of_a_queue_fill_its_time(cost, spare, count):
+    assert count_fitting(Clock(cost=cost), spare, 16) == count
 
 
 def test_a_queue_that_waits_for_the_hand_does_not_count():

@@ -10,9 +10,11 @@ from digiclay.core.model.fingertip import LEVEL
 from digiclay.core.model.layout import Layout
 from digiclay.core.session import snapshot
 from digiclay.core.session.take import from_bytes, make_take, play, to_bytes
+from digiclay.recorded.takes import read_recording
 from digiclay.sessions.forming_device import find_device
 from digiclay.sessions.running import list_pressing
 from digiclay.sessions.sculpting import (
+    advance,
     begin_session,
     change_scene,
     change_stroke,
@@ -386,3 +388,35 @@ def test_a_session_begins_from_the_state_that_was_kept_in_the_middle_of_a_stroke
     # Undo comes back to it as well.
     back = restore(again, session.snapshot, session.poses, 1, session.names)
     assert_array_equal(heights(back), heights(session))
+
+
+def make_longer(scene):
+    return replace(scene, simulation=replace(scene.simulation, duration=9.0))
+
+
+def tick_on(session, ticks):
+    """Return the session after ticks that have no time: each simulates one period of a stroke."""
+    for _ in range(ticks):
+        session = advance(session, session.poses, 0.0, 0, interval=1e-9)
+    return session
+
+
+@pytest.mark.parametrize(
+    "interrupt",
+    [
+        lambda session: drop_strokes(session).snapshot,
+        lambda session: set_recording(session, True).recording.start,
+        lambda session: read_recording(session).end,
+        lambda session: change_scene(session, make_longer(session.scene))[0].snapshot,
+    ],
+    ids=["dropped", "recorded from here", "recorded up to here", "on another scene"],
+)
+def test_ticks_of_a_stroke_pack_no_state_but_whatever_interrupts_it_has_the_present_one(interrupt):
+    begun = tick_on(queue(begin("hybrid"), [(2, 9), (9, 2)], ALONE, RAISE), 1)
+    session = tick_on(begun, 80)
+    # With 24 fingertips, packing would take a fifth of a tick.
+    assert (session.snapshot is begun.snapshot, session.state.period) == (True, 81)
+    stands = heights(session)
+    assert np.abs(stands - 40e-3).max() > 1e-3
+    state = snapshot.load(session.system, interrupt(session))
+    assert_array_equal(state.row(0), stands)

@@ -17,6 +17,7 @@ from ..core.session.live_session import simulate_path
 from ..core.session.take import Take, from_bytes, make_take, to_bytes
 from ..roles import fingertips_of
 from ..sessions.running import Running
+from ..sessions.sculpting import pack
 from ..ui_text import localize
 
 if TYPE_CHECKING:
@@ -71,7 +72,7 @@ def read_recording(session: Running) -> Take | None:
     recording = session.recording
     if recording is None:
         return None
-    return make_take(session.scene, recording, session.snapshot, session.base)
+    return make_take(session.scene, recording, pack(session).snapshot, session.base)
 
 
 def add(bed: Object, take: Take, name: str = "", session: Running | None = None) -> Entry:

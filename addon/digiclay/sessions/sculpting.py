@@ -125,18 +125,14 @@ def _work_off(running: Running, now: float, spare: float) -> Running:
     started = time.perf_counter()
     spent = 0.0
     while running.finished_strokes == finished:
-        cost = running.clock.cost
-        count = int((spare - spent) / cost) if cost > 0.0 else 1
-        if count < 1 and spent > 0.0:
-            break
+        count = live_session.count_fitting(running.clock, spare - spent, CHUNK)
         before = running.state.period
-        running = _follow_stroke(running, min(max(count, 1), CHUNK))
+        running = _follow_stroke(running, count)
         spent = time.perf_counter() - started
-        if running.state.period == before:
+        if spent >= spare or running.state.period == before:
             break
     done = (running.state.period - first) * running.system.period
-    running = replace(running, clock=live_session.count_queue(running.clock, now, done, spent))
-    return _pack(running) if done > 0.0 else running
+    return replace(running, clock=live_session.count_queue(running.clock, now, done, spent))
 
 
 def request_step(running: Running) -> Running:
@@ -147,11 +143,11 @@ def request_step(running: Running) -> Running:
 def follow_finger(running: Running, pose: Floats, count: int) -> Running:
     """Simulate control periods while fingertips move along strokes, or else to poses (f, 7) or one (7,)."""
     if running.strokes:
-        return _pack(_follow_stroke(running, count))
+        return pack(_follow_stroke(running, count))
     poses = live_session.clamp_pose(pose.reshape(-1, 7), running.system.cell.actuator.stroke)
     running = _mark_gesture_start(running, poses, count)
     path = live_session.interpolate_path(running.poses, poses, count)
-    return _pack(_follow(running, path, None, accuracy.PAUSE))
+    return pack(_follow(running, path, None, accuracy.PAUSE))
 
 
 def _follow_stroke(running: Running, count: int) -> Running:
@@ -168,7 +164,7 @@ def _follow_stroke(running: Running, count: int) -> Running:
 
 def _end_stroke(running: Running, stroke: Stroke) -> Running:
     """Note where a stroke has ended, so that redo brings it back as it stands."""
-    running, start = _pack(replace(running, stroke_start=None)), running.stroke_start
+    running, start = pack(replace(running, stroke_start=None)), running.stroke_start
     *earlier, last = running.gestures or (None,)
     if last is None or start is None or last.snapshot is not start.snapshot:
         # It has touched nothing.
@@ -196,15 +192,15 @@ def _give_fingers(running: Running, count: int) -> Running:
         poses[finger] = *image.place(x, y), max(z, above), *turn_image(poses[0, 3:], image)
     recording = running.recording and running.recording.let_in(poses)
     monitor = accuracy.restart(running.monitor, scene)
-    return _pack(
+    return pack(
         replace(
             running, system=system, state=state, poses=poses, recording=recording, monitor=monitor
         )
     )
 
 
-def _pack(running: Running) -> Running:
-    """Return the session with the snapshot of its state, which no chunk of a tick needs."""
+def pack(running: Running) -> Running:
+    """Return the session with the snapshot of its state; while a stroke is formed it has an earlier one."""
     return replace(running, snapshot=snapshot.dump(running.system, running.state))
 
 
@@ -318,6 +314,7 @@ def change_scene(
         return running, ""
     if numbers[0] != running.numbers[0]:  # another fingertip has no part in its strokes
         running = drop_strokes(running)
+    running = pack(running) if running.stroke_start else running
     was, others = running.numbers, running.poses if poses is None else poses
     images = running.names[len(was) :]
     matched = match_poses(running.poses, running.names, others, numbers)
@@ -365,7 +362,7 @@ def set_recording(running: Running, on: bool) -> Running:
     """Begin to record the fingertip's path, or stop recording it."""
     if not on:
         return replace(running, recording=None)
-    return live_session.start_recording(running, running.snapshot, running.tick)
+    return live_session.start_recording(running, pack(running).snapshot, running.tick)
 
 
 def rewind(running: Running) -> Running:
@@ -439,7 +436,7 @@ def change_stroke(running: Running, number: int, change: Callable[[Stroke], Stro
 def drop_strokes(running: Running) -> Running:
     """Return the session without unfinished strokes; the fingertip stays there, upright."""
     turn = running.strokes[0].turn if running.strokes else None
-    running = _give_fingers(running, 1)
+    running = pack(_give_fingers(running, 1)) if running.stroke_start else running
     poses = running.poses.copy()
     if turn is not None:
         poses[0, 3:] = turn

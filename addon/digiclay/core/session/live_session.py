@@ -116,6 +116,11 @@ def find_spare(clock: Clock, now: float, interval: float, least: float = LEAST) 
     return max(min(SHARE * interval, interval - DRAWN * beside), least * beside)
 
 
+def count_fitting(clock: Clock, spare: float, most: int) -> int:
+    """Return how many periods of a queue fit into a time, s, 1 to `most`: the last one may end later."""
+    return min(max(int(spare / clock.cost), 1), most) if clock.cost > 0.0 else 1
+
+
 def count_queue(clock: Clock, now: float, done: float, spent: float) -> Clock:
     """Return the clock after a queue's periods: simulated and wall time, s; waiting does not count."""
     clock = replace(clock, moment=None, left=0.0, spent=spent)
