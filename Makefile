@@ -111,4 +111,4 @@ release: ## check, build twice, tag: zip, wheel, source archive and checksums in
 
 clean: ## remove all that make made
 	rm -rf .venv .matrix .reports demo build dist site addon/*.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
-	find addon benchmarks digiclay_paper digiclay_serve digiclay_study tests tools -name __pycache__ -type d -prune -exec rm -rf {} +
+	find addon benchmarks digiclay_fit digiclay_paper digiclay_serve digiclay_study tests tools -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -101,6 +101,11 @@ BENCHMARKS = {
         },
         needs="scipy",
     ),
+    "fit": Benchmark(
+        "fit_coverage.measure",
+        "how often intervals of digiclay fit contain the truth, and what it refuses by name",
+        needs="scipy",
+    ),
     "terms": Benchmark(
         "session_parts.measure_terms",
         "cost and effect of each part of the model",

@@ -228,7 +228,7 @@ def test_what_fails_to_register_leaves_nothing_registered(monkeypatch):
 HERE = Path(__file__).parent
 TOOL = HERE.parents[1] / "tools" / "extension.py"
 #: Packages that stand beside the extension.
-BESIDE = ("benchmarks", "digiclay_paper", "digiclay_serve", "digiclay_study")
+BESIDE = ("benchmarks", "digiclay_fit", "digiclay_paper", "digiclay_serve", "digiclay_study")
 
 
 @pytest.fixture(scope="module")

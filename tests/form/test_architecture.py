@@ -20,7 +20,7 @@ CORE = PACKAGE / "core"
 #: Packages beside the extension: they import it, and it never imports them.
 BESIDE = {
     name: ROOT / name
-    for name in ("benchmarks", "digiclay_paper", "digiclay_serve", "digiclay_study")
+    for name in ("benchmarks", "digiclay_fit", "digiclay_paper", "digiclay_serve", "digiclay_study")
 }
 PACKAGES = pytest.mark.parametrize(
     "package", [PACKAGE, *BESIDE.values()], ids=lambda path: path.name
@@ -250,8 +250,9 @@ def test_the_extension_never_imports_what_stands_beside_it() -> None:
 
 @pytest.mark.parametrize("name", BESIDE)
 def test_what_stands_beside_the_extension_imports_no_part_of_its_neighbor(name: str) -> None:
-    # benchmarks are in a checkout alone, where the suite's trials are beside them
-    others = BESIDE.keys() - {name, *(["digiclay_study"] if name == "benchmarks" else [])}
+    # benchmarks are in a checkout alone, where the suite's trials and the fit are beside them
+    allowed = ["digiclay_study", "digiclay_fit"] if name == "benchmarks" else []
+    others = BESIDE.keys() - {name, *allowed}
     assert find_imports(BESIDE[name].rglob("*.py"), others.__contains__) == []
 
 

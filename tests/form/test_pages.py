@@ -31,7 +31,15 @@ PAGES = sorted(
         *ROOT.glob("addon/digiclay/sample_shapes/*/README.md"),
     ]
 )
-PACKAGES = ("addon", "benchmarks", "digiclay_paper", "digiclay_serve", "digiclay_study", "tools")
+PACKAGES = (
+    "addon",
+    "benchmarks",
+    "digiclay_fit",
+    "digiclay_paper",
+    "digiclay_serve",
+    "digiclay_study",
+    "tools",
+)
 SOURCES = {
     f"/{path.relative_to(ROOT)}"
     for name in (*PACKAGES, "docs", "tests")

@@ -17,6 +17,7 @@ BESIDE = __name__.removesuffix("digiclay.commands.outside")
 #: Commands of packages beside this one: package, module, extra, and what the list of commands says.
 COMMANDS = {
     "paper": ("digiclay_paper", "reproduce", "plots", "reproduce the paper's results"),
+    "fit": ("digiclay_fit", "fit_command", "fit", "fit device or finger to measured data"),
     "study": (
         "digiclay_study",
         "study_command",

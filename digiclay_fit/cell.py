@@ -1,0 +1,243 @@
+"""Height of a pin over commands of its valve: dead time, lag and flow, with exact derivatives.
+
+The opening is exact between commands, which are held from sample to sample; the flow is summed by three
+points of Gauss in each piece of time. The load is known, so nothing is integrated step by step. Fitted
+are conductance and knee of the orifice: the diameter and the stroke follow, the latter where the flow
+becomes turbulent.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from digiclay.core.base.arrays import Floats
+from digiclay.core.base.errors import DigiclayError
+from digiclay.core.model.laws import select_law
+from digiclay.core.scene.schema import Scene
+
+from .estimation import Derived, Estimate, Parameter
+from .records import Trial
+
+#: Groups of parameters that may be free beside the diameter of the orifice.
+GROUPS = ("stroke", "supply", "lag", "delay")
+#: Points of Gauss in a piece of time, and their weights.
+NODES = 0.5 + np.array((-(0.15**0.5), 0.0, 0.15**0.5))
+WEIGHTS = np.array((5.0, 8.0, 5.0)) / 18.0
+#: Knees at which a fit starts, Pa: above the supply it has no effect, and stays.
+KNEES = (1e4, 4e4, 1e7)
+DIAMETER, STROKE = "valve.orifice_diameter", "valve.stroke"
+LAG, DELAY = "valve_lag.time_constant", "delay.dead_time"
+
+
+class CellTrial:
+    """Commands of a trial as events, and the instants at which its flow is taken.
+
+    The opening has a kink where a command arrives, so a piece ends there.
+    """
+
+    def __init__(self, trial: Trial) -> None:
+        self.time, self.given_load = trial.time - trial.time[0], trial.load
+        changed = np.flatnonzero(np.diff(trial.drive, prepend=0.0))
+        self.events, self.commands = self.time[changed], trial.drive[changed]
+
+    def divide(self, delay: float) -> None:
+        """Place the instants, between samples and arriving commands."""
+        arrived = self.events + delay
+        edges = np.concatenate((self.time, arrived[arrived < self.time[-1]]))
+        order = np.argsort(edges, kind="stable")
+        edges, pieces = edges[order], np.diff(edges[order])
+        self.at_sample = np.argsort(order, kind="stable")[: self.time.size]
+        self.nodes = (edges[:-1, None] + pieces[:, None] * NODES).reshape(-1)
+        self.weight = (pieces[:, None] * WEIGHTS).reshape(-1)
+        self.load = np.interp(self.nodes, self.time, self.given_load)
+
+    def open(self, lag: float, delay: float) -> tuple[Floats, Floats, Floats]:
+        """Return the openings at the nodes, and their derivatives by lag and dead time."""
+        level = slope = 0.0
+        before = 0.0
+        starts, slopes = np.zeros(len(self.events) + 1), np.zeros(len(self.events) + 1)
+        commands = np.concatenate(([0.0], self.commands))
+        gaps = np.diff(self.events).tolist()
+        for number, gap in enumerate((math.inf, *gaps)):
+            stay = math.exp(-gap / lag) if gap < math.inf else 0.0
+            away = level - before
+            if number:
+                slope = slope * stay + away * stay * gap / lag**2
+            level = before + away * stay
+            before = float(self.commands[number]) if len(self.events) else 0.0
+            starts[number + 1 : number + 2], slopes[number + 1 : number + 2] = level, slope
+        place = np.searchsorted(self.events, self.nodes - delay, side="right")
+        first = np.concatenate(([0.0], self.events + delay))
+        since = np.where(place > 0, self.nodes - first[place], 0.0)
+        stay = np.exp(-since / lag)
+        away = starts[place] - commands[place]
+        opening = commands[place] + away * stay
+        by_lag = (slopes[place] + away * since / lag**2) * stay
+        return opening, by_lag, np.where(place > 0, away * stay / lag, 0.0)
+
+    def sum_up(self, rates: Floats) -> Floats:
+        """Return integrals (k, n) at the samples, of rates (k, nodes) at the nodes."""
+        weighted = (rates * self.weight).reshape(len(rates), -1, NODES.size)
+        pieces = sum(weighted[:, :, node] for node in range(NODES.size))
+        summed = np.zeros((len(rates), pieces.shape[1] + 1))
+        np.cumsum(pieces, axis=1, out=summed[:, 1:])
+        return summed[:, self.at_sample]
+
+
+class CellModel:
+    """Model of all samples of some trials; `groups`: what is free."""
+
+    def __init__(self, scene: Scene, trials: Sequence[Trial], groups: Sequence[str]) -> None:
+        self.trials, self.groups = [CellTrial(trial) for trial in trials], tuple(groups)
+        self.measured = np.concatenate([trial.answer for trial in trials])
+        if np.ptp(self.measured) >= scene.actuator.stroke:
+            rule = f"must change by less than actuator.stroke, {scene.actuator.stroke:g} m"
+            raise DigiclayError(f"height {rule} (got {np.ptp(self.measured):g} m).")
+        self.valve, self.fluid, self.area = scene.valve, scene.fluid, scene.actuator.area
+        orifice = select_law("valve", scene.valve).flow_law(scene.fluid)
+        self.power = orifice.power
+        self.resistance = scene.conduit.resistance(scene.fluid) if scene.conduit else 0.0
+        lag = scene.valve_lag.time_constant if scene.valve_lag else 1e-3
+        dead = scene.delay.dead_time if scene.delay else 0.0
+        self.usual = {
+            "supply.high": scene.supply.high,
+            "supply.low": scene.supply.low,
+            LAG: lag,
+            DELAY: dead,
+        }
+        start, far = math.log(orifice.laminar), math.log(1e4)
+        found = [Parameter(DIAMETER, "m3/(s Pa)", start, start - far, start + far, log=True)]
+        low, high, wanted = math.log(10.0), math.log(1e9), "stroke" in groups
+        knee = Parameter(STROKE, "Pa", math.log(KNEES[0]), low, high, True, wanted, beside=DIAMETER)
+        found.append(knee)
+        if "supply" in groups:
+            for key in ("supply.high", "supply.low"):
+                found.append(Parameter(key, "Pa", self.usual[key], -1e6, 1e6))
+        if "lag" in groups:
+            found.append(
+                Parameter(LAG, "s", math.log(lag), math.log(1e-5), math.log(1.0), log=True)
+            )
+        if "delay" in groups:
+            longest = max(float(trial.time[-1]) for trial in self.trials) / 2.0
+            found.append(Parameter(DELAY, "s", min(dead, longest / 2.0), 0.0, longest))
+        self.defaults = {
+            i: each.start for i, each in enumerate(found) if each.wanted or each.key == STROKE
+        }
+        self.defaults[1] = math.log(orifice.knee)
+        first = len(found)
+        for number, trial in enumerate(trials, 1):
+            rest = float(trial.answer[0])
+            low, high = rest - 1.0, rest + 1.0
+            key = f"zero of height {number}"
+            found.append(Parameter(key, "m", rest, low, high, wanted=False, of_trial=True))
+        self.parameters, self.zeros = tuple(found), first
+        self.index = {each.key: i for i, each in enumerate(found)}
+
+    def _value(self, free: Floats, key: str) -> float:
+        """Return a parameter in SI, or what it is where it is not free."""
+        if key not in self.index:
+            return self.usual[key]
+        place = self.index[key]
+        return math.exp(free[place]) if self.parameters[place].log else float(free[place])
+
+    def predict(self, free: Floats) -> tuple[Floats, Floats]:
+        """Return the heights (n,) at all samples and their Jacobian (n, p)."""
+        parts = [self._predict_trial(number, free) for number in range(len(self.trials))]
+        return np.concatenate([part[0] for part in parts]), np.vstack([part[1] for part in parts])
+
+    def _predict_trial(self, number: int, free: Floats) -> tuple[Floats, Floats]:
+        trial, index = self.trials[number], self.index
+        lag = self._value(free, LAG)
+        delay = self._value(free, DELAY)
+        trial.divide(delay)
+        opening, by_lag, by_delay = trial.open(lag, delay)
+        up = opening > 0.0
+        source = np.where(up, self._value(free, "supply.high"), self._value(free, "supply.low"))
+        flow, by_conductance, by_knee, by_drop, by_opening = self._flow(
+            math.exp(free[0]), math.exp(free[1]), opening, source - trial.load / self.area
+        )
+        rates = np.zeros((1 + len(self.parameters), flow.size))
+        rates[:3] = flow, by_conductance, by_knee
+        if "supply" in self.groups:
+            rates[1 + index["supply.high"]] = by_drop * up
+            rates[1 + index["supply.low"]] = by_drop * ~up
+        if LAG in index:
+            rates[1 + index[LAG]] = by_opening * by_lag * lag
+        if DELAY in index:
+            rates[1 + index[DELAY]] = by_opening * by_delay
+        risen = trial.sum_up(rates / self.area)
+        zero = self.zeros + number
+        risen[1 + zero] = 1.0
+        return free[zero] + risen[0], risen[1:].T
+
+    def _flow(
+        self, conductance: float, knee: float, opening: Floats, drop: Floats
+    ) -> tuple[Floats, ...]:
+        """Return the flow, and its derivatives by log conductance, log knee, drop and opening."""
+        size, sign = np.abs(opening), np.sign(opening)
+        lift = size if self.power == 1 else size * size
+        lift_slope = np.ones_like(size) if self.power == 1 else 2.0 * size
+        series = 1.0 + self.resistance * conductance * lift
+        laminar = conductance * lift / series
+        wide = conductance * math.sqrt(knee) * size
+        loss, push = self.resistance * wide * wide, np.abs(drop)
+        turbulent = 0.5 * (np.sqrt(loss * loss + 4.0 * wide * wide * push) - loss)
+        calm = laminar * push <= turbulent
+        flow = np.where(calm, laminar * push, turbulent)
+        below = np.maximum(2.0 * turbulent + loss, 1e-300)
+        by_wide = 2.0 * turbulent**2 / below
+        by_log = np.where(calm, laminar * push / series, by_wide)
+        by_knee = np.where(calm, 0.0, 0.5 * by_wide)
+        by_drop = np.where(calm, laminar, wide * wide / below)
+        by_size = np.where(
+            calm,
+            conductance * lift_slope / series**2 * push,
+            np.divide(by_wide, size, out=np.zeros_like(size), where=size > 0.0),
+        )
+        way = np.sign(drop)
+        return flow * way, by_log * way, by_knee * way, by_drop, by_size * way * sign
+
+    def list_starts(self) -> list[Floats]:
+        """Return the values at which a fit starts: with the knee below, about and above the supply."""
+        start = np.array([each.start for each in self.parameters])
+        return [np.where(np.arange(start.size) == 1, math.log(knee), start) for knee in KNEES]
+
+    def refine(self, free: Floats) -> bool:
+        """Return that a fit is final."""
+        return False
+
+    def turbulent(self, made: Estimate) -> bool:
+        """Return whether a fit has a knee that the flow passed."""
+        return made.judgments[1].verdict == "bounded"
+
+    def derive(self, free: Floats) -> list[Derived]:
+        """Return the values for a scene; the stroke too if it is free, else the diameter with that stroke."""
+        valve, fluid = self.valve, self.fluid
+        conductance, knee = free[0], free[1]
+        drag = 8.0 * valve.knee_reynolds**2 * fluid.density * fluid.viscosity
+        shape = math.log(math.pi * valve.discharge_slope)
+        unit = np.eye(free.size)
+        found = []
+        if "stroke" in self.groups:
+            term = math.log(4.0 * math.sqrt(fluid.density / 2.0)) + conductance + 0.5 * knee
+            gradient = unit[0] + 0.5 * unit[1]
+            found.append(
+                Derived(
+                    STROKE,
+                    "m",
+                    2.0 * term - math.log(drag) - conductance,
+                    2.0 * gradient - unit[0],
+                    True,
+                )
+            )
+        else:
+            term, gradient = 0.5 * (math.log(drag * valve.stroke) + conductance), 0.5 * unit[0]
+        found.insert(0, Derived(DIAMETER, "m", 0.5 * (term - shape), 0.5 * gradient, True))
+        for place, each in enumerate(self.parameters):
+            if each.wanted and place > 1:
+                found.append(
+                    Derived(each.key, each.unit, float(free[place]), unit[place], each.log)
+                )
+        return found

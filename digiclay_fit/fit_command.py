@@ -1,0 +1,179 @@
+"""``digiclay fit``: parameters of a scene from measured data, with intervals, or why they cannot be known."""
+
+from __future__ import annotations
+
+import sys
+from argparse import Namespace
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from digiclay import __version__
+from digiclay.commands.arguments import QUIET, add_command, add_options, add_scene, say, scene_of
+from digiclay.commands.progress import table as aligned
+from digiclay.commands.refusals import refuse_without
+from digiclay.core.base.errors import OutputError
+from digiclay.core.files.run_folder import Content, claim_folder, make_folder, write_whole
+from digiclay.core.files.tables import Record, format_value
+from digiclay.core.scene.schema import Scene
+from digiclay.core.scene.toml_table import UNCERTAINTY
+
+from . import cell, pulp
+from .estimation import USELESS
+from .records import find_records, read_records
+from .verdicts import Findings, fit, split_trials
+
+EXAMPLES = """\
+examples:
+  digiclay fit fingertip --part pulp --holdout 3 --out finger
+  digiclay fit mine.csv --part pulp --free contact,relaxation,lag --out finger
+  digiclay fit valve --part cell --set actuator.bore="2 mm" --out cell
+  digiclay run tap --with finger/fitted.toml
+
+FILE is a sample's name or a CSV file: names of the columns, a row of their units, then numbers.
+pulp: time, position (or indentation, or commanded), force; cell: time, command, height, perhaps load;
+both perhaps trial. The folder has fit.html, fit.png and, with exit code 0, fitted.toml. Exit code 1:
+NO_IMPROVEMENT on the scene, or NOT_IDENTIFIABLE.
+"""
+#: Groups of parameters of each part, and those that are free unless others are asked for.
+GROUPS = {"pulp": pulp.GROUPS, "cell": cell.GROUPS}
+USUAL = {"pulp": "contact,relaxation", "cell": "lag,delay"}
+#: Sections of a scene that the fitted values of a part belong to.
+SECTIONS = {
+    "pulp": ("fingertip", "contact", "relaxation"),
+    "cell": ("actuator", "supply", "fluid", "valve", "conduit", "valve_lag", "delay"),
+}
+#: What those sections have of a scene, and not of device or finger.
+OF_SCENE = {("contact", "share"), ("contact", "offset"), ("actuator", "rest_height")}
+#: Content of the folder, columns of the table, and the exit code of a refusal.
+FIT, REFUSED = Content("fit", ("fit.html", "fit.png")), 1
+HEAD = ("parameter", "value", "95 % interval", "verdict", "most correlated with")
+
+
+def add(commands: Any) -> None:
+    """Add the command."""
+    description = "Fit the parameters of a cell or of the pulp to measured data, with intervals."
+    purpose = "fit device or finger to measured data"
+    parser = add_command(commands, "fit", purpose, EXAMPLES, description, carry_out=carry_out)
+    add_options(
+        parser,
+        {
+            "files FILE": {"nargs": "+", "help": "CSV files or samples of one part"},
+            "--part PART": {"choices": tuple(GROUPS), "required": True, "help": "cell or pulp"},
+            "--law LAW": (("plate", "pin"), "whole finger on a plate, or on one pin", "plate"),
+            "--free GROUP,...": (
+                None,
+                f"what is unknown: {', '.join(pulp.GROUPS)}; beside an orifice {', '.join(cell.GROUPS)}",
+            ),
+            "--holdout TRIAL,...": (None, "trials to predict, not to fit", ""),
+            "--out DIR": (Path, "folder; default: fit", Path("fit")),
+            "--overwrite": "replace an older fit",
+            "--quiet": QUIET,
+        },
+    )
+    add_scene(parser, "tap")
+
+
+def read_groups(text: str | None, part: str) -> tuple[str, ...]:
+    """Return the groups of parameters that are free, in their order."""
+    words = [word.strip() for word in (USUAL[part] if text is None else text).split(",")]
+    for word in words:
+        if word not in GROUPS[part]:
+            rule = f"must be of {', '.join(GROUPS[part])} for the part {part}"
+            raise OutputError(f"--free {rule} (got {word[:40]!r}).")
+    return tuple(name for name in GROUPS[part] if name in words)
+
+
+def carry_out(arguments: Namespace) -> int:
+    """Fit, judge and write; return the exit code."""
+    refuse_without("digiclay fit", "fit", "scipy", "matplotlib")
+    from .fit_page import draw, write_page
+
+    part, groups = arguments.part, read_groups(arguments.free, arguments.part)
+    scene, _ = scene_of(arguments)
+    paths = [find_records(word) for word in arguments.files]
+    fitted, held = split_trials(read_records(paths, part), arguments.holdout)
+    with claim_folder(arguments.out, overwrite=arguments.overwrite, content=FIT):
+        found = fit(part, scene, fitted, held, groups, arguments.law)
+        rows, folder = list(list_rows(found)), make_folder(arguments.out)
+        (folder / "fitted.toml").unlink(missing_ok=True)
+        draw(found, part, folder / "fit.png")
+        write_whole(folder / "fit.html", write_page(found, part, HEAD, rows).encode())
+        if found.code == "OK":
+            text = "\n".join(write_parts(found, part, scene, groups)) + "\n"
+            write_whole(folder / "fitted.toml", text.encode())
+    say(arguments, *aligned(HEAD, rows), *found.cautions, f"written to {folder}")
+    if found.code != "OK":
+        print(found.message, file=sys.stderr)
+        return REFUSED
+    say(arguments, found.message)
+    return 0
+
+
+def list_rows(found: Findings) -> Iterator[list[str]]:
+    """Give the rows of the table, as `HEAD`: values of a scene, then what belongs to the measurement."""
+    made, derived = found.made, found.derived
+    judged = dict(zip((each.key for each in made.model.parameters), made.judgments, strict=True))
+    correlation = found.correlation
+    for number, each in enumerate(derived):
+        half, judgment = found.half_widths[number], judged.get(each.key)
+        ends = each.value - half, each.value + half
+        verdict = judgment.verdict if judgment else "follows from others"
+        if half > (USELESS if each.log else USELESS * abs(each.value)):
+            verdict = verdict if judgment and verdict != "bounded" else "flat"
+        if judgment and verdict == "one-sided" and each.key != cell.STROKE:
+            ends = judgment.low, judgment.high
+        value, low, high = (
+            np.exp(np.clip((each.value, *ends), -700.0, 700.0)) if each.log else (each.value, *ends)
+        )
+        interval = "none" if verdict == "flat" else f"{low:.4g} to {high:.4g}"
+        other = int(np.abs(correlation[number] * (np.arange(len(derived)) != number)).argmax())
+        near = f"{derived[other].key} ({correlation[number, other]:+.2f})"
+        yield [
+            each.key,
+            f"{value:.5g} {each.unit}".strip(),
+            interval,
+            verdict,
+            near if len(derived) > 1 else "",
+        ]
+    pairs = zip(made.model.parameters, made.judgments, made.free, made.widths, strict=True)
+    for parameter, judgment, value, half in pairs:
+        if parameter.beside:
+            low, high = np.exp((judgment.low, judgment.high))
+            shown = f"{low:.3g} to {high:.3g}"
+            yield ["knee of the flow", f"{np.exp(value):.3g} Pa", shown, judgment.verdict, ""]
+        elif not parameter.wanted:
+            shown = f"{value - half:.5g} to {value + half:.5g}"
+            fitted = f"{value:.5g} {parameter.unit}"
+            yield [parameter.key, fitted, shown, "of the measurement", ""]
+
+
+def write_parts(found: Findings, part: str, scene: Scene, groups: Sequence[str]) -> Iterator[str]:
+    """Give the lines of the file of parts: what was held, what was fitted, and its uncertainty."""
+    tables: dict[str, Record] = {}
+    for section in SECTIONS[part]:
+        content = scene.section(section)
+        if content is not None and (part == "cell" or section == "fingertip" or section in groups):
+            names = [name for name in vars(content) if (section, name) not in OF_SCENE]
+            tables[section] = {name: getattr(content, name) for name in names if name[0] != "_"}
+    for each in found.derived:
+        section, name, *number = each.key.split(".")
+        value = float(f"{np.exp(each.value) if each.log else each.value:.7g}")
+        table = tables.setdefault(section, {})
+        if number:
+            values = list(table[name])
+            values[int(number[0]) - 1] = value
+            table[name] = values
+        else:
+            table[name] = value
+    yield f"# Fitted by digiclay {__version__}: digiclay run SCENE --with THIS_FILE"
+    yield f'description = "Fitted {part}: {found.message}"'
+    for section, table in tables.items():
+        yield f"\n[{section}]"
+        yield from (f"{name} = {format_value(value)}" for name, value in table.items())
+    yield f"\n[{UNCERTAINTY}]"
+    yield f"keys = {format_value([each.key for each in found.derived])}"
+    yield f"logarithms = {format_value([each.log for each in found.derived])}"
+    rows = [[float(f"{value:.8g}") for value in row] for row in found.covariance]
+    yield f"covariance = {format_value(rows)}"
