@@ -25,6 +25,7 @@ ENTRIES = (
     ("bpy.ops.digiclay.press", "#brushes"),
     ("bpy.ops.digiclay.press_brush", "#brushes"),
     ("bpy.ops.digiclay.press_curves", "#brushes"),
+    ("bpy.ops.digiclay.press_locks*", "#locks"),
     ("bpy.ops.digiclay.press_*", "#keys"),
     ("bpy.ops.digiclay.skin_toggle", "#display"),
     ("bpy.ops.digiclay.*_pins", "#display"),

@@ -7,7 +7,7 @@ from . import command_line, manual_map, operators, panels, preferences, translat
 from .device import detail, part_watch
 from .exchange import image_reader
 from .live import handlers
-from .press import brush, ghost, tool
+from .press import brush, ghost, lock_marks, tool
 from .settings import properties
 
 #: Each has a function `register` and one `unregister`. Properties come first: panels draw them.
@@ -20,6 +20,7 @@ MODULES: tuple[ModuleType, ...] = (
     panels,
     tool,
     ghost,
+    lock_marks,
     translations,  # of all that is registered before
     command_line,
     manual_map,

@@ -20,7 +20,7 @@ from digiclay.sessions.forming_device import find_device
 from digiclay.sessions.sculpting import queue_stroke
 from digiclay.strokes import drawn
 from digiclay.strokes.falloff import Falloff, evaluate
-from digiclay.strokes.locks import find_locks
+from digiclay.strokes.locks import find_inside, find_locks
 from digiclay.strokes.nominal import Device, find_ghosts, find_nominal, find_radius
 from digiclay.strokes.stamps import load_stamp
 from digiclay.strokes.stroke import Brush, Combine, lay_path, make_images, start
@@ -114,6 +114,28 @@ def test_pins_are_locked_by_number_and_by_height(brush, keys, chosen):
     wanted = np.full(15, 0.25)
     wanted[list(chosen)] = float(brush is Brush.LOCK_PINS)
     assert_array_equal(find_locks(lay(brush, **keys), device, REST + HEIGHTS), wanted)
+
+
+SQUARE = [(0, 0), (4, 0), (4, 4), (0, 4)]
+LEFT, RIGHT, TOP, BESIDE = (1, 2), (3, 2), (2, 3.5), [(5, 2), (-1, 2), (2, 5), (1e9, 2)]
+
+
+@pytest.mark.parametrize(
+    "path, inside",
+    [
+        (SQUARE, {LEFT, RIGHT, TOP}),
+        (SQUARE[::-1], {LEFT, RIGHT, TOP}),
+        ([(0, 0), (4, 4), (4, 0), (0, 4)], {LEFT, RIGHT}),  # an eight
+        ([*SQUARE, (0, 0), (1.5, 0), (1.5, 4), (0, 4)], {RIGHT, TOP}),  # twice around the left
+        ([(0, 0)], set()),
+        ([(0, 0), (4, 4)], set()),
+        ([(0, 2), (4, 2), (2, 2)], set()),
+    ],
+)
+def test_a_lasso_is_even_odd_where_it_crosses_itself(path, inside):
+    places = [LEFT, RIGHT, TOP, *BESIDE, (np.nan, np.nan)]
+    found = find_inside(np.array(places, float), np.array([*path, path[0]], float))
+    assert {place for place, is_in in zip(places, found, strict=True) if is_in} == inside
 
 
 @pytest.mark.parametrize("falloff", list(Falloff)[1:])

@@ -56,14 +56,14 @@ def script(blender):
 def locks(blender, settings):
     """Turn the locks over, undo that, and clear them; take one off by Ctrl before."""
     settings.brush = "LOCK"
-    blender.call(bpy.ops.digiclay.press_locks_invert, "INVOKE_DEFAULT", True)
+    blender.call(bpy.ops.digiclay.press_locks, "INVOKE_DEFAULT", True, change="INVERT")
     yield from finish(blender, hand("sleep 0.1"))
     keep(blender, "inverted")
     yield from act(blender, to(on_the_screen(blender, 0.0, 30.0)), "key ctrl+z")
     keep(blender, "inverting undone")
     yield from stroke(blender, "unlocked", (0.0, -LONG), (0.0, 0.0), *HOW, key="ctrl")
     keep(blender, "unlocked")
-    blender.call(bpy.ops.digiclay.press_locks_clear, "INVOKE_DEFAULT", True)
+    blender.call(bpy.ops.digiclay.press_locks, "INVOKE_DEFAULT", True, change="CLEAR")
     yield from finish(blender, hand("sleep 0.1"))
     keep(blender, "cleared")
 

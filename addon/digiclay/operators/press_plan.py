@@ -1,4 +1,6 @@
-"""What the Press tool's header has beside strokes: the center of symmetry, and the locks of all pins."""
+"""What the Press tool's header has beside strokes: the center of symmetry, and the base."""
+
+from typing import Any
 
 from ..compat import Area, Context, Event, Operator, bpy
 from ..live import beds
@@ -86,32 +88,19 @@ class NoteKeys(Polled, Operator):
         return {"PASS_THROUGH"}
 
 
-def _tell_all(operator: Operator, context: Context, kind: Brush) -> Result | None:
-    """Queue a stroke that tells all pins something."""
+def tell_all(operator: Operator, context: Context, kind: Brush, **fields: Any) -> Result | None:
+    """Queue a stroke that tells all pins something; `fields`: of `Stroke`."""
     session = open_session(operator, context, brush.bed_in_use(context), kind)
     if session is None:
         return {"CANCELLED"}
     x, y = session.pose[:2].tolist()
-    session, _ = queue_stroke(session, let_go(start(0, x, y, SHALLOWEST, brush=kind)))
+    stroke = let_go(start(0, x, y, SHALLOWEST, brush=kind, **fields))
+    session, _ = queue_stroke(session, stroke)
     beds.put(session)
     return None
-
-
-@action(
-    "digiclay.press_locks_invert", "Invert Locks", no_tool_in_view, no_finger, options=("UNDO",)
-)
-def invert_locks(operator: Operator, context: Context) -> Result | None:
-    """Lock the pins that are not locked, and unlock those that are"""
-    return _tell_all(operator, context, Brush.INVERT_LOCKS)
 
 
 @action("digiclay.press_base", "Set Base", no_tool_in_view, no_finger, options=("UNDO",))
 def set_base(operator: Operator, context: Context) -> Result | None:
     """Count heights and depths from the surface as it stands, strokes of the queue included"""
-    return _tell_all(operator, context, Brush.SET_BASE)
-
-
-@action("digiclay.press_locks_clear", "Clear Locks", no_tool_in_view, no_finger, options=("UNDO",))
-def clear_locks(operator: Operator, context: Context) -> Result | None:
-    """Unlock all pins"""
-    return _tell_all(operator, context, Brush.CLEAR_LOCKS)
+    return tell_all(operator, context, Brush.SET_BASE)

@@ -63,7 +63,7 @@ class PressSettings:
     stamp_file: text("File", "Mesh, picture or .npy file that is stamped", subtype="FILE_PATH")
     falloff: choice(
         "Falloff",
-        "Flanks of Raise, Lower and Level, and effect of brushes in the ring; that of Lock is constant",
+        "Flanks of Raise, Lower and Level, and effect of brushes in the ring",
         items=brush.FALLOFF_ITEMS,
         default="DEVICE",
     )

@@ -138,8 +138,9 @@ def draw_header(context: Context, layout: UILayout, settings: OperatorProperties
         _number(layout, settings, amount_name(brush), AMOUNT)
     if brush in LOCKS:
         row = layout.row(align=True)
-        row.operator("digiclay.press_locks_invert", text="Invert")
-        row.operator("digiclay.press_locks_clear", text="Clear")
+        for change in ("Invert", "Clear"):
+            row.operator("digiclay.press_locks", text=change).change = change.upper()
+        row.menu("DIGICLAY_MT_locks", text="", icon="DOWNARROW_HLT")
     else:
         _number(layout, settings, "strength", STRENGTH)
     if brush in STAMPS:
@@ -335,6 +336,12 @@ class PressTool(bpy.types.WorkSpaceTool):
             {"properties": [("name", "DIGICLAY_MT_pie_brushes")]},
         ),
         ("digiclay.press_base", {"type": "Y", "value": "PRESS"}, None),
+        ("digiclay.press_locks_area", {"type": "B", "value": "PRESS"}, None),
+        (
+            "digiclay.press_locks_area",
+            {"type": "LEFTMOUSE", "value": "CLICK_DRAG", "shift": True, "ctrl": True},
+            {"properties": [("shape", "LASSO")]},
+        ),
         ("digiclay.skin_toggle", {"type": "S", "value": "PRESS", "alt": True}, None),
         _scale_key("LEFT_BRACKET", 1.0 / 1.1),
         _scale_key("RIGHT_BRACKET", 1.1),

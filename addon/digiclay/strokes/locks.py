@@ -5,6 +5,7 @@ stroke is formed; what a brush leaves of it is the share of its way that its loc
 """
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -46,6 +47,17 @@ def _choose(stroke: Stroke, device: Device, height: Floats) -> Flags:
         chosen = np.isin(np.arange(height.size), stroke.pins)
     low, high = (device.rest + limit for limit in stroke.limits)
     inside: Flags = chosen & (height >= low - TIE) & (height <= high + TIE)
+    return inside
+
+
+def find_inside(places: Floats, path: Floats) -> Flags:
+    """Return which places (k, 2) are inside a closed path (m, 2); one that crosses itself has holes."""
+    x, y = places.T
+    inside = np.zeros(len(places), np.bool_)
+    for (left, low), (right, high) in pairwise(path.tolist()):
+        if low != high:
+            beside = x < left + (y - low) / (high - low) * (right - left)
+            inside ^= ((low > y) != (high > y)) & beside
     return inside
 
 

@@ -1,0 +1,114 @@
+"""Locks pins beside a ridge by a box, a lasso and the menu, and forms over them: X events from outside."""
+
+from itertools import pairwise
+
+import bpy
+import numpy as np
+
+from tests.window.hand_strokes import (
+    act,
+    brush,
+    finish,
+    hand,
+    note,
+    on_the_screen,
+    prepare,
+    stroke,
+    to,
+)
+from tests.window.see_the_form import read_shot
+
+HOW = (0.5, 60)
+#: Corners of the box and of a lasso that crosses itself, an eight, mm.
+BOX = ((4.0, -26.0), (26.0, -10.0))
+EIGHT = ((-26.0, 8.0), (-2.0, 28.0), (-2.0, 8.0), (-26.0, 28.0), (-26.0, 8.0))
+
+
+def keep(blender, name):
+    note(blender, name)
+    session = blender.session()
+    shares = session.state.shares()
+    grid, height = session.system.grid, session.state.row(0)
+    places = np.column_stack([grid.positions, height])
+    area, region = blender.view()
+    with bpy.context.temp_override(window=blender.window(), area=area, region=region):
+        seen = blender.part("bridge").project(bpy.context, blender.beds()[0], places)
+    blender.SEEN[name] |= {
+        "shares": shares.tolist(),
+        "seen": np.add(seen, (region.x, region.y)).round(1).tolist(),
+    }
+
+
+def draw(blender, *places, before="", after=""):
+    """Return the hand that drags along places of the bed, mm, and their pixels in the window."""
+    screen = [on_the_screen(blender, *place) for place in places]
+    first, words = screen[0], []
+    for start, end in pairwise(screen):
+        way = np.linspace(start, end, 12)[1:].round().astype(int)
+        words += [to((int(x), int(y)), 0.03) for x, y in way]
+    pixels = [(x, blender.window().height - 1 - y) for x, y in screen]
+    return (to(first), before, "mousedown 1", *words, "mouseup 1", after), pixels
+
+
+def change(blender, name, operator, **given):
+    blender.call(operator, **given)
+    yield from finish(blender, hand("sleep 0.1"))
+    keep(blender, name)
+
+
+def script(blender):
+    yield from prepare(blender)
+    settings = brush(blender)
+    settings.brush, settings.height = "RAISE", 8.0
+    yield from stroke(blender, "ridge", (-27.0, -6.0), (27.0, 12.0), *HOW)
+    settings.brush = "LOCK"
+    words, pixels = draw(blender, *BOX, before="key b sleep 0.4")
+    yield from act(blender, *words)
+    keep(blender, "box")
+    blender.SEEN["box"]["path"] = pixels
+    words, pixels = draw(
+        blender,
+        *EIGHT,
+        before="keydown ctrl keydown shift sleep 0.2",
+        after="keyup shift keyup ctrl",
+    )
+    yield from act(blender, *words)
+    keep(blender, "lasso")
+    blender.SEEN["lasso"]["path"] = pixels
+    yield from act(blender, to(on_the_screen(blender, 0.0, 33.0)), "key ctrl+z")
+    keep(blender, "lasso undone")
+    words, _ = draw(
+        blender,
+        (10.0, -28.0),
+        (28.0, -16.0),
+        before="key b sleep 0.4 keydown ctrl sleep 0.2",
+        after="keyup ctrl",
+    )
+    yield from act(blender, *words)
+    keep(blender, "box with ctrl")
+    words, _ = draw(blender, (60.0, 60.0), (61.0, 61.0), before="key b sleep 0.4")
+    yield from act(blender, *words)
+    keep(blender, "nothing inside")
+    height = bpy.ops.digiclay.press_locks_height
+    yield from change(blender, "by height", height, side="ABOVE", height=4.0)
+    blender.shot("locks_skin")
+    for what in ("BLUR", "BLUR"):
+        yield from change(blender, "blurred", bpy.ops.digiclay.press_locks, change=what)
+    blender.shot("locks_skin_blurred")
+    blender.beds()[0].digiclay_display.form = "pins"
+    yield from blender.rounds(8)
+    blender.shot("locks_pins_blurred")
+    blender.beds()[0].digiclay_display.form = "skin"
+    yield from blender.rounds(8)
+    settings.brush = "ERASE"
+    yield from stroke(blender, "erased", (-27.0, -6.0), (27.0, 12.0), *HOW)
+    keep(blender, "erased")
+    blender.shot("locks_erased")
+    yield from change(blender, "cleared", bpy.ops.digiclay.press_locks, change="CLEAR")
+    blender.shot("locks_skin_cleared")
+    blender.beds()[0].digiclay_display.form = "pins"
+    yield from blender.rounds(8)
+    blender.shot("locks_pins_cleared")
+    for name in ("skin", "pins_blurred", "skin_cleared", "pins_cleared"):
+        pixels = read_shot(f"locks_{name}", blender)
+        blender.SEEN[f"white {name}"] = int((pixels > 0.98).all(axis=-1).sum())
