@@ -94,6 +94,15 @@ def test_pins_that_were_made_real_stay_in_the_scene_as_long_as_the_user_wants():
     assert counts == [25, 25, 25, 0, 25]
 
 
+def test_a_mesh_that_a_bed_was_converted_to_comes_alone_beside_the_bed():
+    bed = added()
+    for kind in ("MESH", "CURVE"):
+        bpy.ops.object.convert(target=kind, keep_original=kind == "MESH")
+        done("Convert")
+        others = set(bpy.context.scene.objects) - {bed, *bed.children_recursive}
+        assert others == {bpy.context.object}
+
+
 @pytest.mark.parametrize("by_hand", [True, False])
 def test_undo_stops_where_the_fingertip_of_a_copy_was_deleted(by_hand):
     copy = duplicate(added())

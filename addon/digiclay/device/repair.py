@@ -28,6 +28,7 @@ from ..roles import (
     ROLE,
     ellipsoid,
     fingertips_of,
+    is_bed,
     is_linked,
     is_local,
     owner_of,
@@ -79,10 +80,11 @@ def mark_parts() -> frozenset[int]:
 
 def find_faults(known: frozenset[int], mended: frozenset[int] = frozenset()) -> Faults:
     """Return what is to be put right."""
-    bare = [each for each in _standing(BED) + _standing(PALM) if any(_lacking(each, known, mended))]
-    tips = _standing(FINGERTIP)
+    beds, tips = _standing(BED), _standing(FINGERTIP)
+    # Object > Convert leaves a mesh with faces, which needs no fingertip.
+    owners = [bed for bed in beds if is_bed(bed) and not bed.data.polygons] + _standing(PALM)
+    bare = [each for each in owners if any(_lacking(each, known, mended))]
     bare += [tip for tip in tips if _lacks_part(tip, BALL, known, mended)]
-    beds = _standing(BED)
     held = {bed.get(name) for bed in beds for name in FINGERS}
     tips_of_beds = {tip for _, _, tip in _tips()}
     # Held, but by another bed: it was given to this one.
