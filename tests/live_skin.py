@@ -7,8 +7,9 @@ def interpolate(lattice, height, kind):
     """Return the heights of a skin, as the geometry nodes of a bed work them out, m."""
     for step in (lattice.along, lattice.across):
         before, after = height - height[step.previous], height[step.following] - height
-        product, total = np.maximum(before * after, 0.0), before + after
-        slope = np.divide(2.0 * product, total, out=np.zeros_like(total), where=total != 0.0)
-        value, weights = np.column_stack([height, slope]), step.weights[kind]
+        value, weights = (
+            np.column_stack([height, before + after, after - before]),
+            step.weights[kind],
+        )
         height = (value[step.low] * weights.low + value[step.high] * weights.high).sum(axis=1)
     return height

@@ -25,6 +25,7 @@ def formed(unit, form):
     height = 0.04 + 0.001 * np.arange(ROWS * COLUMNS) ** 0.7
     bridge.write_cells(bed.data, cells["position"], height)
     bed.digiclay_display.form = form
+    bed.digiclay_display.skin = "membrane"  # which goes through every pin; the smooth one rounds
     bpy.context.view_layer.update()
     return bed
 

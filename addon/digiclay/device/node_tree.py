@@ -331,7 +331,7 @@ def _prefixed(tree: NodeTree, words: str, kind: NodeSocket) -> NodeSocket:
 
 
 def _store_pair(tree: NodeTree, table: NodeSocket) -> NodeSocket:
-    """Add the nodes that store height and slope: the harmonic mean of the slopes on both sides, or 0."""
+    """Add the nodes that store height, slope and bend: sum and difference of the rises on both sides."""
     here = attribute(tree, VALUE, "FLOAT")
     sides = []
     for name in (PREVIOUS, FOLLOWING):
@@ -341,17 +341,12 @@ def _store_pair(tree: NodeTree, table: NodeSocket) -> NodeSocket:
         sides.append(enabled(read.outputs, "Value"))
     before = number(tree, "SUBTRACT", here, sides[0])
     after = number(tree, "SUBTRACT", sides[1], here)
-    product = number(tree, "MULTIPLY", before, after)
-    same_way = number(tree, "MAXIMUM", product, 0.0)
-    twice = number(tree, "MULTIPLY", same_way, 2.0)
-    total = number(tree, "ADD", before, after)
-    slope = number(tree, "DIVIDE", twice, total)  # Blender divides by 0 to 0
-    pair = combine(tree, X=here, Y=slope)
-    return store(tree, table, PAIR, "FLOAT_VECTOR", pair)
+    slope, bend = number(tree, "ADD", before, after), number(tree, "SUBTRACT", after, before)
+    return store(tree, table, PAIR, "FLOAT_VECTOR", combine(tree, X=here, Y=slope, Z=bend))
 
 
 def _sum(tree: NodeTree, table: NodeSocket, names: list[NodeSocket]) -> NodeSocket:
-    """Add the nodes that add up heights and slopes of two neighbors."""
+    """Add the nodes that add up heights, slopes and bends of two neighbors."""
     pair = attribute(tree, PAIR, "FLOAT_VECTOR")
     parts = []
     for side, name in zip((LOW, HIGH), names, strict=True):

@@ -200,7 +200,7 @@ def _write_weights(mesh: Mesh, step: Pass) -> None:
         mesh.attributes.new(name, "INT", "POINT").data.foreach_set("value", values)
     for kind, weights in step.weights.items():
         for name, share in zip(WEIGHTS, weights, strict=True):
-            attribute = mesh.attributes.new(name + kind, "FLOAT2", "POINT")
+            attribute = mesh.attributes.new(name + kind, "FLOAT_VECTOR", "POINT")
             attribute.data.foreach_set("vector", share.astype(np.float32).ravel())
 
 

@@ -2,9 +2,11 @@
 
 The skin is interpolated along the rows of pins, then across them. For each of the two passes the
 points and their weights are prepared once. What remains for a new state is, at every point, a
-weighted sum of heights and slopes of two neighbors.
+weighted sum of heights, slopes and bends of two neighbors: cubic B-splines in Hermite's form.
 
-*smooth* and *membrane* are those of `core.surface.skins`.
+*membrane* is that of `core.surface.skins`. *smooth* is a uniform cubic B-spline: a spline through the
+pins, as that of the exports, shows steps of the rows in a rounded wall. What is level over three pins
+each way is drawn at its height, a single pin at 4/9 of it.
 """
 
 from typing import NamedTuple
@@ -31,7 +33,10 @@ SLACK = 1e-6
 
 
 class Weights(NamedTuple):
-    """Weights of (height, slope) of the two neighbors of every point, (m, 2) each."""
+    """Weights of height, slope and bend of the two neighbors of every point, (m, 3) each.
+
+    Slope is the sum of the rises to and from a neighbor, bend their difference.
+    """
 
     low: Floats
     high: Floats
@@ -40,8 +45,7 @@ class Weights(NamedTuple):
 class Pass(NamedTuple):
     """Interpolation along one direction."""
 
-    #: (k,), neighbors of each of the k values that are interpolated, for its slope; itself at an
-    #: end.
+    #: (k,), neighbors of each of the k values that are interpolated; itself at an end, which is level.
     previous: Indices
     following: Indices
     #: (m,), the two values each of the m points is between.
@@ -130,11 +134,11 @@ def _find_cells(place: Floats, count: int) -> tuple[Indices, Floats]:
 
 
 def _neighbors(index: Indices, axis: int) -> tuple[Indices, Indices]:
-    """Return the neighbors of every value along an axis; the end values are their own."""
+    """Return the neighbors of every value along an axis; those of an end value are itself."""
     last = index.shape[axis] - 1
     step = np.arange(last + 1)
-    before = np.take(index, np.maximum(step - 1, 0), axis)
-    after = np.take(index, np.minimum(step + 1, last), axis)
+    inside = (step > 0) & (step < last)
+    before, after = (np.take(index, step + side * inside, axis) for side in (-1, 1))
     return before.ravel(), after.ravel()
 
 
@@ -142,14 +146,16 @@ def _weigh(share: Floats, cap: float) -> dict[str, Weights]:
     """Return the weights at shares of the way between two pins, whose flat ends have a radius in pitches."""
     square, cube = share**2, share**3
     rise = 3.0 * square - 2.0 * cube
-    smooth = Weights(
-        np.column_stack([1.0 - rise, cube - 2.0 * square + share]),
-        np.column_stack([rise, cube - square]),
-    )
+    low, high = 0.5 * (cube - 2.0 * square + share), 0.5 * (cube - square)
     line, none = flatten_share(share, cap), np.zeros_like(share)
     return {
-        "smooth": smooth,
-        "membrane": Weights(np.column_stack([1.0 - line, none]), np.column_stack([line, none])),
+        "smooth": Weights(
+            np.column_stack([1.0 - rise, low, (1.0 - rise) / 6.0]),
+            np.column_stack([rise, high, rise / 6.0]),
+        ),
+        "membrane": Weights(
+            np.column_stack([1.0 - line, none, none]), np.column_stack([line, none, none])
+        ),
     }
 
 

@@ -48,7 +48,12 @@ FORMS = (
     ("both", "Both", "Pins under a clear skin"),
 )
 SKINS = (
-    ("smooth", "Smooth", "Smooth through the tops of the pins, and never beyond them"),
+    (
+        "smooth",
+        "Smooth",
+        "Smooth over the tops of the pins, without steps and never beyond them. Edges are rounded; "
+        "the membrane and exported meshes go through every pin",
+    ),
     ("membrane", "Membrane", "Stretched over the flat ends of the pins"),
 )
 
