@@ -329,6 +329,12 @@ def test_what_gives_no_stroke_is_refused_in_a_line_and_nothing_is_lost(
     assert len(queue()) == 1
 
 
+def test_a_bed_in_another_scene_is_not_formed_by_curves_of_this_one(settings):
+    bpy.context.window.scene = bpy.data.scenes.new("Other")
+    with in_the_view(), pytest.raises(RuntimeError, match=r"Select a bed|not in this view layer"):
+        form(lay([(0, 0), (9, 9)]))
+
+
 @pytest.mark.parametrize(
     "name, fill, words", [("STAMP", False, "another one along"), ("SMOOTH", True, "must be Raise")]
 )

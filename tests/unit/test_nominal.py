@@ -8,7 +8,7 @@ import pytest
 from digiclay.core.control.blister import Blister
 from digiclay.core.model.fingertip import Fingertip
 from digiclay.core.model.layout import Layout, make_grid
-from digiclay.strokes.nominal import Device, extend, find_ghosts, find_nominal
+from digiclay.strokes.nominal import Device, Ghost, extend, find_ghosts, find_nominal
 from digiclay.strokes.stroke import Brush, deepen, lay_path, lay_ring, make_images, start
 from numpy.testing import assert_array_equal
 
@@ -169,3 +169,17 @@ def test_a_ghost_that_is_drawn_on_is_that_of_the_whole_path_and_others_stay():
     assert np.array_equal(other.height, form(stroke(WAVE)))
     raised = find_ghosts((first,), DEVICE, FLAT + 1e-3, kept)[0].nominal
     assert np.array_equal(raised.before, FLAT + 1e-3)
+
+
+def test_each_stroke_of_a_long_queue_is_compared_with_one_ghost(monkeypatch):
+    queue = tuple(replace(stroke(LINE[:1]), number=number) for number in range(1, 41))
+    kept, compare, compared = find_ghosts(queue, DEVICE, FLAT), Ghost.has_grown, []
+
+    def note(ghost, *given):
+        compared.append(ghost.stroke.number)
+        return compare(ghost, *given)
+
+    monkeypatch.setattr(Ghost, "has_grown", note)
+    again = find_ghosts(queue, DEVICE, FLAT, kept)
+    assert compared == [one.number for one in queue]
+    assert all(new.nominal is old.nominal for new, old in zip(again, kept, strict=True))

@@ -445,17 +445,13 @@ class Ghost:
     device: Device
 
     def has_grown(self, stroke: Stroke, before: Floats, device: Device) -> bool:
-        """Tell whether a stroke, on pins at heights (n,), m, is this one drawn on."""
+        """Tell whether the stroke of its number, on pins at heights (n,), m, is this one drawn on."""
         if stroke.from_base and self.device.base is not device.base:
             return False
         if not np.array_equal(self.device.shares, device.shares):
             return False
         former, count = self.stroke, self.nominal.count
-        same = (
-            former.number == stroke.number
-            and former.images == stroke.images
-            and former.turn is stroke.turn
-        )
+        same = former.images == stroke.images and former.turn is stroke.turn
         same = same and former.samples[count - 1 :][:1] == stroke.samples[count - 1 :][:1]
         return same and float(np.abs(self.nominal.before - before).max()) < SAME
 
@@ -467,15 +463,15 @@ def find_ghosts(
 
     The `former` ones, of an earlier look, are drawn on: that takes less time than a whole path.
     """
-    ghosts: list[Ghost] = []
+    ghosts, numbered = list[Ghost](), {ghost.stroke.number: ghost for ghost in former}
     for stroke in strokes:
         if stroke.brush is Brush.SET_BASE:
             device = replace(device, base=height)
         if stroke.brush in LIMITS or stroke.placed:
             before = height if stroke.height is None else stroke.height
-            same = [ghost.nominal for ghost in former if ghost.has_grown(stroke, before, device)]
-            suited = device.suit(stroke)
-            nominal = same[0] if same else find_nominal(stroke, suited, before)
+            suited, ghost = device.suit(stroke), numbered.get(stroke.number)
+            same = ghost is not None and ghost.has_grown(stroke, before, device)
+            nominal = ghost.nominal if ghost and same else find_nominal(stroke, suited, before)
             if nominal.count < len(stroke.samples):
                 nominal = extend(nominal, stroke, suited)
             ghosts.append(Ghost(stroke, nominal, device))
