@@ -55,19 +55,12 @@ class CellTrial:
 
     def open(self, lag: float, delay: float) -> tuple[Floats, Floats, Floats]:
         """Return the openings at the nodes, and their derivatives by lag and dead time."""
-        level = slope = 0.0
-        before = 0.0
-        starts, slopes = np.zeros(len(self.events) + 1), np.zeros(len(self.events) + 1)
         commands = np.concatenate(([0.0], self.commands))
-        gaps = np.diff(self.events).tolist()
-        for number, gap in enumerate((math.inf, *gaps)):
-            stay = math.exp(-gap / lag) if gap < math.inf else 0.0
-            away = level - before
-            if number:
-                slope = slope * stay + away * stay * gap / lag**2
-            level = before + away * stay
-            before = float(self.commands[number]) if len(self.events) else 0.0
-            starts[number + 1 : number + 2], slopes[number + 1 : number + 2] = level, slope
+        starts, slopes = np.zeros(commands.size), np.zeros(commands.size)
+        for number, gap in enumerate(np.diff(self.events).tolist(), 1):
+            stay, away = math.exp(-gap / lag), starts[number] - commands[number]
+            starts[number + 1] = commands[number] + away * stay
+            slopes[number + 1] = (slopes[number] + away * gap / lag**2) * stay
         place = np.searchsorted(self.events, self.nodes - delay, side="right")
         first = np.concatenate(([0.0], self.events + delay))
         since = np.where(place > 0, self.nodes - first[place], 0.0)
@@ -92,14 +85,16 @@ class CellModel:
     def __init__(self, scene: Scene, trials: Sequence[Trial], groups: Sequence[str]) -> None:
         self.trials, self.groups = [CellTrial(trial) for trial in trials], tuple(groups)
         self.measured = np.concatenate([trial.answer for trial in trials])
-        if np.ptp(self.measured) >= scene.actuator.stroke:
+        longest = max(float(np.ptp(trial.answer)) for trial in trials)
+        if longest >= scene.actuator.stroke:
             rule = f"must change by less than actuator.stroke, {scene.actuator.stroke:g} m"
-            raise DigiclayError(f"height {rule} (got {np.ptp(self.measured):g} m).")
+            raise DigiclayError(f"height {rule} (got {longest:g} m).")
         self.valve, self.fluid, self.area = scene.valve, scene.fluid, scene.actuator.area
         orifice = select_law("valve", scene.valve).flow_law(scene.fluid)
         self.power = orifice.power
         self.resistance = scene.conduit.resistance(scene.fluid) if scene.conduit else 0.0
-        lag = scene.valve_lag.time_constant if scene.valve_lag else 1e-3
+        absent = 1e-3 if "lag" in groups else 1e-9
+        lag = scene.valve_lag.time_constant if scene.valve_lag else absent
         dead = scene.delay.dead_time if scene.delay else 0.0
         self.usual = {
             "supply.high": scene.supply.high,
