@@ -233,9 +233,10 @@ def taken_back(blender):
         note(blender, name)
 
 
-def follow(blender, recorded_stroke):
+def follow(blender, recorded_stroke, *keys):
     start, *moves = recorded_stroke.moves
-    words, before = [to(on_the_screen(blender, 1e3 * start[1], 1e3 * start[2])), "mousedown 1"], 0.0
+    words, before = [to(on_the_screen(blender, 1e3 * start[1], 1e3 * start[2]))], 0.0
+    words += [*keys, "mousedown 1"]
     for time, x, y in moves:
         words.append(to(on_the_screen(blender, 1e3 * x, 1e3 * y), time - before))
         before = time
@@ -250,7 +251,7 @@ def things(blender):
     usual = tuple(bpy.context.window_manager.digiclay_finger)
     for name, recorded in drawn:
         note(blender, f"before {name}")
-        for one in recorded.strokes:
+        for number, one in enumerate(recorded.strokes):
             axes = one.length, one.width, one.thickness
             size = [1e3 * given or other for given, other in zip(axes, usual, strict=True)]
             if not np.allclose(bpy.context.window_manager.digiclay_finger, size):
@@ -261,7 +262,9 @@ def things(blender):
                 )
                 bpy.context.window_manager.digiclay_finger = size
             choose(blender, one)
-            yield from done(blender, hand(follow(blender, one)))
+            # They were drawn on the surface as it was, when there was no base.
+            keys = ["key y sleep 0.1"] if number else []
+            yield from done(blender, hand(follow(blender, one, *keys)))
         yield from blender.until(lambda: not any(session.strokes for session in blender.sessions()))
         yield from blender.settle()
         blender.shot(f"thing_{name}")
@@ -275,5 +278,3 @@ def choose(blender, stroke):
     settings.path, settings.symmetry = stroke.path.upper(), stroke.symmetry.upper()
     settings.radial, settings.depth = stroke.radial, 1e3 * stroke.depth
     settings.height = 1e3 * stroke.height
-    # Things of the gallery were drawn on the surface, when there was no base.
-    settings.accumulate = stroke.accumulate or stroke.combine == "usual"
