@@ -19,7 +19,7 @@ DRAWN = {
     "R": ("RAISE", 8.0, AS_DRAWN),
     "X": ("LOWER", -4.0, TURNED),
     "logo": ("RAISE", 8.0, TURNED),
-    "face": ("RAISE", 8.0, TURNED),
+    "face": ("RAISE", 8.0, AS_DRAWN),
     "map": ("RAISE", 8.0, AS_DRAWN),
 }
 
