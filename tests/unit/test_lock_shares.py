@@ -83,6 +83,8 @@ def test_locks_grow_shrink_and_blur_by_the_pins_beside_each(arrangement, beside)
     grown = change(Brush.GROW_LOCKS, ONE)
     assert sorted(np.flatnonzero(grown)) == sorted(around)
     assert_array_equal(change(Brush.SHRINK_LOCKS, grown), ONE)
+    # Beyond an edge of the bed there is nothing, and not the last pin.
+    assert not change(Brush.GROW_LOCKS, np.eye(15)[14])[:5].any()
     assert_array_equal(change(Brush.SHRINK_LOCKS, 1.0 - ONE), 1.0 - grown)
     blurred = change(Brush.BLUR_LOCKS, ONE)
     assert_near(blurred, grown / len(around), 1e-15)
@@ -261,6 +263,8 @@ def test_a_line_of_a_stroke_keeps_its_pins_and_none_that_are_wrong():
         stroke = lay(Brush.LOCK_PINS, pins=pins)
         assert drawn.load(drawn.dump(stroke)).pins == pins
     assert "pins" not in drawn.dump(lay(Brush.LOCK_PINS))
+    high = lay(Brush.LOCK_PINS, limits=(5e-3, np.inf))
+    assert drawn.load(drawn.dump(high)).limits == high.limits
     line = drawn.dump(lay(Brush.LOCK_PINS, pins=(3,)))
     for wrong in ("[-1]", "[1.5]", "[true]", '["3"]', "3", "[[3]]", "[null]", "[NaN]"):
         assert drawn.load(line.replace("[3]", wrong)) is None
