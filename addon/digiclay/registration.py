@@ -7,7 +7,7 @@ from . import command_line, manual_map, operators, panels, preferences, translat
 from .device import detail, part_watch
 from .exchange import image_reader
 from .live import handlers
-from .press import brush, ghost, lock_marks, tool
+from .press import brush_presets, ghost, lock_marks, tool
 from .settings import properties
 
 #: Each has a function `register` and one `unregister`. Properties come first: panels draw them.
@@ -15,7 +15,7 @@ MODULES: tuple[ModuleType, ...] = (
     properties,
     image_reader,
     preferences,
-    brush,
+    brush_presets,
     operators,
     panels,
     tool,

@@ -1,5 +1,7 @@
 """Clicks past a cube in all kinds of views; sets sizes with F, draws symmetric strokes, lines and rings."""
 
+from pathlib import Path
+
 import bpy
 import numpy as np
 from mathutils import Vector
@@ -41,6 +43,7 @@ def script(blender):
     # The first press starts the session.
     yield from act(blender, to(on_the_screen(blender, -24.0, -24.0)), "click 1")
     yield from sizes(blender)
+    yield from brushes(blender)
     yield from reset(blender)
     # What Ctrl-Z goes back to: a reset has no step of its own.
     bpy.ops.ed.undo_push(message="Reset")
@@ -59,6 +62,7 @@ def write_down(blender, name):
         "blister": bed.digiclay.blister.radius,
         "depth": settings.depth,
         "strength": settings.strength,
+        "brush": settings.brush,
     }
 
 
@@ -95,6 +99,36 @@ def sizes(blender):
     yield from done(blender, "click 1", name="deeper")
     yield from done(blender, keys("ctrl+f 4 Return shift+f 5 0 Return"), name="strength")
     yield from done(blender, keys("shift+f 1 0 0 Return"))
+
+
+def brushes(blender):
+    """Choose brushes by the pie, give one another size, and come back; open the presets."""
+    middle = on_the_screen(blender, 0.0, 0.0)
+    right, left = ((middle[0] + way, middle[1]) for way in (110, -110))
+
+    def choose(at, name=""):
+        yield from done(blender, to(middle), keys("e"))
+        yield from done(blender, to(at, 0.3), "click 1", name=name)
+
+    yield from choose(right, "raise chosen")
+    yield from done(blender, to(middle), keys("f 2 4 Return shift+f 3 0 Return"), name="raise")
+    yield from choose(left, "lower again")
+    yield from choose(right, "raise again")
+    yield from done(blender, keys("ctrl+z"), name="raise undone")
+    yield from choose(left)
+    view = bpy.context.preferences.view
+    for language in ("de_DE", "en_US"):
+        view.language = language
+        blender.call(bpy.ops.wm.call_panel, "INVOKE_DEFAULT", name="DIGICLAY_PT_press_presets")
+        yield from rest(blender)
+        blender.shot(f"presets_{language}")
+        yield from done(blender, keys("Escape"))
+        yield from done(blender, to(middle), keys("e"))
+        blender.shot(f"pie_{language}")
+        yield from done(blender, keys("Escape"))
+    presets, settings = blender.part("press.brush_presets"), brush(blender)
+    files = Path(presets.HOME, "presets", presets.SUBFOLDER).glob("*.py")
+    blender.SEEN["icons"] = [presets.find_icon(file, settings) for file in files]
 
 
 def symmetric(blender):

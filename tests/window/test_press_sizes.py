@@ -38,6 +38,33 @@ def test_depth_and_strength_have_keys_of_their_own(seen):
     )
 
 
+#: Brush, size, mm, and strength after brushes were chosen by the pie.
+CHOSEN = {
+    "raise chosen": ("RAISE", 16.0, 1.0),
+    "raise": ("RAISE", 24.0, 0.3),
+    "lower again": ("LOWER", 16.0, 1.0),
+    "raise again": ("RAISE", 24.0, 0.3),
+    "raise undone": ("RAISE", 16.0, 0.3),
+}
+
+
+@pytest.mark.parametrize("name", CHOSEN)
+def test_e_opens_a_pie_of_brushes_and_each_has_its_size_and_strength_while_the_session_goes_on(
+    seen, name
+):
+    kind, size, strength = CHOSEN[name]
+    found = [seen[name][key] for key in ("size", "drawn size", "simulated")]
+    assert (seen[name]["brush"], seen[name]["strength"]) == (kind, pytest.approx(strength))
+    assert found == pytest.approx([size] * 3, abs=1e-3)
+    assert seen[name]["sessions"] == 1
+
+
+def test_each_preset_has_a_picture_of_its_own(seen):
+    icons = seen["icons"]
+    assert len(set(icons)) == len(icons) == 6
+    assert min(icons) > 0
+
+
 def test_a_symmetric_stroke_forms_its_images_and_is_one_undo_step(seen):
     (start, y), (end, _) = MIRRORED
     columns = np.arange(round(start / 3) + 12, round(end / 3) + 13)

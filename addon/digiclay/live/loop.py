@@ -116,8 +116,14 @@ def redraw_status() -> None:
         window.workspace.status_text_set_internal(None)
 
 
+#: Beginning of the names of operators that tell their keys themselves.
+TOLD = "DIGICLAY_OT_press"
+
+
 def draw(header: Header, context: Context) -> None:
-    """Draw the keys of a running session in the status bar."""
+    """Draw the keys of a running session in the status bar, unless the Press tool tells its own there."""
+    if any(each.bl_idname.startswith(TOLD) for each in context.window.modal_operators):
+        return
     row = header.layout.row()
     paused = all(session.paused for session in running.list_sessions())
     row.label(

@@ -17,14 +17,14 @@ from ..core.model.fingertip import Fingertip
 from ..core.surface.pointing import find_contact_outline
 from ..live.beds import Use, find_obstacle
 from ..panels.base import menu
-from ..press import aim, brush, tool
+from ..press import aim, brush, brush_presets, tool
 from ..press.brush import FINGERS
 from ..roles import fingertip_of
 from ..settings import devices
 from ..settings.declared import choice, number
 from ..strokes.stroke import DEEPEST, SHALLOWEST, Brush, Place
 from ..ui_text import localize
-from .action import Action, Drawing, Polled, Result, action, show_status
+from .action import Action, Drawing, Polled, Result, action, inform, show_status
 from .poll_messages import no_finger, no_tool_in_view
 
 #: Factor of the mouse's way with Shift held down.
@@ -323,18 +323,8 @@ def apply_brush(operator: Operator, context: Context) -> None:
     """Set fingertip, brush, stroke and symmetry of the Press tool to those of a preset"""
     settings: OperatorProperties = brush.tool_settings(context)
     file = Path(operator.filepath)
-    brush.apply_preset(settings, brush.read_preset(file, settings))
-    BrushMenu.bl_label = bpy.path.display_name(file.name)
-
-
-class BrushMenu(bpy.types.Menu):
-    """Brush presets that come along, then the user's own."""
-
-    bl_idname = "DIGICLAY_MT_brushes"
-    bl_label = "Presets"
-    preset_subdir = brush.SUBFOLDER
-    preset_operator = apply_brush.bl_idname
-    draw = bpy.types.Menu.draw_preset
+    brush_presets.apply_preset(settings, brush_presets.read_preset(file, settings))
+    bpy.types.DIGICLAY_PT_press_presets.bl_label = bpy.path.display_name(file.name)
 
 
 class SaveBrush(AddPresetBase, Polled, Operator):
@@ -343,11 +333,21 @@ class SaveBrush(AddPresetBase, Polled, Operator):
     bl_idname = "digiclay.press_brush_save"
     bl_label = "Save Brush Preset"
     needs = no_tool_in_view, no_finger
-    preset_menu = BrushMenu.bl_idname
-    preset_subdir = brush.SUBFOLDER
-    preset_defines = brush.DEFINES
+    preset_menu = "DIGICLAY_PT_press_presets"
+    preset_subdir = brush_presets.SUBFOLDER
+    preset_defines = brush_presets.DEFINES
+
+    def execute(self, context: Context) -> Result:
+        """Save it; a folder that cannot be written is told of."""
+        folder = Path(bpy.utils.user_resource("SCRIPTS"), "presets", brush_presets.SUBFOLDER)
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            return super().execute(context)
+        except OSError as error:
+            inform(self, "The preset could not be saved: {}", error, level="ERROR")
+            return {"CANCELLED"}
 
     @property
     def preset_values(self) -> list[str]:
         """What the preset stores."""
-        return brush.preset_values(brush.tool_settings(bpy.context))
+        return brush_presets.preset_values(brush.tool_settings(bpy.context))

@@ -23,6 +23,7 @@ from ..exchange.shape_show import read_relief
 from ..live import beds
 from ..press import aim, brush, tool
 from ..sessions.sculpting import queue_stroke
+from ..settings import devices
 from ..settings.declared import flag
 from ..strokes.curve_paths import join_edges, lay_lines, refuse_paths
 from ..strokes.stamps import cut_stamp
@@ -30,7 +31,7 @@ from ..strokes.stroke import STAMPS, Brush
 from ..ui_text import localize
 from .action import Result, action
 from .poll_messages import Need, no_finger, no_view
-from .press_stroke import lay_stroke, open_session
+from .press_stroke import open_session
 
 #: Objects with lines, and those of them that Blender can fill.
 LINED, FILLED = ("CURVE", "FONT", "CURVES", "GREASEPENCIL", "GPENCIL"), ("CURVE", "FONT")
@@ -152,6 +153,7 @@ def form_curves(operator: Operator, context: Context) -> Result | None:
     settings: OperatorProperties = brush.tool_settings(context)
     bed, kind, things = brush.bed_in_use(context), Brush(settings.brush), list_curves(context)
     brush.take_finger(context, bed)
+    sizes = devices.read_sizes(bed)
     context.view_layer.update()
     grid, _ = aim.read_surface(bed)
     if operator.fill:
@@ -161,7 +163,9 @@ def form_curves(operator: Operator, context: Context) -> Result | None:
         stamp, path = cut_stamp([_read_filled(context, thing, bed) for thing in things], grid)
         if not stamp.values.any():
             raise ParameterError("Curves", "fill", "must lie over the bed", "none of it does")
-        strokes = [replace(lay_stroke(settings, bed, path, kind, stamp), brush=CUT[kind])]
+        strokes = [
+            replace(brush.lay_stroke(settings, path, kind, stamp=stamp, **sizes), brush=CUT[kind])
+        ]
         words = localize("Stamp queued")
     else:
         if kind in STAMPS:
@@ -175,7 +179,8 @@ def form_curves(operator: Operator, context: Context) -> Result | None:
         refuse_paths(paths)
         # A closed path that accumulates would count at its end from what it has formed.
         strokes = [
-            replace(lay_stroke(settings, bed, path, kind), accumulate=False) for path in paths
+            replace(brush.lay_stroke(settings, path, kind, **sizes), accumulate=False)
+            for path in paths
         ]
         words = localize("Strokes queued: {}", len(paths))
         if left:

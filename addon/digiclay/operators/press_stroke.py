@@ -10,7 +10,6 @@ from ..compat import Area, Context, Event, Object, Operator, OperatorProperties,
 from ..core.base.arrays import Floats
 from ..core.base.errors import DigiclayError
 from ..core.control.methods import METHODS
-from ..core.shapes.heightmap import HeightMap
 from ..live import beds, loop, tick
 from ..press import aim, brush, ghost, pointer, tool
 from ..press.pointer import begin_button, read_event
@@ -26,11 +25,9 @@ from ..strokes.stroke import (
     STAMPS,
     Brush,
     Place,
-    Stroke,
     deepen,
     draw,
     lay_line,
-    lay_path,
     lay_ring,
     lay_square,
     let_go,
@@ -342,7 +339,8 @@ class PressShape(Drawing, Operator):
         length = float(np.hypot(self.to[0] - self.start[0], self.to[1] - self.start[1]))
         self.words = localize(SHAPE_KEYS[self.shape], 1e3 * length)
         settings, bed = brush.tool_settings(context), brush.find_bed(context, self.uid)
-        ghost.plan(self.uid, lay_stroke(settings, bed, self._lay(), self.kind))
+        sizes = devices.read_sizes(bed)
+        ghost.plan(self.uid, brush.lay_stroke(settings, self._lay(), self.kind, **sizes))
         show_status(context, self.words)
         self.region.tag_redraw()
 
@@ -387,28 +385,13 @@ class PressLine(Polled, Operator):
         return _queue_path(self, context, target.bed, path, kind)
 
 
-def lay_stroke(
-    settings: OperatorProperties,
-    bed: Object,
-    path: Floats | list[Place],
-    kind: Brush,
-    stamp: HeightMap | None = None,
-) -> Stroke:
-    """Return the stroke along a path (k, 2), m, as the tool's settings have it, or with another stamp."""
-    share = float(brush.read_own(settings, "strength", kind))
-    depth = 1e-3 * share * getattr(settings, brush.amount_name(kind))
-    (x, y), images = path[0], brush.find_images(settings)
-    stamp = stamp or brush.find_stamp(settings, kind)
-    options = brush.find_options(settings, kind) | devices.read_sizes(bed)
-    return lay_path(start(0, x, y, depth, images, kind, share, stamp=stamp, **options), path)
-
-
 def _queue_path(
     operator: Operator, context: Context, bed: Object, path: Floats | list[Place], kind: Brush
 ) -> Result:
     """Queue a path for the fingertip, as the tool's settings have it."""
     brush.take_finger(context, bed)
-    stroke = lay_stroke(brush.tool_settings(context), bed, path, kind)
+    settings, sizes = brush.tool_settings(context), devices.read_sizes(bed)
+    stroke = brush.lay_stroke(settings, path, kind, **sizes)
     session = open_session(operator, context, bed, kind, stroke.falloff)
     if session is None:
         return {"CANCELLED"}

@@ -2,9 +2,11 @@
 
 from collections.abc import Callable
 from functools import wraps
+from pathlib import Path
 from typing import Any
 
 from ..compat import Context, OperatorProperties, UILayout, bpy
+from ..press import brush_presets
 from ..press.brush import EXTREMES, tool_settings
 from ..press.tool import draw_curves, draw_presets
 from ..strokes.nominal import LIMITS
@@ -12,7 +14,9 @@ from ..strokes.stroke import COMBINATIONS, LOCKS, STAMPS, Brush
 from .base import declare
 
 
-def popover(idname: str, label: str) -> Callable[[Callable[[UILayout, Context], None]], Any]:
+def popover(
+    idname: str, label: str, width: int = 12
+) -> Callable[[Callable[[UILayout, Context], None]], Any]:
     """Return a decorator that makes a panel, opened from the tool's header, of what draws its settings."""
 
     def make(draw_settings: Callable[[UILayout, Context], None]) -> Any:
@@ -30,7 +34,7 @@ def popover(idname: str, label: str) -> Callable[[Callable[[UILayout, Context], 
             label,
             bl_space_type="VIEW_3D",
             bl_region_type="HEADER",
-            bl_ui_units_x=12,
+            bl_ui_units_x=width,
             poll=classmethod(lambda cls, context: tool_settings(context) is not None),
         )(wraps(draw_settings)(draw))
 
@@ -80,6 +84,26 @@ def _draw(column: UILayout, settings: OperatorProperties, name: str, *, enabled:
     row.prop(settings, name)
 
 
+#: Columns of presets, and height of a picture, in Blender's units.
+COLUMNS, PICTURE = 3, 5.0
+
+
+@popover("DIGICLAY_PT_press_presets", "Presets", 20)
+def presets(column: UILayout, settings: OperatorProperties) -> None:
+    """Brush presets that come along, then the user's own; what keeps one, and removes that applied last."""
+    grid = column.grid_flow(row_major=True, columns=COLUMNS, even_columns=True)
+    folders = map(Path, bpy.utils.preset_paths(brush_presets.SUBFOLDER))
+    for file in (file for folder in folders for file in sorted(folder.glob("*.py"))):
+        entry = grid.column(align=True)
+        # One that cannot be read has no picture, and says why when it is chosen.
+        entry.template_icon(brush_presets.find_icon(file, settings), scale=PICTURE)
+        words = bpy.path.display_name(file.stem, title_case=False)
+        entry.operator("digiclay.press_brush", text=words).filepath = str(file)
+    row = column.row(align=True)
+    row.operator("digiclay.press_brush_save", text="Save", icon="ADD")
+    row.operator("digiclay.press_brush_save", text="Remove", icon="REMOVE").remove_active = True
+
+
 @popover("DIGICLAY_PT_press_pen", "Pen")
 def pen_options(column: UILayout, settings: OperatorProperties) -> None:
     """Effects of a pen's pressure and tilt."""
@@ -88,4 +112,4 @@ def pen_options(column: UILayout, settings: OperatorProperties) -> None:
     column.prop(settings, "use_tilt")
 
 
-CLASSES = (stroke_options, pen_options)
+CLASSES = (stroke_options, presets, pen_options)

@@ -1,15 +1,13 @@
 """Settings of the Press tool: brush, finger and presets, and the text beside the cursor."""
 
-import ast
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import astuple, dataclass
-from pathlib import Path
 from typing import Any
 
 from ..compat import Context, Event, Object, OperatorProperties, bpy
-from ..core.base.errors import DigiclayError, one_line
-from ..core.files.tables import Record, show_value
+from ..core.base.arrays import Floats
+from ..core.files.tables import Record
 from ..core.model.fingertip import Fingertip
 from ..core.shapes.fitting import list_shapes
 from ..core.shapes.heightmap import HeightMap
@@ -18,7 +16,19 @@ from ..roles import bed_of, is_bed
 from ..settings import devices
 from ..strokes.falloff import Falloff
 from ..strokes.stamps import load_stamp
-from ..strokes.stroke import COMBINATIONS, LOCKS, STAMPS, Brush, Combine, Image, make_images
+from ..strokes.stroke import (
+    COMBINATIONS,
+    LOCKS,
+    STAMPS,
+    Brush,
+    Combine,
+    Image,
+    Place,
+    Stroke,
+    lay_path,
+    make_images,
+    start,
+)
 from ..ui_text import localize
 from .aim import PLANE, SURFACE
 
@@ -204,6 +214,19 @@ def find_options(settings: OperatorProperties, brush: Brush) -> dict[str, Any]:
     return options
 
 
+def lay_stroke(
+    settings: OperatorProperties, path: Floats | list[Place], kind: Brush, **more: Any
+) -> Stroke:
+    """Return the stroke along a path (k, 2), m, as the tool's settings have it; `more`: of `Stroke`."""
+    share = float(read_own(settings, "strength", kind))
+    depth = 1e-3 * share * getattr(settings, amount_name(kind))
+    options = find_options(settings, kind) | more
+    if "stamp" not in more:
+        options["stamp"] = find_stamp(settings, kind)
+    (x, y), images = path[0], find_images(settings)
+    return lay_path(start(0, x, y, depth, images, kind, share, **options), path)
+
+
 def tool_settings(context: Context) -> OperatorProperties | None:
     """Return the settings of the Press tool, or None while another tool is in use."""
     tool = context.workspace.tools.from_space_view3d_mode("OBJECT", create=False)
@@ -330,102 +353,3 @@ def describe_queue(brush: Brush, waiting: int, seconds: float | None) -> str:
     more = f" + {waiting}" if waiting else ""
     left = "" if seconds is None else localize(", {:.0f} s", math.ceil(seconds))
     return localize("   Forming: {}", localize(LABELS[brush])) + more + left
-
-
-#: Folder of the presets below ``presets``, here and in the user's own folder.
-SUBFOLDER = "digiclay_press"
-#: Names that the lines of a preset begin with.
-DEFINES = (
-    "wm = bpy.context.window_manager",
-    'settings = bpy.context.workspace.tools.from_space_view3d_mode("OBJECT").operator_properties('
-    f'"{OPERATOR}")',
-)
-#: Name by which they have the fingertip.
-FINGER = "digiclay_finger"
-#: Folder with a folder ``presets``.
-HOME = str(Path(__file__).parents[1])
-
-
-def list_settings(settings: OperatorProperties) -> list[str]:
-    """Return the names of all settings of the tool, the brush before those that come with it."""
-    return [
-        shown.identifier
-        for shown in settings.bl_rna.properties
-        if not shown.is_hidden and shown.identifier != "rna_type"
-    ]
-
-
-def read_preset(file: Path, settings: OperatorProperties) -> Record:
-    """Return what a preset sets. Raises DigiclayError for a file that is none."""
-    try:
-        lines = ast.parse(file.read_text(encoding="utf-8")).body
-        chosen = {
-            line.targets[0].attr: ast.literal_eval(line.value)
-            for line in lines
-            if isinstance(line, ast.Assign) and isinstance(line.targets[0], ast.Attribute)
-        }
-    except (OSError, ValueError, SyntaxError) as error:
-        raise DigiclayError(f"{file.name} cannot be read: {one_line(error)}") from None
-    unknown = chosen.keys() - {FINGER, *list_settings(settings)}
-    if unknown:
-        rule = "must be a setting of the Press tool"
-        raise DigiclayError(f"{file.name}: a key {rule} (got {show_value(min(unknown))}).")
-    return chosen
-
-
-def apply_preset(settings: OperatorProperties, chosen: Record) -> None:
-    """Give the tool the settings of a preset, and else its defaults. Raises DigiclayError."""
-    shown = settings.bl_rna.properties
-    names = list_settings(settings)
-    before = {name: getattr(settings, name) for name in {*shown.keys()} - {"rna_type"}}
-    try:
-        for name in names:
-            value = chosen.get(name, shown[name].default)
-            setattr(settings, name, value)
-        if FINGER in chosen:
-            name, value = FINGER, chosen[FINGER]
-            _take_finger(value)
-    except (DigiclayError, TypeError, ValueError):
-        settings.brush = before["brush"]
-        for each, former in before.items():
-            setattr(settings, each, former)
-        rule = "must be a value of that setting"
-        raise DigiclayError(f"Preset: {name} {rule} (got {show_value(value)}).") from None
-
-
-def preset_values(settings: OperatorProperties) -> list[str]:
-    """Return what a preset keeps: the form of the fingertip, and every setting of the tool."""
-    return [f"wm.{FINGER}", *(f"settings.{name}" for name in list_settings(settings))]
-
-
-def register() -> None:
-    """Let Blender find the presets that come along, and presets the fingertip."""
-    bpy.types.WindowManager.digiclay_finger = bpy.props.FloatVectorProperty(
-        name="Fingertip (mm)",
-        description="Length, width and height of the fingertip that the Press tool is about, in mm",
-        size=3,
-        get=lambda _: _read_finger(),
-        set=lambda _, axes: _take_finger(axes),
-    )
-    bpy.utils.register_preset_path(HOME)
-
-
-def unregister() -> None:
-    """Undo `register`."""
-    bpy.utils.unregister_preset_path(HOME)
-    del bpy.types.WindowManager.digiclay_finger
-
-
-def _read_finger() -> tuple[float, float, float]:
-    """Return the fingertip's length, width and height, mm; that of a new bed without one."""
-    bed = bed_in_use(bpy.context)
-    finger = Fingertip() if bed is None else devices.read_finger(devices.find_first(bed))
-    return 2e3 * finger.length, 2e3 * finger.width, 2e3 * finger.height
-
-
-def _take_finger(axes: Sequence[float]) -> None:
-    """Give the fingertip a length, width and height, mm."""
-    bed = bed_in_use(bpy.context)
-    if bed is not None and not beds.find_obstacle(bpy.context, bed, beds.Use.CHANGE):
-        length, width, height = (round(5e-4 * float(axis), 9) for axis in axes)
-        devices.resize(devices.find_first(bed), Fingertip(length, width, height))

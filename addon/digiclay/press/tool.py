@@ -9,7 +9,16 @@ from typing import Any
 import numpy as np
 
 from .. import bridge, preferences
-from ..compat import Context, Object, OperatorProperties, UILayout, WorkSpaceTool, bpy
+from ..compat import (
+    Context,
+    Object,
+    OperatorProperties,
+    UILayout,
+    WorkSpaceTool,
+    bpy,
+    connect,
+    disconnect,
+)
 from ..core.base.arrays import Floats
 from ..core.base.modes import COLORS, Mode
 from ..core.model.fingertip import Fingertip
@@ -41,6 +50,8 @@ from .brush import (
     find_images,
     find_kind,
     read_own,
+    take_finger,
+    tool_settings,
 )
 from .pointer import HELD
 
@@ -160,19 +171,17 @@ def draw_header(context: Context, layout: UILayout, settings: OperatorProperties
     layout.operator("digiclay.skin_toggle", text="", icon="SURFACE_DATA")
 
 
-def draw_presets(layout: UILayout) -> None:
-    """Draw the menu of brush presets, and what keeps and removes one. `layout` bpy.types.UILayout."""
-    row = layout.row(align=True)
-    row.menu("DIGICLAY_MT_brushes", text=bpy.types.DIGICLAY_MT_brushes.bl_label)
-    row.operator("digiclay.press_brush_save", text="", icon="ADD")
-    row.operator("digiclay.press_brush_save", text="", icon="REMOVE").remove_active = True
-
-
 def draw_curves(layout: UILayout) -> None:
     """Draw what forms strokes along curves, and stamps filled ones. `layout` bpy.types.UILayout."""
     layout.operator("digiclay.press_curves", icon="CURVE_DATA").fill = False
     row = layout.operator("digiclay.press_curves", text="Stamp Filled Curves", icon="CURVE_NCIRCLE")
     row.fill = True
+
+
+def draw_presets(layout: UILayout) -> None:
+    """Draw what opens the presets. `layout` bpy.types.UILayout."""
+    words = bpy.types.DIGICLAY_PT_press_presets.bl_label
+    layout.popover("DIGICLAY_PT_press_presets", text=words, icon="PRESET")
 
 
 def _number(layout: UILayout, owner: OperatorProperties, name: str, units: float) -> None:
@@ -354,13 +363,36 @@ class PressTool(bpy.types.WorkSpaceTool):
         draw_header(context, layout, tool.operator_properties(OPERATOR))
 
 
+def settle_finger() -> None:
+    """Give the bed in use the fingertip of the brush in hand again: undo brings back that of another one."""
+    bpy.context.view_layer.update()  # what undo has brought back has no place in the world before
+    bed = bed_in_use(bpy.context)
+    if bed is not None and tool_settings(bpy.context) is not None:
+        take_finger(bpy.context, bed)
+
+
+@bpy.app.handlers.persistent
+def _settle_soon(*_: object) -> None:
+    """Settle it when Blender has evaluated what undo has brought back."""
+    if not (bpy.app.background or bpy.app.timers.is_registered(settle_finger)):
+        bpy.app.timers.register(settle_finger)
+
+
+#: Handlers by the names of Blender's lists.
+HANDLERS = dict.fromkeys(("undo_post", "redo_post"), _settle_soon)
+
+
 def register() -> None:
     """Add the tool at the end of the toolbar."""
     bpy.utils.register_tool(PressTool, separator=True)
+    connect(HANDLERS)
 
 
 def unregister() -> None:
     """Remove the tool; where it is in use, the first tool replaces it."""
+    disconnect(HANDLERS)
+    if bpy.app.timers.is_registered(settle_finger):
+        bpy.app.timers.unregister(settle_finger)
     _put_down()
     bpy.utils.unregister_tool(PressTool)
 
