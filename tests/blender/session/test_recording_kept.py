@@ -11,6 +11,8 @@ from digiclay.core.session.live_session import Recording
 from digiclay.live import handlers
 from digiclay.recorded import takes
 from digiclay.sessions import running
+from digiclay.sessions.sculpting import queue_stroke
+from digiclay.strokes.stroke import let_go, start
 
 from tests.blender.session.live import move, only_bed, started, undone
 
@@ -161,3 +163,20 @@ def test_undoing_the_first_gesture_of_a_recording_leaves_it_recording(bed, clock
     bpy.ops.ed.undo_push(message="Gesture")
     undone(clock)
     assert running.find(only_bed()).recording is not None
+
+
+def test_a_stroke_of_another_size_keeps_what_was_recorded_as_a_take_of_the_size_before(
+    recording, clock
+):
+    finger = running.find(recording).scene.fingers[0].fingertip
+    wide = replace(finger, width=1.5 * finger.width)
+    for y, tip in ((-9e-3, finger), (9e-3, wide)):
+        stroke = let_go(start(0, 0.0, y, 2e-3, finger=tip))
+        running.put(queue_stroke(running.find(recording), stroke)[0])
+    notes = clock.until(lambda: not running.find(recording).strokes)
+    assert ["kept as Take 1" in note.message for note in notes] == [True]
+    assert running.find(recording).recording is None
+    take = takes.read(recording)
+    assert take.scene.fingers[0].fingertip == finger
+    # The stroke before belongs to it.
+    assert seconds(recording)[0] > SECONDS
