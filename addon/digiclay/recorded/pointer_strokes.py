@@ -31,6 +31,7 @@ from ..strokes.stroke import (
     SHALLOWEST,
     STAMPS,
     SYMMETRIES,
+    UNLIMITED,
     Brush,
     Combine,
     Image,
@@ -50,6 +51,8 @@ RATE = 60.0
 PATIENCE = 300.0
 #: Keys of a file beside its strokes.
 TEXTS = ("name", "description", "bed")
+#: Limits of a stroke that has none, m.
+NO_LIMITS = (-1.0, 1.0)
 Move = tuple[float, float, float]
 #: Paths between two places.
 LAYS = {"line": lay_line, "ring": lay_ring}
@@ -91,10 +94,10 @@ class PointerStroke(Parameters):
         choices=tuple(combine.value.lower() for combine in Combine),
     )
     limit_low: float = quantity(
-        -1.0, "lowest that it forms above rest", unit="m", at_least=-1.0, at_most=1.0
+        NO_LIMITS[0], "lowest that it forms above rest", unit="m", at_least=-1.0, at_most=1.0
     )
     limit_high: float = quantity(
-        1.0, "highest that it forms above rest", unit="m", at_least=-1.0, at_most=1.0
+        NO_LIMITS[1], "highest that it forms above rest", unit="m", at_least=-1.0, at_most=1.0
     )
     accumulate: bool = quantity(
         False, "whether a path that comes back counts from what it has left there"
@@ -256,6 +259,7 @@ def _play(running: Running, stroke: PointerStroke, number: int) -> Iterator[Runn
         lagged.append(pull(lagged[-1], place, string))
     path = LAYS[stroke.path](places[0], places[-1]) if stroke.path in LAYS else lagged
     stamp = load_stamp(stroke.stamp) if stroke.kind in STAMPS else None
+    limits = stroke.limit_low, stroke.limit_high
     begun = start(0, *places[0], stroke.amount, stroke.images, stroke.kind, stroke.strength)
     begun = replace(
         begun,
@@ -263,7 +267,7 @@ def _play(running: Running, stroke: PointerStroke, number: int) -> Iterator[Runn
         stamp=stamp,
         falloff=stroke.shape,
         combine=Combine(stroke.combine.upper()),
-        limits=(stroke.limit_low, stroke.limit_high),
+        limits=UNLIMITED if limits == NO_LIMITS else limits,
         as_left=stroke.finish == "as_left",
     )
     running, queued = queue_stroke(running, lay_path(begun, path))
