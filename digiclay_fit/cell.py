@@ -82,6 +82,8 @@ class CellTrial:
 class CellModel:
     """Model of all samples of some trials; `groups`: what is free."""
 
+    held_first: tuple[int, ...] = (1,)
+
     def __init__(self, scene: Scene, trials: Sequence[Trial], groups: Sequence[str]) -> None:
         self.trials, self.groups = [CellTrial(trial) for trial in trials], tuple(groups)
         self.measured = np.concatenate([trial.answer for trial in trials])

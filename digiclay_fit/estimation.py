@@ -65,6 +65,8 @@ class Model(Protocol):
     parameters: tuple[Parameter, ...]
     index: dict[str, int]
     measured: Floats
+    held_first: tuple[int, ...]
+    """Indices of parameters that are held until the others are fitted, against other minima."""
     defaults: dict[int, float]
     """Values of the scene for the parameters that it has, by index."""
 
@@ -185,8 +187,12 @@ def measure_units(model: Model, free: Floats) -> Floats:
 
 def estimate(model: Model) -> Estimate:
     """Fit a model to its measured samples, with intervals and a verdict for each parameter."""
-    rough = [minimize(model, each, max_nfev=15) for each in model.list_starts()]
-    result = minimize(model, min(rough, key=lambda each: float(each.cost)).whole)
+    results = []
+    for start in model.list_starts():
+        held = {index: start[index] for index in model.held_first}
+        begun = minimize(model, start, held).whole if held else start
+        results.append(minimize(model, begun))
+    result = min(results, key=lambda each: float(each.cost))
     while model.refine(result.whole):
         result = minimize(model, result.whole)
     residual = result.fun

@@ -73,6 +73,8 @@ class PulpTrial:
 class PulpModel:
     """Model of all samples of some trials; `law`: plate or pin; `groups`: what is free."""
 
+    held_first: tuple[int, ...] = ()
+
     def __init__(
         self, scene: Scene, trials: Sequence[Trial], groups: Sequence[str], law: str = "plate"
     ) -> None:
