@@ -200,7 +200,9 @@ class PulpModel:
         if "compliance" in self.groups:
             columns[:, 1 + index["compliance"]] = -slope * trial.felt
         columns[:, 0] = force
-        driven = np.flatnonzero(columns.any(axis=0))
+        used = columns.any(axis=0)
+        used[0] = True  # the force itself, also where it does not touch
+        driven = np.flatnonzero(used)
         plain = columns[:, driven].copy()
         states = []
         for weight, time in zip(weights[1:], times, strict=True):

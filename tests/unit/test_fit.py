@@ -24,6 +24,7 @@ from digiclay_fit.records import Trial, find_records, read_records
 from digiclay_fit.verdicts import fit, make_model
 
 TAP = digiclay.scene("tap")
+BOTH = ("contact", "relaxation")
 
 
 def draw(seed):
@@ -81,6 +82,36 @@ def test_the_jacobian_is_that_of_differences(part, groups, knee, off):
         np.testing.assert_allclose(jacobian[:, number], slope, atol=most, err_msg=each.key)
 
 
+def test_predictions_at_the_truth_are_those_of_the_other_code():
+    time, position, force = Finger().measure(
+        [(0.0, -3e-4), (0.1, -3e-4), (0.2, 1.5e-3), (0.4, 1.5e-3)], 500.0
+    )
+    model = make_model("pulp", TAP, [Trial("1", time, position, force, 0.0 * time)], BOTH)
+    free = np.array([each.start for each in model.parameters])
+    free[[model.index["zero of position"], model.index["zero of force"]]] = 0.0
+    # N: what the corner of the path is worth between two samples, of 1.6 N.
+    np.testing.assert_allclose(model.predict(free)[0], force, atol=6e-3)
+    commands = measure_cell(draw(2)).trials[0].drive
+    height = Cell(delay=1.6e-3).measure(commands, 1000.0)
+    time = np.arange(commands.size) * 1e-3
+    model = make_model(
+        "cell", TAP, [Trial("1", time, commands, height, 0.0 * time)], ("lag", "delay")
+    )
+    free = np.array([model.defaults.get(i, each.start) for i, each in enumerate(model.parameters)])
+    free[model.index["delay.dead_time"]] = 1.6e-3
+    # Rounding of sums of steps; with kinks inside pieces of time 0.3 um.
+    np.testing.assert_allclose(model.predict(free)[0], height, atol=5e-8)
+
+
+def test_a_finger_that_does_not_touch_is_predicted_without_force():
+    model = make_model("pulp", TAP, measure_finger(draw(1)).trials, BOTH)
+    free = np.array([each.start for each in model.parameters])
+    free[model.index["zero of position"]] = 1.0
+    force, jacobian = model.predict(free)
+    assert (force == free[model.index["zero of force"]]).all()
+    assert jacobian[:, model.index["zero of force"]].all()
+
+
 #: Devices of each kind, and misses of 95 % intervals that are tolerated: with independent parameters
 #: fewer than one in 300 suites has more.
 NOISE = {"pulp": FORCE_NOISE, "cell": HEIGHT_NOISE}
@@ -126,9 +157,6 @@ def press(**more):
 def find_value(found, key):
     (each,) = [each for each in found.derived if each.key == key]
     return np.exp(each.value) if each.log else each.value
-
-
-BOTH = ("contact", "relaxation")
 
 
 @pytest.mark.parametrize("group, size, error", [
