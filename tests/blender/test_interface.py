@@ -243,6 +243,7 @@ def test_a_label_is_found_among_operators_and_elsewhere_and_a_brush_has_the_name
     assert entries == {
         ("*", "Take Back a Gesture"): wanted,
         ("Operator", "Take Back a Gesture"): wanted,
+        ("Brush", "Take Back a Gesture"): wanted,
     }
     entries = translations.make_entries({"Smooth"}, "de")
     assert (entries["*", "Smooth"], entries["Brush", "Smooth"]) == ("Glatt", "Glätten")
@@ -251,7 +252,7 @@ def test_a_label_is_found_among_operators_and_elsewhere_and_a_brush_has_the_name
 @pytest.mark.usefixtures("extension")
 def test_values_come_into_their_places_in_the_language_of_the_interface():
     # Blender's module has no languages: its window shows them (tests/window).
-    ui_text.set_translator(lambda text: translations.translate(text, "de") or text)
+    ui_text.set_translator(lambda text, context: translations.translate(text, "de") or text)
     try:
         assert localize("Simulated: {:.1f} s", 1.25) == "Simuliert: 1.2 s"
         assert localize("Nobody has written this {}", 1) == "Nobody has written this 1"

@@ -78,6 +78,8 @@ ADJUSTING = {
     "DIGICLAY_OT_press_strength",
     "DIGICLAY_OT_press_center",
 }
+#: Context of its translation: as a brush, "Smooth" is what is done, elsewhere what something is.
+CONTEXT = "Brush"
 LABELS = {brush: brush.value.replace("_", " ").title() for brush in Brush}
 BRUSH_WORDS = {
     Brush.LOWER: "Press a valley of the given depth, to which the valves bring the pins in the end, "
@@ -338,18 +340,23 @@ def describe_brush(finger: Fingertip, brush: Brush, depth: float, strength: floa
     )
 
 
+def localize_label(brush: Brush) -> str:
+    """Return the name of a brush in the language of the interface."""
+    return localize(LABELS[brush], context=CONTEXT)
+
+
 def describe_stroke(brush: Brush, depth: float, strength: float = 1.0) -> str:
     """Return a brush, and its depth or height (m) times strength, in mm."""
     if brush in (*LOCKS, Brush.SET_BASE):
-        return localize(LABELS[brush])
+        return localize_label(brush)
     if not brush.has_amount:
-        return f"{localize(LABELS[brush])} {100.0 * strength:.0f} %"
+        return f"{localize_label(brush)} {100.0 * strength:.0f} %"
     share = f" × {100.0 * strength:.0f} %" if strength < 1.0 else ""
-    return f"{localize(LABELS[brush])}, {localize(amount_name(brush))} {1e3 * depth:.3g} mm{share}"
+    return f"{localize_label(brush)}, {localize(amount_name(brush))} {1e3 * depth:.3g} mm{share}"
 
 
 def describe_queue(brush: Brush, waiting: int, seconds: float | None) -> str:
     """Return what is being formed, how many strokes wait, and about how long all take, s; None: not known."""
     more = f" + {waiting}" if waiting else ""
     left = "" if seconds is None else localize(", {:.0f} s", math.ceil(seconds))
-    return localize("   Forming: {}", localize(LABELS[brush])) + more + left
+    return localize("   Forming: {}", localize_label(brush)) + more + left

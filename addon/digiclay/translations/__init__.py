@@ -10,6 +10,7 @@ from .. import operators, panels, preferences, ui_text
 from ..compat import bpy, bpy_struct
 from ..core.scene.toml_table import PRESETS
 from ..panels import display
+from ..press.brush import CONTEXT as BRUSH
 from ..press.tool import PressTool
 from ..settings import groups
 from ..settings.declared import title
@@ -18,10 +19,8 @@ from ..settings.declared import title
 EXTENSION = __package__.rpartition(".")[0]
 #: Languages that have a catalog.
 LANGUAGES = ("de",)
-#: Contexts in which Blender looks up a text: labels of operators have one of their own.
-CONTEXTS = ("*", "Operator")
-#: That of the brushes: as a brush, "Smooth" is what is done, elsewhere what something is.
-BRUSH = "Brush"
+#: Contexts in which Blender looks up a text: labels of operators and of brushes have their own.
+CONTEXTS = ("*", "Operator", BRUSH)
 
 
 @cache
@@ -104,9 +103,8 @@ def make_entries(texts: Iterable[str], language: str) -> dict[tuple[str, str], s
     shown = _catalog(language)["brushes"].items()
     brushes = {(BRUSH, text): words for text, words in shown if text in translated}
     labels = {text: words for text, words in translated.items() if words}
-    return brushes | {
-        (context, text): words for text, words in labels.items() for context in CONTEXTS
-    }
+    entries = {(context, text): words for text, words in labels.items() for context in CONTEXTS}
+    return entries | brushes
 
 
 def register() -> None:
