@@ -13,6 +13,7 @@ from digiclay.core.base.errors import DigiclayError
 from digiclay.core.base.quantity import UNITS, normalize
 from digiclay.core.files.run_folder import find_file, list_files
 from digiclay.core.scene.scene_source import SAMPLES
+from digiclay.core.studies.axes import is_number
 
 #: Columns of a part's file and their SI units; the last ones may be absent.
 COLUMNS = {
@@ -112,7 +113,7 @@ def _read_columns(path: Path, rows: Sequence[Sequence[str]], part: str) -> tuple
         )
     factors = []
     units = rows[1] if len(rows) > 1 else []
-    if len(units) != len(names) or all(_is_number(word) for word in units):
+    if len(units) != len(names) or all(is_number(word) for word in units):
         raise DigiclayError(f"{path}, row 2 must be the units of the columns, such as s,mm,N.")
     for name, word in zip(names, units, strict=True):
         wanted, plain = known[name], normalize(word.strip())
@@ -131,14 +132,6 @@ def _read_columns(path: Path, rows: Sequence[Sequence[str]], part: str) -> tuple
             rule = f"must be {len(names)} finite numbers (got {','.join(row)[:40]!r})"
             raise DigiclayError(f"{path}, row {number + 3} {rule}.")
     return names, values * factors
-
-
-def _is_number(word: str) -> bool:
-    try:
-        float(word)
-    except ValueError:
-        return False
-    return True
 
 
 def _check_trial(trial: Trial, drive: str, answer: str) -> None:

@@ -18,10 +18,7 @@ PACKAGE = ROOT / "addon" / "digiclay"
 CORE = PACKAGE / "core"
 
 #: Packages beside the extension: they import it, and it never imports them.
-BESIDE = {
-    name: ROOT / name
-    for name in ("benchmarks", "digiclay_fit", "digiclay_paper", "digiclay_serve", "digiclay_study")
-}
+BESIDE = {path.name: path for path in (ROOT / "benchmarks", *sorted(ROOT.glob("digiclay_*")))}
 PACKAGES = pytest.mark.parametrize(
     "package", [PACKAGE, *BESIDE.values()], ids=lambda path: path.name
 )

@@ -31,15 +31,7 @@ PAGES = sorted(
         *ROOT.glob("addon/digiclay/sample_shapes/*/README.md"),
     ]
 )
-PACKAGES = (
-    "addon",
-    "benchmarks",
-    "digiclay_fit",
-    "digiclay_paper",
-    "digiclay_serve",
-    "digiclay_study",
-    "tools",
-)
+PACKAGES = ("addon", "benchmarks", "tools", *(path.name for path in ROOT.glob("digiclay_*")))
 SOURCES = {
     f"/{path.relative_to(ROOT)}"
     for name in (*PACKAGES, "docs", "tests")

@@ -49,14 +49,7 @@ def test_no_word_is_spelled_the_british_way() -> None:
 
 
 def test_no_module_has_the_name_of_its_package_or_of_another_module() -> None:
-    beside = (
-        "benchmarks",
-        "digiclay_fit",
-        "digiclay_paper",
-        "digiclay_serve",
-        "digiclay_study",
-        "tools",
-    )
+    beside = ("benchmarks", "tools", *(path.name for path in ROOT.glob("digiclay_*")))
     modules = [
         path
         for path in tracked("addon/*.py", *(f"{name}/*.py" for name in beside))

@@ -103,7 +103,7 @@ def read_varied(text: str, *names: str) -> Varied:
     require(len(parts) == len(names) + logarithmic, f"must be {form} or {form}:log{count}")
     (low, _, unit), (high, _, other) = (end.partition(" ") for end in parts[:2])
     require(unit.strip() == other.strip(), f"must have the same unit {at}")
-    require(all(map(_is_number, (low, high))), f"must have a number {at}")
+    require(all(map(is_number, (low, high))), f"must have a number {at}")
     start, stop = float(low), float(high)
     different = math.isfinite(start) and math.isfinite(stop) and start != stop
     require(different, f"must have two different finite numbers {at}")
@@ -112,7 +112,7 @@ def read_varied(text: str, *names: str) -> Varied:
     return Varied(key, (), (low, high), unit.strip(), "".join(parts[2 : len(names)]), logarithmic)
 
 
-def _is_number(word: str) -> bool:
+def is_number(word: str) -> bool:
     """Return whether a word is a number."""
     try:
         float(word)
