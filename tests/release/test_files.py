@@ -14,7 +14,7 @@ import pytest
 from tests.timeouts import TIMEOUT
 
 ROOT = Path(__file__).parents[2]
-BESIDE = ("digiclay_paper", "digiclay_serve", "digiclay_study")
+BESIDE = [path.name for path in ROOT.glob("digiclay_*")]
 #: Endings of the files that the extension reads, and of texts for people.
 KINDS = re.compile(
     r"LICENSE|LICENSES/[\w.-]+\.txt|blender_manifest\.toml|[\w/]+\.py|wheels/[\w.-]+-py3-none-any\.whl"
@@ -72,7 +72,11 @@ def test_the_wheel_has_the_package_and_those_beside_it_and_no_benchmark(wheel):
         *BESIDE,
     }
     beside = {f"{name}/{path.name}" for name in BESIDE for path in (ROOT / name).glob("*.*")}
-    shipped = {"digiclay/manual/guide.html", "digiclay/sample_shapes/sessions/tap.toml"}
+    samples = ("sessions/tap.toml", "measurements/valve.csv")
+    shipped = {
+        "digiclay/manual/guide.html",
+        *(f"digiclay/sample_shapes/{name}" for name in samples),
+    }
     assert (beside | shipped) - names == set()
     assert len(beside) > 20
 
