@@ -10,10 +10,19 @@ from typing import Any
 
 import numpy as np
 from digiclay import __version__
-from digiclay.commands.arguments import QUIET, add_command, add_options, add_scene, say, scene_of
+from digiclay.commands.arguments import (
+    QUIET,
+    add_command,
+    add_options,
+    add_scene,
+    say,
+    scene_of,
+    told_as_options,
+)
 from digiclay.commands.progress import table as aligned
 from digiclay.commands.refusals import refuse_without
 from digiclay.core.base.errors import OutputError
+from digiclay.core.base.quantity import list_quantities, parse
 from digiclay.core.files.run_folder import Content, claim_folder, make_folder, write_whole
 from digiclay.core.files.tables import Record, format_value
 from digiclay.core.scene.schema import Scene
@@ -21,6 +30,7 @@ from digiclay.core.scene.toml_table import UNCERTAINTY
 
 from . import cell, pulp
 from .estimation import USELESS
+from .experiment import LIMITS, Limits, Task, design
 from .records import find_records, read_records
 from .verdicts import Findings, fit, split_trials
 
@@ -30,11 +40,13 @@ examples:
   digiclay fit mine.csv --part pulp --free contact,relaxation,lag --out finger
   digiclay fit valve --part cell --set actuator.bore="2 mm" --out cell
   digiclay run tap --with finger/fitted.toml
+  digiclay fit --design --part pulp --max-speed "32 mm/s" --max-force "2 N" --out press
 
 FILE is a sample's name or a CSV file: names of the columns, a row of their units, then numbers.
 pulp: time, position (or indentation, or commanded), force; cell: time, command, height, perhaps load;
 both perhaps trial. The folder has fit.html, fit.png and, with exit code 0, fitted.toml. Exit code 1:
 NO_IMPROVEMENT on the scene, or NOT_IDENTIFIABLE.
+With --design the folder has protocol.csv, which lacks the measured column, and protocol.png.
 """
 #: Groups of parameters of each part, and those that are free unless others are asked for.
 GROUPS = {"pulp": pulp.GROUPS, "cell": cell.GROUPS}
@@ -48,6 +60,7 @@ SECTIONS = {
 OF_SCENE = {("contact", "share"), ("contact", "offset"), ("actuator", "rest_height")}
 #: Content of the folder, columns of the table, and the exit code of a refusal.
 FIT, REFUSED = Content("fit", ("fit.html", "fit.png")), 1
+DESIGN = Content("design", ("protocol.csv",))
 HEAD = ("parameter", "value", "95 % interval", "verdict", "most correlated with")
 
 
@@ -59,7 +72,7 @@ def add(commands: Any) -> None:
     add_options(
         parser,
         {
-            "files FILE": {"nargs": "+", "help": "CSV files or samples of one part"},
+            "files FILE": {"nargs": "*", "help": "CSV files or samples of one part"},
             "--part PART": {"choices": tuple(GROUPS), "required": True, "help": "cell or pulp"},
             "--law LAW": (("plate", "pin"), "whole finger on a plate, or on one pin", "plate"),
             "--free GROUP,...": (
@@ -67,6 +80,13 @@ def add(commands: Any) -> None:
                 f"what is unknown: {', '.join(pulp.GROUPS)}; beside an orifice {', '.join(cell.GROUPS)}",
             ),
             "--holdout TRIAL,...": (None, "trials to predict, not to fit", ""),
+            "--design": "design a measurement instead, from the scene and these limits",
+            **{
+                f"{_option(name)} SIZE": (None, f"design: {each.doc}; default {each.show(usual)}")
+                for (name, each), usual in zip(
+                    list_quantities(Limits).items(), vars(Limits()).values(), strict=True
+                )
+            },
             "--out DIR": (Path, "folder; default: fit", Path("fit")),
             "--overwrite": "replace an older fit",
             "--quiet": QUIET,
@@ -91,7 +111,10 @@ def carry_out(arguments: Namespace) -> int:
     from .fit_page import draw, write_page
 
     part, groups = arguments.part, read_groups(arguments.free, arguments.part)
+    limits = read_limits(arguments)
     scene, _ = scene_of(arguments)
+    if arguments.design:
+        return write_design(arguments, Task(part, scene, groups, arguments.law, limits))
     paths = [find_records(word) for word in arguments.files]
     fitted, held = split_trials(read_records(paths, part), arguments.holdout)
     with claim_folder(arguments.out, overwrite=arguments.overwrite, content=FIT):
@@ -108,6 +131,60 @@ def carry_out(arguments: Namespace) -> int:
         print(found.message, file=sys.stderr)
         return REFUSED
     say(arguments, found.message)
+    return 0
+
+
+def _option(name: str) -> str:
+    """Return the option of a limit."""
+    return f"--{name.replace('_', '-')}"
+
+
+def read_limits(arguments: Namespace) -> Limits:
+    """Return the limits of a design; refused where measured files are to be fitted."""
+    kind, values = LIMITS[arguments.part], {}
+    if arguments.design == bool(arguments.files or arguments.holdout):
+        shown = "both" if arguments.design else "neither"
+        raise OutputError(f"digiclay fit must have a measured FILE or --design (got {shown}).")
+    for name, declared in list_quantities(kind).items():
+        option, text = _option(name), getattr(arguments, name)
+        if text is None:
+            continue
+        if not arguments.design or (name.startswith("max") and arguments.part == "cell"):
+            rule = "must be with --design, and a limit of force or path with --part pulp"
+            raise OutputError(f"{option} {rule} (got {text[:40]!r}).")
+        try:
+            values[name] = parse(text, declared.unit)
+        except ValueError as error:
+            raise OutputError(f"{option} {error} (got {text[:40]!r}).") from None
+    with told_as_options(kind.__name__):
+        return kind(**values)
+
+
+def write_design(arguments: Namespace, task: Task) -> int:
+    """Design a measurement and write it."""
+    from .fit_page import DRIVEN, draw_protocol
+
+    with claim_folder(arguments.out, overwrite=arguments.overwrite, content=DESIGN):
+        best, plain = design(task)
+        folder = make_folder(arguments.out)
+        factor, unit, name = DRIVEN[task.part]
+        lines = [f"time,{name}", f"s,{unit}"]
+        for number, drive in enumerate(factor * best.drive):
+            lines.append(f"{number * task.limits.step:.9g},{drive:.7g}")
+        other = "one ramp" if task.part == "pulp" else "one step"
+        write_whole(folder / "protocol.csv", ("\n".join(lines) + "\n").encode())
+        draw_protocol(best, plain, task, other, folder / "protocol.png")
+    widths = zip(best.derived, 100.0 * best.widths, 100.0 * plain.widths, strict=True)
+    rows = [[each.key, f"± {ours:.2g} %", f"± {theirs:.2g} %"] for each, ours, theirs in widths]
+    low, high = best.answer.min(), best.answer.max()
+    caution = f"this pin moves from {1e3 * low:.3g} to {1e3 * high:.3g} mm, others farther"
+    if task.part == "pulp":
+        caution = (
+            f"position 0 is the first contact; this finger is pressed with {high:.2f} N, a stiffer one may "
+            f"exceed {task.limits.max_force:g} N: the machine needs a force stop"
+        )
+    head = ("parameter", "95 %, designed", other)
+    say(arguments, *aligned(head, rows), f"caution: {caution}", f"written to {folder}")
     return 0
 
 

@@ -11,6 +11,7 @@ from digiclay.commands.gallery import make_table, wrap
 from digiclay.core.base.arrays import Floats
 from digiclay.plots.figure import LINES, canvas, legend_above, save
 
+from .experiment import Prediction, Task
 from .records import Trial
 from .verdicts import Findings
 
@@ -32,6 +33,8 @@ UNSEEN = {
         "gas in the fluid, friction and inertia of the pin, which the model does not have",
     ),
 }
+#: Scale and unit of what drives a part, and its name.
+DRIVEN = {"pulp": (1e3, "mm", "position"), "cell": (1.0, "", "command")}
 #: Scale and unit of a signal and of its residuals, and its name, by part.
 SHOWN = {"pulp": (1.0, "N", 1e3, "mN", "force"), "cell": (1e3, "mm", 1e6, "µm", "height")}
 
@@ -64,6 +67,29 @@ def draw(found: Findings, part: str, out: Path) -> None:
             above.set_title(title, pad=26)
             below.set(xlabel="time, trials one after another (s)", ylabel=f"residual ({tiny})")
             legend_above(above, 3)
+        save(figure, out)
+
+
+def draw_protocol(best: Prediction, plain: Prediction, task: Task, other: str, out: Path) -> None:
+    """Draw a designed measurement, and its intervals beside those of another one."""
+    factor, unit, driven = DRIVEN[task.part]
+    large, measured, _, _, answer = SHOWN[task.part]
+    time = np.arange(best.drive.size) * task.limits.step
+    with canvas(12.5, 6.6, f"Measurement of a {task.part}, designed") as (figure, place):
+        for bottom, values, label in (
+            (3.75, factor * best.drive, f"{driven} ({unit})" if unit else driven),
+            (0.7, large * best.answer, f"predicted {answer} ({measured})"),
+        ):
+            axes = place(label, 0.95, bottom, 5.8, 2.15)
+            axes.plot(time, values, color=LINES[0], linewidth=1.2)
+            axes.set(xlabel="time (s)", ylabel=label)
+        beside = place("widths", 9.4, 0.7, 2.8, 5.2)
+        keys = [each.key for each in best.derived]
+        beside.plot(100.0 * plain.widths, keys, "s", color=LINES[1], label=other)
+        beside.plot(100.0 * best.widths, keys, "o", color=LINES[0], label="designed")
+        beside.set(xscale="log", xlabel="half of the 95 % interval (%)")
+        beside.invert_yaxis()
+        legend_above(beside, 2)
         save(figure, out)
 
 
