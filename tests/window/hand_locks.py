@@ -86,8 +86,11 @@ def script(blender):
     )
     yield from act(blender, *words)
     keep(blender, "box with ctrl")
-    words, _ = draw(blender, (60.0, 60.0), (61.0, 61.0), before="key b sleep 0.4")
-    yield from act(blender, *words)
+    # Inside the view: a press beside that would drag a value of another editor.
+    _, region = blender.view()
+    x, y = region.x + 150, blender.window().height - region.y - 100
+    box = ("mousedown 1", to((x + 20, y - 20)), "mouseup 1")
+    yield from act(blender, to((x, y)), "key b sleep 0.4", *box)
     keep(blender, "nothing inside")
     height = bpy.ops.digiclay.press_locks_height
     yield from change(blender, "by height", height, side="ABOVE", height=4.0)
