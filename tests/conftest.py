@@ -68,6 +68,7 @@ def quick_machine(monkeypatch):
     from digiclay.core.session import live_session
 
     monkeypatch.setattr(live_session, "SHARE", 1e9)
+    monkeypatch.setattr(live_session, "RELEASED_SHARE", 1e9)
 
 
 @pytest.fixture

@@ -25,7 +25,6 @@ def start(script, *arguments, env=None, **options):
     """Start Python on a script that may import the package."""
     return subprocess.Popen(
         [sys.executable, "-c", script, *arguments],
-        text=True,
         encoding="utf-8",
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,

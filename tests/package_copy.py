@@ -24,7 +24,7 @@ def run_python(copy, *arguments):
         [sys.executable, *arguments],
         env={"PYTHONPATH": str(copy / "addon"), "PATH": ""},
         capture_output=True,
-        text=True,
+        encoding="utf-8",
         check=False,
         timeout=TIMEOUT,
     )

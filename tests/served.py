@@ -101,7 +101,6 @@ def serve(folder, *options, rate=200):
         command,
         cwd=folder,
         env={**os.environ, "PYTHONPATH": path},
-        text=True,
         encoding="utf-8",
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,

@@ -46,6 +46,7 @@ def factory_file(request):
 def quick_machine(monkeypatch):
     """Leave out no control period: what a test forms must not depend on who else uses the machine."""
     monkeypatch.setattr(live_session, "SHARE", 1e9)
+    monkeypatch.setattr(live_session, "RELEASED_SHARE", 1e9)
 
 
 @pytest.fixture

@@ -235,7 +235,7 @@ BESIDE = ("benchmarks", "digiclay_fit", "digiclay_paper", "digiclay_serve", "dig
 def archive(tmp_path_factory):
     out = tmp_path_factory.mktemp("dist")
     command = [sys.executable, str(TOOL), "--out", str(out)]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=TIMEOUT)
+    done = subprocess.run(command, capture_output=True, encoding="utf-8", timeout=TIMEOUT)
     assert done.returncode == 0, done.stderr
     (found,) = out.glob("*.zip")
     return found
@@ -251,7 +251,7 @@ def seen(archive, tmp_path_factory):
     environment.pop("PYTHONPATH", None)
     command = [sys.executable, "-P", str(HERE / "use_the_zip.py"), str(archive), str(folder)]
     done = subprocess.run(
-        command, env=environment, cwd=folder, capture_output=True, text=True, timeout=TIMEOUT
+        command, env=environment, cwd=folder, capture_output=True, encoding="utf-8", timeout=TIMEOUT
     )
     assert done.returncode == 0, f"{done.stdout[-2000:]}\n{done.stderr[-2000:]}"
     assert "Traceback" not in done.stderr
@@ -280,7 +280,7 @@ def test_the_tool_refuses_a_tag_blender_does_not_know(tmp_path):
     manifest = copy / "addon" / "digiclay" / "blender_manifest.toml"
     manifest.write_text(manifest.read_text().replace('"Modeling"', '"Pottery"'))
     command = [sys.executable, str(copy / "tools" / "extension.py")]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=TIMEOUT)
+    done = subprocess.run(command, capture_output=True, encoding="utf-8", timeout=TIMEOUT)
     assert done.returncode != 0
     assert "Pottery" in done.stderr
     assert not (copy / "dist").exists()

@@ -107,6 +107,6 @@ def test_threads_that_were_started_before_are_kept_to_the_core_too():
     )
     command = [sys.executable, "-c", script]
     told = subprocess.run(
-        command, capture_output=True, text=True, timeout=TIMEOUT, check=True, cwd=ROOT
+        command, capture_output=True, encoding="utf-8", timeout=TIMEOUT, check=True, cwd=ROOT
     )
     assert told.stdout.splitlines()[-1].split() == ["1", "1"]  # Blender may log before

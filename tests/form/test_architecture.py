@@ -147,7 +147,7 @@ def tracked(*patterns: str) -> list[Path]:
         ],
         cwd=ROOT,
         capture_output=True,
-        text=True,
+        encoding="utf-8",
         check=True,
         timeout=TIMEOUT,
     )

@@ -51,7 +51,7 @@ def told(*command):
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         check=False,
-        text=True,
+        encoding="utf-8",
         errors="replace",
         timeout=TIMEOUT,
     )

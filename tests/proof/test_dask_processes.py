@@ -43,7 +43,7 @@ def start(here):
         process = subprocess.Popen(
             [sys.executable, *["-S"] * bare, "-m", *arguments],
             stderr=subprocess.PIPE,
-            text=True,
+            encoding="utf-8",
             env={**os.environ, "PYTHONPATH": str(addon), **settings},
         )
         running.append(process)
@@ -115,7 +115,7 @@ def test_a_point_that_no_process_of_this_machine_survives_fails_alone(here):
             "o",
         ],
         capture_output=True,
-        text=True,
+        encoding="utf-8",
         check=False,
         timeout=TIMEOUT,
         env={**os.environ, "PYTHONPATH": str(ADDON)},

@@ -70,7 +70,7 @@ def test_a_step_whose_task_fails_stops_those_that_need_it(tmp_path):
     done = subprocess.run(
         [sys.executable, "-m", "openjd", "run", template, "-p", program],
         capture_output=True,
-        text=True,
+        encoding="utf-8",
         check=False,
         timeout=TIMEOUT,
     )

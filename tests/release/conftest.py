@@ -33,7 +33,7 @@ def git(folder, *words):
         cwd=folder,
         env=ENVIRONMENT,
         capture_output=True,
-        text=True,
+        encoding="utf-8",
         timeout=TIMEOUT,
         check=True,
     )
@@ -78,7 +78,7 @@ def run_release(folder, version=__version__, umask=18, **added):
         env=ENVIRONMENT | added,
         umask=umask,
         capture_output=True,
-        text=True,
+        encoding="utf-8",
         timeout=TIMEOUT,
     )
 

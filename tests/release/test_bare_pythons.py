@@ -46,7 +46,7 @@ class BarePython:
             cwd=cwd,
             env=environment | {"PYTHONPATH": path},
             capture_output=True,
-            text=True,
+            encoding="utf-8",
             timeout=limit,
         )
 
@@ -59,7 +59,7 @@ def read_pins(name):
 def _carry_out(*command):
     environment = {**os.environ, "GOAL": "test-release", "PYTHONPATH": ""}
     done = subprocess.run(
-        command, cwd=ROOT, env=environment, capture_output=True, text=True, timeout=TIMEOUT
+        command, cwd=ROOT, env=environment, capture_output=True, encoding="utf-8", timeout=TIMEOUT
     )
     assert done.returncode == 0, f"{done.stdout[-2000:]}{done.stderr[-2000:]}"
     return done.stdout

@@ -17,7 +17,7 @@ def carry_out(folder, *words):
         cwd=folder,
         env=ENVIRONMENT | {"GOAL": "demo"},
         capture_output=True,
-        text=True,
+        encoding="utf-8",
         timeout=TIMEOUT,
     )
     assert done.returncode == 0, f"{done.stdout[-2000:]}{done.stderr[-2000:]}"

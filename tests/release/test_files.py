@@ -89,7 +89,7 @@ def test_the_paper_is_found_in_the_wheel(wheel, tmp_path):
         env=os.environ | {"PYTHONPATH": str(tmp_path / "installed")},
         cwd=tmp_path,
         capture_output=True,
-        text=True,
+        encoding="utf-8",
         timeout=TIMEOUT,
     )
     assert (done.returncode, "reproduce the paper" in done.stdout.lower()) == (0, True), done.stderr

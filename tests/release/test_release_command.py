@@ -190,7 +190,7 @@ def test_a_stop_during_the_builds_leaves_nothing(number, checkout):
         env=ENVIRONMENT,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
-        text=True,
+        encoding="utf-8",
     )
     assert process.stdout.readline().startswith(f"building {__version__}")
     process.send_signal(number)
@@ -216,7 +216,7 @@ def test_a_release_leaves_its_files_their_checksums_and_an_annotated_tag_with_th
     assert list(released.glob("build/release-*")) == []
     check = ["sha256sum", "--check", "--strict", "SHA256SUMS"]
     done = subprocess.run(
-        check, cwd=released / FOLDER, capture_output=True, text=True, timeout=TIMEOUT
+        check, cwd=released / FOLDER, capture_output=True, encoding="utf-8", timeout=TIMEOUT
     )
     assert (done.returncode, done.stdout.count(": OK")) == (0, len(ARCHIVES) + 1), done.stdout
 

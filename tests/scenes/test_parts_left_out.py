@@ -30,7 +30,7 @@ def imported(*settings):
         [sys.executable, "-W", "error", "-c", RUN, *settings],
         cwd=ADDON,
         capture_output=True,
-        text=True,
+        encoding="utf-8",
         check=False,
         timeout=TIMEOUT,
     )

@@ -77,7 +77,9 @@ def test_a_killed_server_leaves_takes_that_can_be_replayed(tmp_path):
 def test_a_signal_ends_a_server_whose_doors_hang_and_finishes_its_take(tmp_path):
     with serve(tmp_path, "--out", "recorded", "--part", "0.2") as one:
         wait_until(lambda: list((tmp_path / "recorded").glob("*_part_00002.npz")))
-        (door,) = subprocess.check_output(["pgrep", "-P", str(one.process.pid)], text=True).split()
+        (door,) = subprocess.check_output(
+            ["pgrep", "-P", str(one.process.pid)], encoding="utf-8"
+        ).split()
         os.kill(int(door), signal.SIGSTOP)
         began = time.monotonic()
         report = one.stop(signal.SIGTERM)
@@ -131,7 +133,7 @@ def test_hands_of_a_quest_are_recorded_and_played_into_a_server(tmp_path):
         listen = [*command, "--port", str(port), "--record", "hands.txt"]
         with (
             subprocess.Popen(
-                listen, cwd=tmp_path, env=environment, stdout=subprocess.PIPE, text=True,
+                listen, cwd=tmp_path, env=environment, stdout=subprocess.PIPE, encoding="utf-8",
                 preexec_fn=partial(signal.signal, signal.SIGINT, signal.default_int_handler),
             ) as hands,
             ExitStack() as stack,
@@ -464,7 +466,7 @@ def test_the_example_shows_the_heights_on_a_pin_display(server, door):
             [*command, "--rate", "100"],
             env=environment,
             stdout=subprocess.PIPE,
-            text=True,
+            encoding="utf-8",
             # In the background of a shell it would have Ctrl-C ignored.
             preexec_fn=partial(signal.signal, signal.SIGINT, signal.SIG_DFL),
         ) as example,

@@ -86,7 +86,7 @@ def execute(command: str, folder: Path) -> str:
         env=environment,
         stdin=subprocess.DEVNULL,
         capture_output=True,
-        text=True,
+        encoding="utf-8",
         errors="replace",
         timeout=LONGEST,
         check=False,

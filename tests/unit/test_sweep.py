@@ -415,7 +415,7 @@ def test_a_sweep_whose_worker_is_killed_comes_to_the_same_table(here, whole):
     sweep = start(PROGRAM, *QUICK, "--out", str(out))
     wait_until(lambda: list(out.glob("points/*.json")))
     told = subprocess.run(
-        ["ps", "-A", "-o", "pid=,ppid="], capture_output=True, text=True, check=True
+        ["ps", "-A", "-o", "pid=,ppid="], capture_output=True, encoding="utf-8", check=True
     ).stdout
     pairs = [tuple(map(int, line.split())) for line in told.splitlines()]
     worker, *_ = (pid for pid, parent in pairs if parent == sweep.pid)

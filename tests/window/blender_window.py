@@ -55,7 +55,7 @@ def played(script, out, size=(1280, 800), by_hand=False, display=""):
     screen = {"BLENDER_WINDOW_SCREEN": f"{size[0]}x{size[1]}x24"}
     screen |= {"DISPLAY": display} if display else {}
     environment = os.environ | screen | {"BLENDER_USER_EXTENSIONS": str(out / "extensions")}
-    done = subprocess.run(command, env=environment, capture_output=True, text=True)
+    done = subprocess.run(command, env=environment, capture_output=True, encoding="utf-8")
     kept = os.environ.get("DIGICLAY_SCREENSHOTS")
     if kept:
         Path(kept).mkdir(parents=True, exist_ok=True)

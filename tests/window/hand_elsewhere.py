@@ -109,7 +109,7 @@ def windows_on_screen():
 
     def told(*words):
         return subprocess.run(
-            ["xdotool", *words], check=True, capture_output=True, text=True
+            ["xdotool", *words], check=True, capture_output=True, encoding="utf-8"
         ).stdout.split()
 
     lines = {

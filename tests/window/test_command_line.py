@@ -21,7 +21,12 @@ def execute(tmp_path_factory):
 
     def execute(*words, status=0):
         done = subprocess.run(
-            words, env=environment, cwd=folder, capture_output=True, text=True, timeout=TIMEOUT
+            words,
+            env=environment,
+            cwd=folder,
+            capture_output=True,
+            encoding="utf-8",
+            timeout=TIMEOUT,
         )
         assert (done.returncode, "Traceback" in done.stderr) == (status, False), (
             done.stdout + done.stderr

@@ -106,8 +106,9 @@ def advance(
         )
     running = replace(running, tick=running.tick + 1)
     if running.strokes and not running.paused:
-        least = live_session.LEAST if running.strokes[-1].held else live_session.RELEASED
-        return _work_off(running, now, live_session.find_spare(running.clock, now, interval, least))
+        held = running.strokes[-1].held
+        spare = live_session.find_spare(running.clock, now, interval, held)
+        return _work_off(running, now, spare)
     if running.paused:
         count, clock = running.steps, running.clock.stopped()
     else:

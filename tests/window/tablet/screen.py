@@ -40,7 +40,7 @@ def pen_screen(folder):
     inputs = folder / "modules" / "input"
     inputs.mkdir(parents=True)
     flags = subprocess.run(
-        ["pkg-config", "--cflags", HEADERS], check=True, capture_output=True, text=True
+        ["pkg-config", "--cflags", HEADERS], check=True, capture_output=True, encoding="utf-8"
     ).stdout.split()
     command = [
         "gcc",

@@ -23,12 +23,12 @@ from . import accuracy, snapshot
 #: Wall time over which the real-time factor is averaged, s.
 WINDOW = 1.0
 #: Longest time for the periods of a tick, as a share of the interval of ticks: the rest is for
-#: drawing and for the user.
-SHARE = 0.7
+#: drawing and for the user; and for those of a queue when the hand has let go.
+SHARE, RELEASED_SHARE = 0.7, 0.9
 #: Least time for the periods of a queue, as a share of Blender's drawing time, while a stroke is
 #: drawn, and after its end: software drawing takes half a second. At 30 frames per second, 15 are
 #: still displayed then.
-LEAST, RELEASED = 0.5, 1.0
+LEAST, RELEASED_LEAST = 0.5, 1.0
 #: Share of the time between the periods that is drawing for certain: Blender also waits for the
 #: next tick.
 DRAWN = 0.9
@@ -109,11 +109,15 @@ def _extend_window(ticks: Ticks, gone: float, done: float) -> Ticks:
     return ticks
 
 
-def find_spare(clock: Clock, now: float, interval: float, least: float = LEAST) -> float:
-    """Return the time for the periods of a queue in a tick at `now`, of ticks an `interval` apart, s."""
+def find_spare(clock: Clock, now: float, interval: float, held: bool) -> float:
+    """Return the time for the periods of a queue in a tick at `now`, of ticks an `interval` apart, s.
+
+    `held`: the hand draws a stroke.
+    """
+    share, least = (SHARE, LEAST) if held else (RELEASED_SHARE, RELEASED_LEAST)
     # Drawing cannot be measured here, only the whole time between two ticks without the periods.
     beside = interval if clock.seen is None else max(0.0, now - clock.seen - clock.spent)
-    return max(min(SHARE * interval, interval - DRAWN * beside), least * beside)
+    return max(min(share * interval, interval - DRAWN * beside), least * beside)
 
 
 def count_fitting(clock: Clock, spare: float, most: int) -> int:
