@@ -41,12 +41,12 @@ DRAWN = Drawn()
 def find_hatch(session: Running, shares: Floats, skin: bool) -> Floats:
     """Return the ends of a line over each locked pin, (2 k, 3), m; over a skin they follow it."""
     grid, height, layout = session.system.grid, session.state.row(0), session.scene.layout
-    beside = layout.find_neighbors(corners=True)
+    beside = grid.find_beside(corners=True)
     half = beside.shape[1] // 2
     tops, pins = np.column_stack([grid.positions, height]), np.flatnonzero(shares > LEAST)
     ends = []
     for neighbor in (beside[pins, 1], beside[pins, 1 + half]):
-        way = 0.5 * (tops[np.where(neighbor < 0, pins, neighbor)] - tops[pins])
+        way = 0.5 * (tops[neighbor] - tops[pins])
         if not skin:
             way = HALF * layout.pitch * np.sign(way) * (0.7, 0.7, 0.0)
         ends.append(tops[pins] + shares[pins, None] * way + (0.0, 0.0, ABOVE * layout.pitch))

@@ -32,9 +32,8 @@ def find_locks(stroke: Stroke, device: Device, height: Floats) -> Floats:
     if brush in (Brush.LOCK, Brush.UNLOCK):
         weight = weigh_path(stroke, device).max(axis=0)
         return np.maximum(locks, weight) if brush is Brush.LOCK else np.minimum(locks, 1.0 - weight)
-    beside = device.grid.layout.find_neighbors(corners=False)
-    here = np.arange(height.size)[:, None]
-    around = locks[np.column_stack([here, np.where(beside < 0, here, beside)])]
+    beside = device.grid.find_beside(corners=False)
+    around = locks[np.column_stack([np.arange(height.size), beside])]
     if brush is Brush.GROW_LOCKS:
         return np.asarray(around.max(axis=1))
     return np.asarray(around.min(axis=1) if brush is Brush.SHRINK_LOCKS else around.mean(axis=1))
@@ -65,6 +64,7 @@ def order_at_once(
     stroke: Stroke, device: Device, height: Floats, pose: Floats
 ) -> tuple[Stroke, Floats, Orders]:
     """Lock pins, at heights (n,), m, as a stroke has it, and end it; returns as `sweep.sweep`."""
+    # Smoothing of no pin: an order that makes a gesture of what changes no valve.
     order = Orders(repeat_order(1, Verb.SMOOTH))
     if stroke.brush in LOCKS:
         order = share(find_locks(stroke, device, height))

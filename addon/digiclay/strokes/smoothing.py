@@ -22,8 +22,7 @@ def smooth(grid: Grid, height: Floats, weight: Floats, radius: float) -> Floats:
     steepest within a radius, m, was.
     """
     plan, amount = grid.layout, SPREAD * radius**2
-    beside = plan.find_neighbors(corners=False)
-    beside = np.where(beside < 0, np.arange(grid.count)[:, None], beside)
+    beside = grid.find_beside(corners=False)
     cells = np.flatnonzero(weight[beside].any(axis=1) | (weight > 0.0))
     count = math.ceil(STEPS * amount / min(plan.pitch, plan.row_spacing) ** 2)
     exchange, smoothed = make_exchange(grid, amount, 1.0 / count), height[cells]
@@ -31,7 +30,7 @@ def smooth(grid: Grid, height: Floats, weight: Floats, radius: float) -> Floats:
         smoothed += weight[cells] * (exchange.even_out(cells, smoothed) - smoothed)
     spread = height.copy()
     spread[cells] = smoothed
-    length = np.hypot(grid.x[beside] - grid.x[:, None], grid.y[beside] - grid.y[:, None])
+    length = measure_distances(grid, beside)
     steep = np.abs(height[beside] - height[:, None]) / np.where(length > 0.0, length, 1.0)
     steepest = steep.max(axis=1)
     for _ in range(math.ceil(radius / plan.pitch)):
@@ -49,14 +48,18 @@ def slant(grid: Grid, formed: Floats, before: Floats, slope: float) -> Floats:
 
     The surface `before` stays as steep as it is, and so does what is formed of it.
     """
-    beside = grid.layout.find_neighbors(corners=True)
-    beside = np.where(beside < 0, np.arange(grid.count)[:, None], beside)
-    length = np.hypot(grid.x[beside] - grid.x[:, None], grid.y[beside] - grid.y[:, None])
+    beside = grid.find_beside(corners=True)
+    length = measure_distances(grid, beside)
     limit = np.maximum(slope * length, np.abs(before[beside] - before[:, None]))
     changed = formed != before
     inside = changed[beside] & changed[:, None]
     limit = np.maximum(limit, np.where(inside, np.abs(formed[beside] - formed[:, None]), 0.0))
     return bound(beside, limit, formed)
+
+
+def measure_distances(grid: Grid, beside: Cells) -> Floats:
+    """Return the distances of cells from those `beside` each, (n, k), m."""
+    return np.hypot(grid.x[beside] - grid.x[:, None], grid.y[beside] - grid.y[:, None])
 
 
 def bound(beside: Cells, limit: Floats, values: Floats) -> Floats:

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -145,6 +145,11 @@ class Grid:
         """Positions of the cells, shape (n, 2), m."""
         return np.column_stack([self.x, self.y])
 
+    def find_beside(self, *, corners: bool) -> Cells:
+        """Return neighbors as `find_neighbors`, where there is none the cell itself."""
+        beside = self.layout.find_neighbors(corners=corners)
+        return np.where(beside < 0, np.arange(self.count)[:, None], beside)
+
     def box(self, x: float, y: float, radius: float) -> Cells:
         """Return the cells in the rows and columns that a disc may reach, m, in ascending order."""
         plan = self.layout
@@ -274,14 +279,21 @@ def list_steps(shift: float) -> Cells:
     return np.array(STEPS[round(2.0 * shift)], np.intp)
 
 
+# Several milliseconds for 10,000 cells, asked for at each move of a mouse.
+@lru_cache(maxsize=8)
 def find_neighbors(rows: int, columns: int, shift: float, *, corners: bool) -> Cells:
-    """Return each cell's neighbors (n, 6), (n, 4) or with corners (n, 8), counter-clockwise; -1: none."""
+    """Return each cell's neighbors (n, 6), (n, 4) or with corners (n, 8), counter-clockwise; -1: none.
+
+    The array is kept, and read-only.
+    """
     row, column = np.divmod(np.arange(rows * columns), columns)
     steps = list_steps(shift)
     steps = (steps if corners or steps.shape[1] != len(SQUARE) else steps[:, ::2])[row % 2]
     beside, along = row[:, None] + steps[..., 0], column[:, None] + steps[..., 1]
     on_bed = (beside >= 0) & (beside < rows) & (along >= 0) & (along < columns)
-    return np.where(on_bed, beside * columns + along, -1).astype(np.intp)
+    neighbors = np.where(on_bed, beside * columns + along, -1).astype(np.intp)
+    neighbors.flags.writeable = False
+    return neighbors
 
 
 def add_disc(discs: Any, other: Disc) -> Any:
