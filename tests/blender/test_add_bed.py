@@ -77,6 +77,18 @@ def test_a_preset_of_the_user_s_own_is_taken_and_another_method_brings_its_own_g
     assert (scene.control, scene.blister, scene.valve.stroke) == (plain.control, None, 41e-6)
 
 
+@pytest.mark.parametrize("method", ["cell_states", "hybrid"])
+def test_a_preset_of_the_user_s_own_has_its_finger_on_beds_for_smaller_ones(preset, method):
+    wanted = load(own_presets.path(preset))
+    scene = make_scene(preset, Layout(9, 9, 1.5e-3), method, share=0.5)
+    for section in ("fingertip", "relaxation", "valve", "delay"):
+        assert scene.section(section) == wanted.section(section), section
+    # Its law on the area of the smaller cells.
+    assert scene.section("contact").share == pytest.approx(0.34 / 4)
+    other = make_scene("paper", Layout(), method)
+    assert scene.control == (wanted.control if method == "cell_states" else other.control)
+
+
 @pytest.mark.parametrize("rows, columns", [(1, 1), (2, 9), (6, 6)])
 @pytest.mark.parametrize("method", ["virtual_master", "cell_states"])
 def test_a_bed_smaller_than_its_blister_gets_one_that_fits(rows, columns, method):

@@ -39,6 +39,7 @@ CALLS = {
     "digiclay.clear_pins": ({}, CHANGES),
     "digiclay.skin_toggle": ({}, CHANGES),
     "digiclay.preset_apply": ({"preset": "viscous"}, CHANGES),
+    "digiclay.preset_parts": ({"filepath": "fitted.toml"}, CHANGES),
     "digiclay.preset_remove": ({}, CHANGES),
     "digiclay.shape_remove": ({}, CHANGES),
     "digiclay.take_remove": ({}, CHANGES),
@@ -226,6 +227,7 @@ def make_files(folder):
         "[[stroke]]\ndepth = 0.001\nmoves = [[0, 0, 0], [0.1, 0.002, 0]]\n"
     )
     np.save(folder / "ramp.npy", np.linspace(0.0, 1.0, 25).reshape(5, 5))
+    (folder / "fitted.toml").write_text("[contact]\nstiffness = 330.0\n")
     scene = properties.scene_of(bed)
     short = replace(scene, simulation=replace(scene.simulation, duration=0.1))
     takes.add(bed, takes.simulate(short), "Press")

@@ -1,17 +1,18 @@
-"""Presets of a device: apply, save, remove; own control methods are loaded again."""
+"""Presets of a device: apply, save, remove; parts from a file; own control methods are loaded again."""
 
 from dataclasses import replace
+from pathlib import Path
 
 from .. import preferences
-from ..compat import Context, Event, Operator, OperatorProperties
-from ..core.scene.scene_source import load
-from ..core.scene.toml_table import PRESETS
+from ..compat import Context, Event, Operator, OperatorProperties, bpy
+from ..core.scene.scene_source import load, make_scene, read_parts
+from ..core.scene.toml_table import PRESETS, tabulate
 from ..roles import bed_of
 from ..settings import own_folder, own_presets, properties
 from ..settings.declared import text
-from ..settings.devices import change_layout
+from ..settings.devices import change_layout, find_first, resize
 from ..settings.groups import PRESET_WORDS
-from .action import Action, Result, action, inform
+from .action import Action, FileAction, Result, action, file_of, inform
 from .poll_messages import cannot_change, no_bed, no_own_methods, no_own_preset
 
 
@@ -84,6 +85,25 @@ class RemovePreset(Action, Operator):
         own_presets.remove(settings.own_preset)
         inform(self, "Removed the preset {}", settings.own_preset)
         settings.own_preset = ""
+
+
+@action(
+    "digiclay.preset_parts",
+    "Device and Finger from File",
+    cannot_change,
+    bases=(FileAction,),
+    **file_of("*.toml", "SKIP_SAVE"),
+)
+def take_parts(operator: Operator, context: Context) -> None:
+    """Set the parameters of device and finger that a file has, such as fitted.toml; the others stay"""
+    path, bed = Path(bpy.path.abspath(operator.filepath)), bed_of(context)
+    scene = make_scene(None, tabulate(properties.read_scene(bed)), read_parts(path))
+    tip = scene.fingers[0].fingertip
+    if tip is not None:
+        resize(find_first(bed), tip)  # a blister may follow
+    blister = properties.read_scene(bed).blister
+    properties.write_scene(bed, replace(scene, blister=blister))
+    inform(operator, "Device and finger have the parameters of {}", path.name)
 
 
 @action("digiclay.methods_reload", "Reload Methods", no_own_methods, options=(), in_any_mode=True)

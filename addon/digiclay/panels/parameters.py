@@ -40,6 +40,9 @@ def presets(entries: Menu, context: Context) -> None:
         entries.layout.separator()
     for name in names:
         entries.layout.operator("digiclay.preset_apply", text=name).preset = name
+    entries.layout.separator()
+    entries.layout.operator_context = "INVOKE_DEFAULT"
+    entries.layout.operator("digiclay.preset_parts", text="Parts from File...", icon="FILE_FOLDER")
 
 
 @panel("DIGICLAY_PT_device", "Device", 2, parent=LABORATORY)

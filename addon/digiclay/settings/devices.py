@@ -69,7 +69,10 @@ LENGTHS = ("radius", "edge_radius", "flat_radius", "sigma")
 
 
 def make_scene(preset: str, layout: Layout, method: str, share: float = 1.0) -> Scene:
-    """Return the scene of a preset, with another plan of the bed, method and size of the fingertip."""
+    """Return the scene of a preset, with another plan of the bed and method.
+
+    `share`: size of the fingertip and blister of a preset of the core.
+    """
     # In Method I the blister rises from each cell's own height: the paper's strokes do not cross,
     # those of a sculptor do.
     control = {"layout": {"arrangement": layout.arrangement}, "control": {"method": method}}
@@ -78,11 +81,14 @@ def make_scene(preset: str, layout: Layout, method: str, share: float = 1.0) -> 
         if isinstance(scene.control, VirtualMaster):
             scene = replace(scene, control=replace(scene.control, ground="cell"))
         return change_layout(_scale_finger(scene, share), layout)
+    # A preset of the user's own has its finger's size.
     scene = load(path(preset))
     if scene.method != method:
-        plain = resolve(control)
+        tip = scene.fingers[0].fingertip
+        size = tip.width / Fingertip().width if tip else 1.0
+        plain = _scale_finger(resolve(control), size)
         scene = replace(scene, method=method, control=plain.control, blister=plain.blister)
-    return change_layout(_scale_finger(scene, share), layout)
+    return change_layout(scene, layout)
 
 
 def change_layout(scene: Scene, layout: Layout) -> Scene:

@@ -3,9 +3,11 @@
 import dataclasses
 
 import bpy
+import digiclay
 import numpy as np
 import pytest
 from digiclay.core.control.methods import METHODS
+from digiclay.core.scene.scene_source import load
 from digiclay.core.scene.schema import OPTIONAL, SECTIONS, import_parameters
 from digiclay.live import handlers
 from digiclay.sessions import running
@@ -137,3 +139,90 @@ def test_a_session_is_told_by_the_new_name_of_its_bed(bed, clock):
     clock.tick()
     (session,) = running.list_sessions()
     assert session.name == session.scene.name == "Renamed"
+
+
+#: Files as of `digiclay fit`: of a finger and of a cell.
+FINGER = """description = "Fitted pulp"
+[fingertip]
+length = 0.012
+width = 0.009
+height = 0.0085
+[contact]
+stiffness = 500.123456
+exponent = 1751.533
+[relaxation]
+times = [0.00187009, 0.00307019, 0.004255916]
+weights = [0.08546971, 0.6285909, 0.1962111, 0.08972834]
+[uncertainty]
+keys = ["contact.stiffness"]
+logarithms = [true]
+covariance = [[0.01]]
+"""
+CELL = """[actuator]
+bore = 0.0021
+[valve]
+orifice_diameter = 0.0004599788
+[delay]
+dead_time = 0.001558179
+"""
+
+
+def take_parts(folder, text):
+    """Give the bed the parts of a file; return the scene that the file is alone, without its name."""
+    path = folder / "fitted.toml"
+    path.write_text(text, encoding="utf-8")
+    assert bpy.ops.digiclay.preset_parts(filepath=str(path)) == {"FINISHED"}
+    return load(path)
+
+
+def test_a_bed_has_the_parts_of_files_and_its_finger_presses_with_them(bed, clock, tmp_path):
+    before = properties.scene_of(bed)
+    finger = take_parts(tmp_path, FINGER)
+    # The blister follows the finger's width, as when it is resized by hand.
+    assert properties.scene_of(bed).blister.radius == pytest.approx(before.blister.radius * 9 / 8)
+    cell = take_parts(tmp_path, CELL)
+    scene = properties.scene_of(bed)
+    for name in SECTIONS:
+        wanted = cell if name in ("actuator", "valve", "delay") else before
+        wanted = finger if name in ("fingertip", "contact", "relaxation") else wanted
+        assert name == "blister" or scene.section(name) == wanted.section(name), name
+
+    bed.digiclay.use_control = False  # so that no valve opens
+    started(bed)
+    depth = 1.5
+    top = 1e3 * scene.actuator.rest_height
+    lifted = 1e3 * (scene.section("fingertip").height - 8e-3)  # `move` has the paper's finger
+    place = (0.0, top - depth + lifted)
+    assert move(bed, clock, [(0.0, 60.0), *[place] * 5]) == []
+    elastic = digiclay.force(scene, [0.0, 0.0, (top - depth) * 1e-3]).sum()
+    # 32 bits of a Blender unit at most are 30 nm, and the force grows by 0.2 % per um.
+    relaxed = pytest.approx(0.08546971 * elastic, rel=1e-4)
+    assert running.find(bed).state.finger_forces().tolist() == [relaxed]
+
+
+#: Contents of a file, and what is said of it.
+REFUSED = [
+    ("[contact]\nstiffness = -1\n", "contact.stiffness must be"),
+    ("[contact]\nstiffnes = 1\n", "contact.stiffnes"),
+    ("[contact]\nstiffness = nan\n", "contact.stiffness must be"),
+    ("[actuator]\nbore = 0.004\n", "must be at least actuator.bore"),
+    ("[control]\nmethod = 'hybrid'\n", "control"),
+    ("contact = 3\n", "contact must be"),
+    ("stiffness\n", "line 1"),
+    (None, "cannot be read"),
+]
+
+
+def test_parts_that_a_bed_cannot_have_are_refused_in_a_line(bed, tmp_path):
+    before, path = properties.read_stored_settings(bed), tmp_path / "fitted.toml"
+    for text, said in REFUSED:
+        path.unlink(missing_ok=True)
+        if text is not None:
+            path.write_text(text, encoding="utf-8")
+        with pytest.raises(RuntimeError) as told:
+            bpy.ops.digiclay.preset_parts(filepath=str(path))
+        words = str(told.value).removeprefix("Error: ").strip()
+        assert said in words
+        assert "\n" not in words
+        assert len(words) <= 400 + len(str(tmp_path))
+        assert properties.read_stored_settings(bed) == before
