@@ -20,7 +20,7 @@ from digiclay.sessions.forming_device import find_device
 from digiclay.sessions.sculpting import queue_stroke
 from digiclay.strokes import drawn
 from digiclay.strokes.falloff import Falloff, evaluate
-from digiclay.strokes.locks import find_inside, find_locks
+from digiclay.strokes.locks import find_inside, find_locks, place_images
 from digiclay.strokes.nominal import Device, find_ghosts, find_nominal, find_radius
 from digiclay.strokes.stamps import load_stamp
 from digiclay.strokes.stroke import Brush, Combine, lay_path, make_images, start
@@ -138,6 +138,29 @@ def test_a_lasso_is_even_odd_where_it_crosses_itself(path, inside):
     places = [LEFT, RIGHT, TOP, *BESIDE, (np.nan, np.nan)]
     found = find_inside(np.array(places, float), np.array([*path, path[0]], float))
     assert {place for place, is_in in zip(places, found, strict=True) if is_in} == inside
+
+
+@pytest.mark.parametrize(
+    "symmetry, count, center, locked",
+    [
+        ("NONE", 2, (0.0, 0.0), {(-2, -1)}),
+        ("X", 2, (0.0, 0.0), {(-2, -1), (2, -1)}),
+        ("X", 2, (-3e-3, 0.0), {(-2, -1), (0, -1)}),
+        ("XY", 2, (0.0, 0.0), {(-2, -1), (2, -1), (-2, 1), (2, 1)}),
+        ("RADIAL", 4, (-3e-3, 0.0), {(-2, -1), (0, -1), (-2, 1), (0, 1)}),
+        ("RADIAL", 3, (-6e-3, -3e-3), {(-2, -1)}),
+    ],
+)
+def test_an_area_locks_the_pins_that_come_into_it_by_the_symmetry(symmetry, count, center, locked):
+    grid = device_of("aligned", np.zeros(15)).grid
+    images = make_images(symmetry, count, center)
+    found = set()
+    for places in place_images(images, grid, np.arange(15.0)):
+        near = np.hypot(*(places[:, :2] - grid.positions[0]).T) < 1e-6
+        found |= {tuple(pin) for pin in np.rint(grid.positions[near] / 3e-3).astype(int).tolist()}
+        # It is looked at where the surface is that comes there.
+        assert (places[near, 2] == 0.0).all()
+    assert found == locked
 
 
 @pytest.mark.parametrize("falloff", list(Falloff)[1:])

@@ -113,5 +113,52 @@ def script(blender):
     yield from blender.rounds(8)
     blender.shot("locks_pins_cleared")
     for name in ("skin", "pins_blurred", "skin_cleared", "pins_cleared"):
-        pixels = read_shot(f"locks_{name}", blender)
-        blender.SEEN[f"white {name}"] = int((pixels > 0.98).all(axis=-1).sum())
+        blender.SEEN[f"white {name}"] = count_white(blender, name).tolist()
+    settings.symmetry = "X"
+    words, _ = draw(blender, *BOX, before="key b sleep 0.4")
+    yield from act(blender, *words)
+    keep(blender, "mirrored box")
+    settings.symmetry = "NONE"
+    yield from change(blender, "left in part", bpy.ops.digiclay.press_locks, change="BLUR")
+    yield from without_session(blender)
+
+
+def count_white(blender, name):
+    """Return how many pixels are white in the left and in the right half of the view in a picture."""
+    white = (read_shot(f"locks_{name}", blender) > 0.98).all(axis=-1).sum(axis=0)
+    return np.array([half.sum() for half in np.array_split(white, 2)])
+
+
+def without_session(blender):
+    """Look at two beds without a session, as skin and as pins, before and after the file is opened again."""
+    yield from act(blender, "key Escape")
+    yield from blender.stopped()
+    bed = blender.beds()[0]
+    blender.select(bed)
+    blender.call(bpy.ops.object.duplicate)
+    other = bpy.context.object
+    other.location.x += 1.1 * bed.dimensions.x
+    bed.digiclay_display.form, other.digiclay_display.form = "skin", "pins"
+    blender.call(bpy.ops.object.select_all, action="DESELECT")
+    yield from blender.rounds(8)
+    blender.call(bpy.ops.view3d.view_axis, type="TOP")
+    blender.call(bpy.ops.view3d.view_orbit, angle=0.7, type="ORBITUP")
+    blender.call(bpy.ops.view3d.view_all)
+    yield from look_with_and_without(blender, "two")
+    file = str(blender.OUT / "locked.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=file)
+    bpy.ops.wm.open_mainfile(filepath=file)
+    yield from blender.rounds(8)
+    yield from look_with_and_without(blender, "opened")
+
+
+def look_with_and_without(blender, name):
+    """Write down how many white pixels the overlays have in both halves of a picture."""
+    area, _ = blender.view()
+    for shown in (True, False):
+        area.spaces.active.overlay.show_overlays = shown
+        yield from blender.rounds(8)
+        blender.shot(f"locks_{name}_{shown}")
+    area.spaces.active.overlay.show_overlays = True
+    white = [count_white(blender, f"{name}_{shown}") for shown in (True, False)]
+    blender.SEEN[f"white {name}"] = (white[0] - white[1]).tolist()

@@ -50,6 +50,20 @@ def test_a_lasso_that_crosses_itself_locks_both_loops_and_is_one_undo_step(seen)
     np.testing.assert_array_equal(shares(seen, "lasso undone"), shares(seen, "box"))
 
 
+def test_a_box_locks_the_mirror_images_of_what_is_seen_in_it(seen):
+    left, top, right, bottom = np.ravel(seen["box"]["path"])
+    corners = [(left, top), (right, top), (right, bottom), (left, bottom), (left, top)]
+    shape = up(seen, "mirrored box").shape
+    low, high = np.sort([(left, top), (right, bottom)], axis=0)
+    places = np.array(seen["mirrored box"]["seen"])
+    inside = ((places > low) & (places < high)).all(axis=1)
+    far = is_far(seen, "mirrored box", corners)
+    mirrored, both = (each.reshape(shape)[:, ::-1].ravel() for each in (inside, far))
+    far &= both
+    assert (inside & ~mirrored)[far].sum() > 20
+    np.testing.assert_array_equal(shares(seen, "mirrored box")[far], (inside | mirrored)[far])
+
+
 def test_ctrl_unlocks_and_a_box_beside_the_bed_changes_nothing(seen):
     lost = shares(seen, "box") - shares(seen, "box with ctrl")
     assert set(lost) == {0.0, 1.0}
@@ -80,5 +94,13 @@ def test_erasing_brings_pins_locked_in_part_back_by_the_rest_of_their_share(seen
 def test_locked_pins_are_hatched_in_skin_and_pins_until_they_are_free(seen):
     assert not shares(seen, "cleared").any()
     for locked, free in (("skin", "skin_cleared"), ("pins_blurred", "pins_cleared")):
-        white = seen[f"white {locked}"], seen[f"white {free}"]
+        white = sum(seen[f"white {locked}"]), sum(seen[f"white {free}"])
         assert white[0] > white[1] + 1000, (locked, white)
+
+
+def test_locked_pins_of_several_beds_are_hatched_without_a_session_and_in_a_file_opened_again(seen):
+    partly = shares(seen, "left in part")
+    assert ((partly > 0.0) & (partly < 1.0)).sum() > 20
+    # A skin is on the left, pins are on the right.
+    for name in ("two", "opened"):
+        assert min(seen[f"white {name}"]) > 300, (name, seen[f"white {name}"])

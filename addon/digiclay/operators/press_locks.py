@@ -10,7 +10,7 @@ from ..core.base.arrays import Floats
 from ..panels.base import menu
 from ..press import aim, brush, tool
 from ..settings.declared import choice, flag
-from ..strokes.locks import find_inside
+from ..strokes.locks import find_inside, place_images
 from ..strokes.stroke import Brush, Place
 from ..ui_text import localize
 from .action import Action, Drawing, Result, action, inform, millimeters, show_status
@@ -79,7 +79,7 @@ def choose_kind(unlock: bool) -> Brush:
 
 
 class LockArea(Drawing, Operator):
-    """Lock, or with Ctrl unlock, the pins inside a box or a lasso, also those that others hide"""
+    """Lock, or with Ctrl unlock, the pins inside a box or a lasso and its mirror images, also hidden ones"""
 
     bl_idname = "digiclay.press_locks_area"
     bl_label = "Lock Area"
@@ -120,9 +120,13 @@ class LockArea(Drawing, Operator):
     def _lock(self, context: Context) -> Result:
         """Lock the pins inside."""
         bed: Any = brush.bed_in_use(context)
-        grid, height = aim.read_surface(bed)
-        seen = bridge.project(context, bed, np.column_stack([grid.positions, height]))
-        pins = np.flatnonzero(find_inside(seen, self._outline())).tolist()
+        # The images of a symmetry are a group: what comes to a pin is among those it comes to.
+        images, outline = brush.find_images(brush.tool_settings(context)), self._outline()
+        found = [
+            find_inside(bridge.project(context, bed, places), outline)
+            for places in place_images(images, *aim.read_surface(bed))
+        ]
+        pins = np.flatnonzero(np.any(found, axis=0)).tolist()
         if not pins:
             inform(self, NONE)
             return {"CANCELLED"}

@@ -4,7 +4,7 @@ Light with a dark edge, it is told from a shadow and from any color of a pin. Th
 of their overlays hides it.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -12,10 +12,15 @@ import numpy as np
 from .. import bridge
 from ..compat import Context, Object, bpy
 from ..core.base.arrays import Floats
+from ..core.base.errors import DigiclayError
+from ..core.base.modes import LOCKED
+from ..core.model.layout import Grid
+from ..core.session.snapshot import read_shares
 from ..device import view
+from ..live import beds
+from ..roles import is_bed
 from ..sessions import running
-from ..sessions.running import Running
-from .brush import find_bed
+from .aim import read_surface
 from .tool import DARK, LIGHT
 
 #: How far above the pins the hatch is, and half its length on a pin that is drawn alone, in pitches.
@@ -26,55 +31,97 @@ LOOKS = (DARK, 6.0), (LIGHT, 1.8)
 LEAST = 0.02
 
 
+#: Beds whose lines are stored.
+MOST = 32
+
+
 @dataclass
 class Drawn:
-    """Lines of the last bed drawn, what they were made of, and the handler that draws."""
+    """Lines of the last beds drawn, and what they were made of, by `session_uid`; the handler that draws."""
 
-    made_of: tuple[Any, ...] = ()
-    batch: Any = None
+    hatches: dict[int, tuple[object, Any]] = field(default_factory=dict)
     handle: Any = None
 
 
 DRAWN = Drawn()
 
 
-def find_hatch(session: Running, shares: Floats, skin: bool) -> Floats:
+def find_hatch(grid: Grid, height: Floats, shares: Floats, skin: bool) -> Floats:
     """Return the ends of a line over each locked pin, (2 k, 3), m; over a skin they follow it."""
-    grid, height, layout = session.system.grid, session.state.row(0), session.scene.layout
-    beside = grid.find_beside(corners=True)
+    pitch, beside = grid.layout.pitch, grid.find_beside(corners=True)
     half = beside.shape[1] // 2
     tops, pins = np.column_stack([grid.positions, height]), np.flatnonzero(shares > LEAST)
     ends = []
     for neighbor in (beside[pins, 1], beside[pins, 1 + half]):
         way = 0.5 * (tops[neighbor] - tops[pins])
         if not skin:
-            way = HALF * layout.pitch * np.sign(way) * (0.7, 0.7, 0.0)
-        ends.append(tops[pins] + shares[pins, None] * way + (0.0, 0.0, ABOVE * layout.pitch))
+            way = HALF * pitch * np.sign(way) * (0.7, 0.7, 0.0)
+        ends.append(tops[pins] + shares[pins, None] * way + (0.0, 0.0, ABOVE * pitch))
     return np.stack(ends, axis=1).reshape(-1, 3)
 
 
+def find_shares(bed: Object) -> Floats:
+    """Return the shares (n,) by which a bed's pins are locked, in its session or as it is stored."""
+    session = running.find(bed)
+    if session is not None:
+        return session.state.shares()
+    whole = bridge.read_cells(bed.data)["mode"] == LOCKED
+    stored = beds.read_snapshot(bed)
+    shares = np.zeros(whole.size) if stored is None else read_shares(stored)
+    # A take that is played shows locks of its own.
+    return shares if np.array_equal(shares == 1.0, whole) else whole.astype(np.float64)
+
+
+def identify(bed: Object) -> object:
+    """Return what tells apart the hatches of a bed."""
+    session, skin = running.find(bed), view.is_skin_shown(bed)
+    if session is not None:
+        return session.tick, session.state.period, skin
+    cells = bridge.read_cells(bed.data)
+    shown = cells["height"].tobytes(), cells["mode"].tobytes()
+    return hash((beds.read_snapshot(bed), *shown)), skin
+
+
 def _draw() -> None:
-    """Draw the hatch of all sessions into a view."""
+    """Draw the hatch of all beds into a view."""
     context = bpy.context
     if not context.space_data.overlay.show_overlays:
         return
-    for session in running.list_sessions():
-        bed, shares = find_bed(context, session.uid), session.state.shares()
-        if bed is not None and bed.visible_get() and (shares > LEAST).any():
-            _draw_hatch(context, bed, session, shares)
+    for bed in filter(is_bed, context.visible_objects):
+        try:
+            batch = _find_batch(bed)
+        except DigiclayError:  # its panel tells what is wrong with it
+            continue
+        if batch is not None:
+            _draw_hatch(context, bed, batch)
 
 
-def _draw_hatch(context: Context, bed: Object, session: Running, shares: Floats) -> None:
-    """Draw the hatch of a bed."""
+def _find_batch(bed: Object) -> Any:
+    """Return the lines over a bed; None: no pin is locked."""
     import gpu
     from gpu_extras.batch import batch_for_shader
 
-    shader, skin = gpu.shader.from_builtin("POLYLINE_UNIFORM_COLOR"), view.is_skin_shown(bed)
-    made_of = session.uid, session.tick, session.state.period, skin
-    if DRAWN.made_of != made_of:
-        ends = find_hatch(session, shares, skin) * bridge.SCALE
-        DRAWN.made_of = made_of
-        DRAWN.batch = batch_for_shader(shader, "LINES", {"pos": ends.astype(np.float32)})
+    if running.find(bed) is None and beds.STATE not in bed:
+        return None
+    uid, made_of = bed.session_uid, identify(bed)
+    former, batch = DRAWN.hatches.pop(uid, (None, None))
+    if former != made_of:
+        shares, batch = find_shares(bed), None
+        if (shares > LEAST).any():
+            ends = find_hatch(*read_surface(bed), shares, view.is_skin_shown(bed)) * bridge.SCALE
+            shader = gpu.shader.from_builtin("POLYLINE_UNIFORM_COLOR")
+            batch = batch_for_shader(shader, "LINES", {"pos": ends.astype(np.float32)})
+    DRAWN.hatches[uid] = made_of, batch
+    if len(DRAWN.hatches) > MOST:
+        del DRAWN.hatches[next(iter(DRAWN.hatches))]
+    return batch
+
+
+def _draw_hatch(context: Context, bed: Object, batch: Any) -> None:
+    """Draw the hatch of a bed."""
+    import gpu
+
+    shader = gpu.shader.from_builtin("POLYLINE_UNIFORM_COLOR")
     gpu.state.depth_test_set("LESS_EQUAL")
     gpu.state.depth_mask_set(False)
     try:
@@ -85,7 +132,7 @@ def _draw_hatch(context: Context, bed: Object, session: Running, shares: Floats)
                 shader.uniform_float("viewportSize", gpu.state.viewport_get()[2:])
                 shader.uniform_float("lineWidth", width * context.preferences.system.pixel_size)
                 shader.uniform_float("color", (*color, 1.0))
-                DRAWN.batch.draw(shader)
+                batch.draw(shader)
     finally:
         gpu.state.depth_test_set("NONE")
 
@@ -98,4 +145,4 @@ def register() -> None:
 def unregister() -> None:
     """Draw no more of it, and forget what was drawn."""
     bpy.types.SpaceView3D.draw_handler_remove(DRAWN.handle, "WINDOW")
-    DRAWN.made_of, DRAWN.batch = (), None
+    DRAWN.hatches.clear()

@@ -4,6 +4,7 @@ A pin of share 1 is locked: its valves are shut. One locked in part moves as any
 stroke is formed; what a brush leaves of it is the share of its way that its lock does not take.
 """
 
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import pairwise
 
@@ -11,8 +12,9 @@ import numpy as np
 
 from ..core.base.arrays import TIE, Flags, Floats
 from ..core.control.orders import Orders, Verb, repeat_order, share
+from ..core.model.layout import Grid
 from .nominal import Device, weigh_path
-from .stroke import DONE, LOCKS, RETURNING, SWEPT, Brush, Stroke
+from .stroke import DONE, LOCKS, RETURNING, SWEPT, Brush, Image, Stroke
 
 #: Brushes that are done at once, wherever the fingertip is.
 AT_ONCE = (*(brush for brush in LOCKS if brush not in SWEPT), Brush.SET_BASE)
@@ -58,6 +60,13 @@ def find_inside(places: Floats, path: Floats) -> Flags:
             beside = x < left + (y - low) / (high - low) * (right - left)
             inside ^= ((low > y) != (high > y)) & beside
     return inside
+
+
+def place_images(images: Sequence[Image], grid: Grid, height: Floats) -> Iterator[Floats]:
+    """Yield for each image the places (n, 3), m, on pins at heights (n,), that it brings to the pins."""
+    for image in images:
+        x, y = image.place(grid.x, grid.y)
+        yield np.column_stack([x, y, height[grid.at(x, y)]])
 
 
 def order_at_once(

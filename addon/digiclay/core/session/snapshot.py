@@ -16,7 +16,7 @@ import numpy as np
 
 from ..base.arrays import Array, Floats
 from ..base.errors import StateError
-from ..base.modes import HOLD, REST, Mode
+from ..base.modes import HOLD, LOCKED, REST, Mode
 from ..control.pin_division import Hands
 from ..engine.simulation import begin
 from ..engine.state import ActiveSet, Rows, State
@@ -196,6 +196,14 @@ def load(system: System, data: bytes) -> State:
 def count_fingers(data: bytes) -> int:
     """Return the number of fingers of a stored state; StateError if it is damaged."""
     return len(_read(data).header["gathered"]["fingers"])
+
+
+def read_shares(data: bytes) -> Floats:
+    """Return the shares by which pins of a stored state are locked, (n,); StateError if it is damaged."""
+    arrays = _read(data).arrays
+    modes = arrays["modes"]
+    modes[arrays["cells"]] = arrays["mode"]
+    return np.where(modes == LOCKED, 1.0, arrays.get("locks", 0.0))
 
 
 def transfer_heights(system: System, data: bytes) -> State:
