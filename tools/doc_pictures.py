@@ -50,8 +50,6 @@ INSTANTS = {
     "two_hands_bowl": 9.0,
     "viscous_press": 2.7,
 }
-#: Area of a picture of 640 x 400 pixels beside its legend.
-BESIDE = (120, 10, 640, 400)
 #: Film of one of them: a series, and how long a frame is shown, ms.
 HAND_FILM = """\
 scenes = ["two_hands_bowl"]
@@ -162,7 +160,7 @@ def draw_hands(folder: Path, name: str) -> None:
 
 def draw_sample(folder: Path, name: str) -> None:
     """Draw a sample scene for the table of all."""
-    save_jpeg(draw_instant(folder, name, "640x400", "mode"), f"samples/{name}.jpg", 70, BESIDE)
+    save_jpeg(draw_instant(folder, name, "520x390"), f"samples/{name}.jpg", 70)
 
 
 def draw_hand_film(folder: Path) -> None:

@@ -248,6 +248,12 @@ def test_curves_become_strokes_of_the_brush_with_its_settings_and_one_undo_step(
     assert queue() == ()
 
 
+def test_a_curve_of_1e5_places_is_a_stroke_of_its_millimeters(settings):
+    form(LINES["1e5 places"][0]())
+    (stroke,) = queue()
+    assert len(stroke.samples) == 61
+
+
 def test_a_ring_is_raised_along_it_without_a_seam_whether_or_not_strokes_accumulate(settings):
     settings.height = 8.0
     for settings.accumulate in (False, True):

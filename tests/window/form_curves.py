@@ -1,4 +1,4 @@
-"""Forms along a text and an imported SVG, then stamps the text, on a bed in a real window."""
+"""Forms along a curve, a text and an SVG, then stamps what is filled: X events, from the menus."""
 
 from pathlib import Path
 
@@ -19,10 +19,15 @@ from tests.window.hand_strokes import (
     to,
 )
 
-#: A ring, and a roof in it that is open below, in mm.
+#: A ring, a filled disc beside it, and in it a roof that is open below, in mm.
 SVG = """<svg xmlns="http://www.w3.org/2000/svg" width="80mm" height="80mm" viewBox="0 0 80 80">
 <circle cx="40" cy="40" r="30" fill="none" stroke="black"/>
+<circle cx="9" cy="9" r="6" fill="black"/>
 <path d="M28 30 L40 18 L52 30" fill="none" stroke="black"/></svg>"""
+
+
+#: The Object menu, pixels from the top left corner of the window, and half the height of an entry.
+OBJECT, HALF = (328, 41), 10
 
 
 def script(blender):
@@ -33,18 +38,38 @@ def script(blender):
     settings.brush, settings.height = "RAISE", 8.0
     add_curves(blender)
     yield from blender.rounds()
-    yield from look_at_menus(blender)
-    blender.call(bpy.ops.digiclay.press_curves, "EXEC_DEFAULT", True)
-    yield from blender.rounds()
+    yield from act(blender, to(on_the_screen(blender, 0.0, 0.0)), "key a sleep 0.5")
+    blender.SEEN["selected"] = len([thing for thing in curves() if thing.select_get()])
+    yield from click_entry(blender, "along", 2)
+    yield from blender.until(lambda: blender.session() is not None)
     blender.SEEN["queued"] = blender.session().begun_strokes
     blender.shot("curves_queued")
     yield from formed(blender, "formed")
     yield from act(blender, to(on_the_screen(blender, 0.0, 0.0)), "key ctrl+z")
     note(blender, "undone")
     for thing in curves():
-        thing.select_set(thing.type == "FONT")
-    blender.call(bpy.ops.digiclay.press_curves, "EXEC_DEFAULT", True, fill=True)
+        filled = thing.type == "FONT" or thing.data.fill_mode != "NONE"
+        thing.select_set(filled and thing.data.dimensions == "2D")
+    yield from click_entry(blender, "filled", 1)
     yield from formed(blender, "stamped")
+
+
+def click_entry(blender, name, number):
+    """Open the Object menu by the pointer, and click an entry, by its number from the end.
+
+    The arrow keys tell where it is: the picture changes in it and in the one above.
+    """
+    yield from done(blender, hand(to(OBJECT, 0.3), "click 1 sleep 0.8"))
+    pictures = []
+    for words in (["key Up sleep 0.3"] * number, ["key Up sleep 0.3"]):
+        yield from done(blender, hand(*words))
+        blender.shot(f"curves_{name}")
+        pictures.append(blender.read_shot(f"curves_{name}"))
+    rows, columns = np.nonzero((np.abs(pictures[1] - pictures[0]) > 0.05).any(axis=-1))
+    x, y = int(np.median(columns)), len(pictures[0]) - int(rows.min()) - HALF
+    yield from done(blender, hand(to((x + 3, y), 0.3), to((x, y), 0.3)))
+    blender.shot(f"curves_{name}")  # a menu takes clicks when it has been drawn
+    yield from done(blender, hand("click 1 sleep 0.5"))
 
 
 def curves():
@@ -62,8 +87,8 @@ def add_curves(blender):
         thing.scale, thing.location = (16.0,) * 3, (-0.64, -0.64, 0.6)
     blender.call(bpy.ops.object.text_add, location=(-0.2, -0.34, 0.6))
     bpy.context.object.data.body, bpy.context.object.data.size = "R", 0.6
-    for thing in curves():
-        thing.select_set(True)
+    blender.call(bpy.ops.curve.primitive_bezier_curve_add, radius=0.14, location=(0.54, -0.58, 0.6))
+    blender.call(bpy.ops.object.select_all, action="DESELECT")
     blender.evaluate()
     blender.SEEN["lines"] = [line for thing in curves() for line in convert(thing)]
     bpy.ops.ed.undo_push(message="Curves")
@@ -84,15 +109,6 @@ def convert(thing):
         lines.append(places[line].tolist())
     other.to_mesh_clear()
     return lines
-
-
-def look_at_menus(blender):
-    for name, operator in (("DIGICLAY_PT_press_stroke", "panel"), ("VIEW3D_MT_object", "menu")):
-        yield from done(blender, hand(to((300, 250), 0.3)))
-        blender.call(getattr(bpy.ops.wm, f"call_{operator}"), "INVOKE_DEFAULT", name=name)
-        yield from blender.rounds()
-        blender.shot(f"curves_{operator}")
-        yield from done(blender, hand("key Escape"))
 
 
 def formed(blender, name):
