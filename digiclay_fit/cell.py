@@ -2,8 +2,8 @@
 
 The opening is exact between commands, which are held from sample to sample; the flow is summed by three
 points of Gauss in each piece of time. The load is known, so nothing is integrated step by step. Fitted
-are conductance and knee of the orifice: the diameter and the stroke follow, the latter where the flow
-becomes turbulent.
+is the conductance of the orifice, from which its diameter follows, and where the stroke is free the knee,
+from which that follows; else the knee is that of the scene's stroke.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from digiclay.core.base.errors import DigiclayError
 from digiclay.core.model.laws import select_law
 from digiclay.core.scene.schema import Scene
 
-from .estimation import Derived, Estimate, Parameter
+from .estimation import Derived, Parameter
 from .records import Trial
 
 #: Groups of parameters that may be free beside the diameter of the orifice.
@@ -28,6 +28,7 @@ WEIGHTS = np.array((5.0, 8.0, 5.0)) / 18.0
 #: Knees at which a fit starts, Pa: above the supply it has no effect, and stays.
 KNEES = (1e4, 4e4, 1e7)
 DIAMETER, STROKE = "valve.orifice_diameter", "valve.stroke"
+HIGH, LOW = "supply.high", "supply.low"
 LAG, DELAY = "valve_lag.time_constant", "delay.dead_time"
 
 
@@ -82,8 +83,6 @@ class CellTrial:
 class CellModel:
     """Model of all samples of some trials; `groups`: what is free."""
 
-    held_first: tuple[int, ...] = (1,)
-
     def __init__(self, scene: Scene, trials: Sequence[Trial], groups: Sequence[str]) -> None:
         self.trials, self.groups = [CellTrial(trial) for trial in trials], tuple(groups)
         self.measured = np.concatenate([trial.answer for trial in trials])
@@ -99,18 +98,21 @@ class CellModel:
         lag = scene.valve_lag.time_constant if scene.valve_lag else absent
         dead = scene.delay.dead_time if scene.delay else 0.0
         self.usual = {
-            "supply.high": scene.supply.high,
-            "supply.low": scene.supply.low,
+            HIGH: scene.supply.high,
+            LOW: scene.supply.low,
             LAG: lag,
             DELAY: dead,
         }
         start, far = math.log(orifice.laminar), math.log(1e4)
         found = [Parameter(DIAMETER, "m3/(s Pa)", start, start - far, start + far, log=True)]
-        low, high, wanted = math.log(10.0), math.log(1e9), "stroke" in groups
-        knee = Parameter(STROKE, "Pa", math.log(KNEES[0]), low, high, True, wanted, beside=DIAMETER)
-        found.append(knee)
+        self.held_first: tuple[int, ...] = ()
+        if "stroke" in groups:
+            low, high = math.log(10.0), math.log(1e9)
+            knee = Parameter(STROKE, "Pa", math.log(KNEES[0]), low, high, True, beside=DIAMETER)
+            found.append(knee)
+            self.held_first = (1,)
         if "supply" in groups:
-            for key in ("supply.high", "supply.low"):
+            for key in (HIGH, LOW):
                 found.append(Parameter(key, "Pa", self.usual[key], -1e6, 1e6))
         if "lag" in groups:
             found.append(
@@ -119,10 +121,11 @@ class CellModel:
         if "delay" in groups:
             longest = max(float(trial.time[-1]) for trial in self.trials) / 2.0
             found.append(Parameter(DELAY, "s", min(dead, longest / 2.0), 0.0, longest))
-        self.defaults = {
-            i: each.start for i, each in enumerate(found) if each.wanted or each.key == STROKE
-        }
-        self.defaults[1] = math.log(orifice.knee)
+        self.defaults = {i: each.start for i, each in enumerate(found)}
+        #: Logarithm of knee times conductance: that of a stroke, at any diameter.
+        self.knee = math.log(orifice.knee * orifice.laminar)
+        if "stroke" in groups:
+            self.defaults[1] = math.log(orifice.knee)
         first = len(found)
         for number, trial in enumerate(trials, 1):
             rest = float(trial.answer[0])
@@ -146,24 +149,28 @@ class CellModel:
 
     def _predict_trial(self, number: int, free: Floats) -> tuple[Floats, Floats]:
         trial, index = self.trials[number], self.index
-        lag = self._value(free, LAG)
-        delay = self._value(free, DELAY)
+        lag, delay = self._value(free, LAG), self._value(free, DELAY)
         trial.divide(delay)
         opening, by_lag, by_delay = trial.open(lag, delay)
         up = opening > 0.0
-        source = np.where(up, self._value(free, "supply.high"), self._value(free, "supply.low"))
+        source = np.where(up, self._value(free, HIGH), self._value(free, LOW))
+        drop = source - trial.load / self.area
+        knee = free[index[STROKE]] if STROKE in index else self.knee - free[0]
         flow, by_conductance, by_knee, by_drop, by_opening = self._flow(
-            math.exp(free[0]), math.exp(free[1]), opening, source - trial.load / self.area
+            math.exp(free[0]), math.exp(knee), opening, drop
         )
+        slopes = {
+            DIAMETER: by_conductance if STROKE in index else by_conductance - by_knee,
+            STROKE: by_knee,
+            HIGH: by_drop * up,
+            LOW: by_drop * ~up,
+            LAG: by_opening * by_lag * lag,
+            DELAY: by_opening * by_delay,
+        }
         rates = np.zeros((1 + len(self.parameters), flow.size))
-        rates[:3] = flow, by_conductance, by_knee
-        if "supply" in self.groups:
-            rates[1 + index["supply.high"]] = by_drop * up
-            rates[1 + index["supply.low"]] = by_drop * ~up
-        if LAG in index:
-            rates[1 + index[LAG]] = by_opening * by_lag * lag
-        if DELAY in index:
-            rates[1 + index[DELAY]] = by_opening * by_delay
+        rates[0] = flow
+        for key in slopes.keys() & index.keys():
+            rates[1 + index[key]] = slopes[key]
         risen = trial.sum_up(rates / self.area)
         zero = self.zeros + number
         risen[1 + zero] = 1.0
@@ -197,28 +204,25 @@ class CellModel:
         return flow * way, by_log * way, by_knee * way, by_drop, by_size * way * sign
 
     def list_starts(self) -> list[Floats]:
-        """Return the values at which a fit starts: with the knee below, about and above the supply."""
+        """Return the values at which a fit starts: with a free knee below, about and above the supply."""
         start = np.array([each.start for each in self.parameters])
-        return [np.where(np.arange(start.size) == 1, math.log(knee), start) for knee in KNEES]
+        held = np.isin(np.arange(start.size), self.held_first)
+        return [np.where(held, math.log(knee), start) for knee in KNEES[: 1 + 2 * held.any()]]
 
     def refine(self, free: Floats) -> bool:
         """Return that a fit is final."""
         return False
 
-    def turbulent(self, made: Estimate) -> bool:
-        """Return whether a fit has a knee that the flow passed."""
-        return made.judgments[1].verdict == "bounded"
-
     def derive(self, free: Floats) -> list[Derived]:
         """Return the values for a scene; the stroke too if it is free, else the diameter with that stroke."""
         valve, fluid = self.valve, self.fluid
-        conductance, knee = free[0], free[1]
+        conductance = free[0]
         drag = 8.0 * valve.knee_reynolds**2 * fluid.density * fluid.viscosity
         shape = math.log(math.pi * valve.discharge_slope)
         unit = np.eye(free.size)
         found = []
         if "stroke" in self.groups:
-            term = math.log(4.0 * math.sqrt(fluid.density / 2.0)) + conductance + 0.5 * knee
+            term = math.log(4.0 * math.sqrt(fluid.density / 2.0)) + conductance + 0.5 * free[1]
             gradient = unit[0] + 0.5 * unit[1]
             found.append(
                 Derived(
@@ -233,7 +237,7 @@ class CellModel:
             term, gradient = 0.5 * (math.log(drag * valve.stroke) + conductance), 0.5 * unit[0]
         found.insert(0, Derived(DIAMETER, "m", 0.5 * (term - shape), 0.5 * gradient, True))
         for place, each in enumerate(self.parameters):
-            if each.wanted and place > 1:
+            if each.wanted and each.key not in (DIAMETER, STROKE):
                 found.append(
                     Derived(each.key, each.unit, float(free[place]), unit[place], each.log)
                 )

@@ -23,7 +23,9 @@ CAREFUL = 0.9
 #: Gap to the finger, m, and rest, s, before a touch.
 GAP, REST = 0.3e-3, 0.15
 #: Touches to choose from: speeds and depths as shares of the largest, and holds of the time.
-SPEEDS, DEPTHS, HOLDS = (1.0, 0.25, 0.06), (1.0, 0.6), (0.0, 0.01, 0.1, 0.4)
+SPEEDS, DEPTHS, HOLDS = (1.0, 0.25, 0.06, 0.02), (1.0, 0.6), (0.0, 0.01, 0.1, 0.4, 0.8)
+#: Best plans of touches, by the sum of what each tells of a rested finger, that are predicted whole.
+PREDICTED = 6
 #: Frequencies of sines, 1/s, their amplitude as a share of the depth, and duration, s.
 SINES, AMPLITUDE, SWING = (2.0, 8.0, 30.0), 0.06, 1.0
 #: Speed, m/s, and depth, m, of the one ramp that a design is compared with.
@@ -99,11 +101,11 @@ class Task(NamedTuple):
         return Prediction(drive, answer, information, model.derive(free))
 
 
-def find_widths(derived: Sequence[Derived], information: Floats) -> Floats:
+def find_widths(derived: Sequence[Derived], information: Floats, ridge: float = RIDGE) -> Floats:
     """Return half widths of 95 % intervals as shares of the values (..., d), by information (..., p, p)."""
     sizes = np.sqrt(np.diagonal(information, axis1=-2, axis2=-1)) + NOTHING
     scaled = information / sizes[..., None] / sizes[..., None, :]
-    covariance = np.linalg.inv(scaled + RIDGE * np.eye(sizes.shape[-1]))
+    covariance = np.linalg.inv(scaled + ridge * np.eye(sizes.shape[-1]))
     units = [1.0 if each.log else abs(each.value) + NOTHING for each in derived]
     gradients = np.array([each.gradient for each in derived]) / np.array(units)[:, None]
     turned = gradients / sizes[..., None, :]
@@ -120,8 +122,10 @@ def design(task: Task) -> tuple[Prediction, Prediction]:
         given = ",".join(task.groups)
         raise OutputError(f"--free must have contact or relaxation with --design (got {given}).")
     best, plain = _design_commands(task) if task.part == "cell" else _design_touches(task)
-    pairs = zip(best.derived, best.widths, strict=True)
-    if unknown := [each.key for each, width in pairs if not width < USELESS]:
+    # A width that is the ridge's alone is no width.
+    bare = find_widths(best.derived, best.information, 0.01 * RIDGE)
+    lost = ~(bare < np.minimum(2.0 * best.widths, USELESS))
+    if unknown := [each.key for each, gone in zip(best.derived, lost, strict=True) if gone]:
         names = ", ".join(unknown)
         raise OutputError(f"--free must be what the limits permit to know (got {names}).")
     return best, plain
@@ -176,14 +180,21 @@ def _design_touches(task: Task) -> tuple[Prediction, Prediction]:
         ratios: Floats = find_widths(plain.derived, total) / plain.widths
         return -np.log((ratios**2).sum(axis=-1))
 
-    chosen: list[int] = []
-    while (left := room - sizes[chosen].sum()) >= sizes.min():
-        total = information[chosen].sum(axis=0)
-        gain = (rate(total + information) - rate(total)) / sizes
-        chosen.append(int(np.where(sizes <= left, gain, -np.inf).argmax()))
-    # A long hold tells most of a finger that has rested.
-    paths = sorted((touches[number].drive for number in chosen), key=len, reverse=True)
-    return task.predict(np.concatenate(paths)), plain
+    def fill(first: int) -> tuple[int, ...]:
+        chosen = [first]
+        while (left := room - sizes[chosen].sum()) >= sizes.min():
+            total = information[chosen].sum(axis=0)
+            gain = (rate(total + information) - rate(total)) / sizes
+            chosen.append(int(np.where(sizes <= left, gain, -np.inf).argmax()))
+        return tuple(sorted(chosen, key=lambda number: (-sizes[number], number)))
+
+    def tell(plan: tuple[int, ...]) -> float:
+        return float(rate(information[list(plan)].sum(axis=0)))
+
+    # A long hold tells most of a finger that has rested, so it comes first.
+    plans = sorted(set(map(fill, range(sizes.size))), key=tell)[-PREDICTED:]
+    tried = [task.predict(np.concatenate([touches[i].drive for i in plan])) for plan in plans]
+    return max(tried, key=lambda each: float(rate(each.information))), plain
 
 
 def _design_commands(task: Task) -> tuple[Prediction, Prediction]:
@@ -197,7 +208,11 @@ def _design_commands(task: Task) -> tuple[Prediction, Prediction]:
         # Each command is followed by its opposite, so the pin stays near.
         levels = random.choice((-1.0, 0.0, 1.0), (count, 1)) * (1.0, -1.0)
         lengths = random.integers(5, longest, count).repeat(2)
-        tried.append(task.predict(levels.ravel().repeat(lengths)[:count]))
+        commands = levels.ravel().repeat(lengths)[:count]
+        # In half of them a long way up and down, which tells the orifice.
+        if (run := int(random.integers(-count // 6, count // 6))) > 0:
+            commands[-2 * run :] = np.repeat((1.0, -1.0), run)
+        tried.append(task.predict(commands))
     inside = [each for each in tried if low < each.answer.min() and each.answer.max() < high]
     if not inside:
         rest = task.scene.actuator.rest_height

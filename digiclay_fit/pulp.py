@@ -188,40 +188,35 @@ class PulpModel:
 
     def _predict_trial(self, trial: PulpTrial, free: Floats) -> tuple[Floats, Floats]:
         b, m, weights, times = self.read(free)
-        index, count = self.index, len(self.parameters)
+        index = self.index
         give = self._value(free, "compliance", 0.0)
         depth = trial.grid - give * trial.felt - free[index["zero of position"]]
         force, slope, stiffening = self.press(b, m, depth)
-        columns = np.zeros((len(depth), count + 1))
-        columns[:, 1 + index["zero of position"]] = -slope
-        if "contact" in self.groups:
-            columns[:, 1 + index["contact.stiffness"]] = force
-            columns[:, 1 + index["contact.exponent"]] = stiffening
-        if "compliance" in self.groups:
-            columns[:, 1 + index["compliance"]] = -slope * trial.felt
-        columns[:, 0] = force
-        used = columns.any(axis=0)
-        used[0] = True  # the force itself, also where it does not touch
-        driven = np.flatnonzero(used)
-        plain = columns[:, driven].copy()
-        states = []
+        slopes = {
+            "zero of position": -slope,
+            "contact.stiffness": force,
+            "contact.exponent": stiffening,
+            "compliance": -slope * trial.felt,
+        }
+        driving = [key for key in slopes if key in index]
+        elastic = np.column_stack([force, *(slopes[key] for key in driving)])
+        relaxed, states = elastic.copy(), []
         for weight, time in zip(weights[1:], times, strict=True):
-            filtered, by_time = relax(plain, time, trial.step)
-            columns[:, driven] -= weight * filtered
+            filtered, by_time = relax(elastic, time, trial.step)
+            relaxed -= weight * filtered
             states.append((filtered[:, 0], by_time))
+        columns = np.zeros((len(depth), 1 + len(self.parameters)))
+        columns[:, [0, *(1 + index[key] for key in driving)]] = relaxed
         if "relaxation" in self.groups:
             self._add_relaxation(columns, states, weights)
         columns *= columns[:, :1] > 0.0
         sampled, rate = trial.sample(columns, self._value(free, "lag", 0.0))
-        jacobian = sampled[:, 1:]
-        jacobian[:, index["zero of force"]] = 1.0
-        predicted = sampled[:, 0] + free[index["zero of force"]]
-        if "lag" in self.groups:
-            jacobian[:, index["lag"]] = -rate
-        if "drift" in self.groups:
-            jacobian[:, index["drift"]] = trial.elapsed
-            predicted = predicted + free[index["drift"]] * trial.elapsed
-        return predicted, jacobian
+        predicted, jacobian = sampled[:, 0], sampled[:, 1:]
+        added = {"zero of force": np.ones(len(rate)), "lag": -rate, "drift": trial.elapsed}
+        for key in added.keys() & index.keys():
+            jacobian[:, index[key]] = added[key]
+        drift = self._value(free, "drift", 0.0)
+        return predicted + free[index["zero of force"]] + drift * trial.elapsed, jacobian
 
     def _add_relaxation(
         self, columns: Floats, states: Sequence[tuple[Floats, Floats]], weights: Floats

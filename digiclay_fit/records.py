@@ -104,6 +104,9 @@ def _read_columns(path: Path, rows: Sequence[Sequence[str]], part: str) -> tuple
     needed, optional = COLUMNS[part]
     known = {**needed, **optional, TRIAL: ""}
     head = [word.strip().lower() for word in rows[0]] if rows else []
+    if len(head) == 1 and ";" in head[0]:
+        rule = "must use commas between columns, and points in decimals"
+        raise DigiclayError(f"{path} {rule} (got ';').")
     names = [ALIKE.get(word, word) for word in head]
     if len(set(names)) < len(names) or not needed.keys() <= set(names) <= known.keys():
         more = ", ".join((*optional, TRIAL))

@@ -26,6 +26,8 @@ from .estimation import (
 from .pulp import PulpModel
 from .records import Trial, estimate_noise
 
+#: Likelihood from which a free stroke contradicts a held one.
+CONTRADICTED = 0.999
 #: Noise of the position that matters, as a share of that of the force.
 TOO_NOISY = 0.3
 
@@ -120,17 +122,28 @@ def fit(
     elif errors[0] > errors[1]:
         code = "NO_IMPROVEMENT"
         why = f"the unchanged scene predicts the held-out trials better: {told}"
-    if made.unknown:
+    if part == "cell" and _needs_stroke(made, scene, trials, groups):
+        why = "the flow becomes turbulent elsewhere than with valve.stroke: it must be free, too"
+        code = "NOT_IDENTIFIABLE"
+    elif made.unknown:
         direction = f"; known worst: {{{', '.join(made.worst)}}}"
         unknown = f"the data do not determine {', '.join(made.unknown)}{direction}"
         code, why = ("NOT_IDENTIFIABLE", unknown) if code == "OK" else (code, f"{why}; {unknown}")
-    elif isinstance(model, CellModel) and model.turbulent(made) and "stroke" not in groups:
-        code, why = "NOT_IDENTIFIABLE", "the flow becomes turbulent: the stroke must be free, too"
     derived = model.derive(made.free)
     cautions = list(_list_cautions(made, trials))
     return Findings(
         made, derived, plain, trials, held, predictions, code, f"{code}: {why}", cautions
     )
+
+
+def _needs_stroke(
+    made: Estimate, scene: Scene, trials: Sequence[Trial], groups: Sequence[str]
+) -> bool:
+    """Return whether the stroke is held, and the data contradict it."""
+    if "stroke" in groups:
+        return False
+    free = estimate(CellModel(scene, trials, (*groups, "stroke")))
+    return improves(free, made.residual, 1, CONTRADICTED)
 
 
 def _predict(other: Model, free: Floats, model: Model) -> Floats:

@@ -57,18 +57,20 @@ def test_the_synthetic_cell_moves_as_a_free_pin_does():
     np.testing.assert_allclose(ours, wanted - wanted[0], atol=2e-6)  # between samples of 1 ms
 
 
-@pytest.mark.parametrize("part, groups, knee, off", [
-    ("pulp", ("contact", "relaxation", "lag", "drift", "compliance"), 0.0, 2e-3),
-    ("cell", ("supply", "lag", "delay"), 1e9, 2e-3),
+@pytest.mark.parametrize("part, groups, stroke, off", [
+    ("pulp", ("contact", "relaxation", "lag", "drift", "compliance"), 30e-6, 2e-3),
+    ("cell", ("supply", "lag", "delay"), 30e-6, 2e-3),
     # Where the flow becomes turbulent the derivative by time jumps within a sample.
-    ("cell", ("stroke", "supply", "lag", "delay"), 20e3, 0.25),
+    ("cell", ("supply", "lag", "delay"), 4e-6, 0.25),
+    ("cell", ("stroke", "supply", "lag", "delay"), 4e-6, 0.25),
 ])  # fmt: skip
-def test_the_jacobian_is_that_of_differences(part, groups, knee, off):
+def test_the_jacobian_is_that_of_differences(part, groups, stroke, off):
     measured = measure_finger(draw(1)) if part == "pulp" else measure_cell(draw(1), loaded=True)
-    model = make_model(part, TAP, measured.trials[-1:], groups)
+    scene = digiclay.scene(TAP, {"valve.stroke": stroke})
+    model = make_model(part, scene, measured.trials[-1:], groups)
     free = np.array([each.start for each in model.parameters])
     if part == "cell":
-        free[model.index["valve.stroke"]] = np.log(knee)
+        free[list(model.defaults)] = list(model.defaults.values())
         free[model.index["delay.dead_time"]] = 1.23e-3  # no kink at a sample
     else:
         free[model.index["lag"]] = 0.3e-3
@@ -208,7 +210,7 @@ def test_a_default_finger_is_no_improvement_and_a_hidden_knee_is_found():
     ]
     noisy = change(default, lambda t: t.answer + draw(3).normal(0.0, 10e-3, t.time.size))
     assert fit("pulp", TAP, noisy, (), BOTH).code == "NO_IMPROVEMENT"
-    # A stroke of 5 um has its knee at 35 kPa, below the supply: flow becomes turbulent.
+    # This stroke has its knee below the supply: flow becomes turbulent.
     commands = measure_cell(draw(4)).trials[0].drive
     height = Cell(diameter=0.3e-3, stroke=2e-6).measure(commands, 1000.0)
     height += draw(4).normal(0.0, 1e-5, height.size)
@@ -217,7 +219,17 @@ def test_a_default_finger_is_no_improvement_and_a_hidden_knee_is_found():
     assert found.code == "OK"
     assert find_value(found, "valve.stroke") == pytest.approx(2e-6, rel=0.02)
     assert find_value(found, "valve.orifice_diameter") == pytest.approx(0.3e-3, rel=0.02)
-    assert "stroke must be free" in fit("cell", TAP, [trial], (), ("lag", "delay")).message
+    held = fit("cell", TAP, [trial], (), ("lag", "delay"))
+    assert held.code == "NOT_IDENTIFIABLE"
+    assert "valve.stroke: it must be free" in held.message
+    right = digiclay.scene(TAP, {"valve.stroke": 2e-6})
+    held = fit("cell", right, [trial], (), ("lag", "delay"))
+    assert held.code == "OK"
+    assert find_value(held, "valve.orifice_diameter") == pytest.approx(0.3e-3, rel=2e-3)
+    # The knee of a held stroke that does not exist is contradicted, too.
+    trial = measure_cell(draw(4)).trials[0]
+    short = digiclay.scene(TAP, {"valve.stroke": 0.5e-6})
+    assert "valve.stroke: it" in fit("cell", short, [trial], (), ("lag", "delay")).message
 
 
 def test_the_law_of_a_pin_is_no_law_of_a_finger():

@@ -17,7 +17,11 @@ BOTH = ("contact", "relaxation")
 VALVE = ("lag", "delay")
 
 
-@pytest.mark.parametrize("changes", [{}, {"max_speed": 8e-3}, {"max_speed": 0.1}, {"time": 30.0}])
+#: At 1 m/s no press is slow unless it is a fiftieth of that; at 20 ms short relaxations are not sampled.
+LIMITS = [{}, {"max_speed": 8e-3}, {"time": 5.0}, {"max_speed": 1.0, "step": 0.02}]
+
+
+@pytest.mark.parametrize("changes", LIMITS)
 def test_touches_tell_twice_as_much_as_one_ramp_in_its_time(changes):
     limits = Limits(**changes)
     best, ramp = design(Task("pulp", TAP, BOTH, "plate", limits))
@@ -34,8 +38,9 @@ def test_limits_of_depth_and_force_hold_where_they_are_small():
     for changes in ({"max_depth": 1e-3}, {"max_force": 1.0}):
         limits = Limits(**changes)
         best, ramp = design(Task("pulp", TAP, BOTH, "plate", limits))
-        # 0.73: the slowest relaxation, which one long hold tells best.
+        # The slowest relaxation, which one long hold as deep as the ramp tells nearly as well.
         assert (best.widths < 0.85 * ramp.widths).all()
+        assert (best.widths[:-1] <= 0.53 * ramp.widths[:-1]).all()
         assert best.drive.max() <= limits.max_depth
         # Of a sine on a slow touch each swing back is faster than the touch was.
         assert best.answer.max() <= CAREFUL * limits.max_force
@@ -56,6 +61,8 @@ def test_commands_tell_lag_and_dead_time_and_leave_the_end_stops():
     for scene in (TAP, digiclay.scene("tap", {"valve.orifice_diameter": 2e-3})):
         best, step = design(Task("cell", scene, VALVE, "plate", CellLimits()))
         assert (best.widths[1:] <= 0.5 * step.widths[1:]).all()
+        # One step is all way, which tells the orifice.
+        assert best.widths[0] <= step.widths[0]
         stroke = scene.actuator.stroke
         assert 0.1 * stroke < best.answer.min() < best.answer.max() < 0.9 * stroke
         assert set(best.drive.tolist()) == {-1.0, 0.0, 1.0}
@@ -107,8 +114,8 @@ def test_the_file_is_measured_and_fitted_and_tells_what_was_predicted(
     assert set(predicted) == {each.key for each in found.derived}
     for each, half in zip(found.derived, found.half_widths, strict=True):
         width = half if each.log else half / each.value
-        # Noise of 6,000 samples is found to 1 %; where the knee of the flow seems felt, intervals are wider.
-        assert width == pytest.approx(predicted[each.key], rel=0.2), each.key
+        # Noise of 6,000 samples is found to 1 %, and the printed widths are rounded to 2 digits, by 5 %.
+        assert width == pytest.approx(predicted[each.key], rel=0.08), each.key
 
 
 PULP, CELL = ["--design", "--part", "pulp"], ["--design", "--part", "cell"]
@@ -133,6 +140,8 @@ BAD = {
     "unknown option": ([*PULP, "--max-sped", "1 m/s"], "Did you mean --max-speed"),
     "force on a cell": ([*CELL, "--max-force", "1 N"], "--max-force must be with --design, and a"),
     "no turbulence": ([*CELL, "--free", "stroke"], "know (got valve.orifice_diameter, valve.stroke)"),
+    "no load": ([*CELL, "--free", "supply"], "know (got valve.orifice_diameter, supply.high, supply.low)"),
+    "no noise, no load": ([*CELL, "--free", "supply", "--noise", "1e-9 m"], "supply.high, supply.low)"),
     "no dead time": ([*CELL, "--set", "delay=absent"], "limits permit to know (got delay.dead_time)"),
     "at the end": ([*CELL, "--set", "actuator.rest_height=95 mm"], "rest_height must be so far from 0.01"),
     "two fingers": ([*PULP, "--scene", "pinch_crease"], "a single finger (got 2)"),

@@ -76,6 +76,13 @@ def test_too_many_samples_are_refused_before_they_are_read(tmp_path):
         read_records([path], "pulp")
 
 
+def test_semicolons_are_refused_with_the_remedy(tmp_path):
+    path = tmp_path / "from a spreadsheet.csv"
+    path.write_text("time;position;force\ns;mm;N\n0,001;0,5;0,1\n", encoding="utf-8")
+    with pytest.raises(DigiclayError, match=r"sheet.csv must use commas .* decimals \(got ';'\).$"):
+        read_records([path], "pulp")
+
+
 def test_units_names_and_trials_are_read(tmp_path):
     for path, factor in ((tmp_path / "a.csv", 1.0), (tmp_path / "b.csv", 1e3)):
         columns = {"trial": np.repeat((1, 2), 100), "time": TIME, "load": factor * np.ones(200)}
