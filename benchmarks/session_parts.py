@@ -19,7 +19,7 @@ from digiclay import core
 from digiclay.commands.arguments import scene_of
 from digiclay.commands.progress import table
 from digiclay.core.base.arrays import Floats
-from digiclay.core.engine.simulation import advance, begin, periods, trace_fingers
+from digiclay.core.engine.simulation import advance, begin, periods
 from digiclay.core.engine.state import State
 from digiclay.core.engine.system import System
 from digiclay.core.files.tables import Record
@@ -181,7 +181,7 @@ def period_calls(
     arrays = {name: getattr(state, name).view(Counted) for name in ("rows", "modes", "aged")}
     starts = np.arange(count)[:, None] * system.period
     poses = sample_poses(trajectories, (starts + system.instants).ravel())
-    paths = trace_fingers(system, poses.reshape(count, -1, len(trajectories), 7))
+    paths = system.trace(poses.reshape(count, -1, len(trajectories), 7), 0)
     ledger: Ledger = Counter()
     Counted.ledger = ledger
     totals, state = [0], state._replace(**arrays)

@@ -16,7 +16,7 @@ import pytest
 from digiclay.core.base.errors import DigiclayError, SceneError, StateError
 from digiclay.core.control.methods import METHODS
 from digiclay.core.control.orders import Orders, Verb, place, repeat_order
-from digiclay.core.engine.simulation import advance, begin, periods, trace_fingers
+from digiclay.core.engine.simulation import advance, begin, periods
 from digiclay.core.files.tables import parse_tables
 from digiclay.core.metrics.summary import compute_metrics
 from digiclay.core.model.trajectory import interpolate_poses
@@ -195,9 +195,8 @@ def go_on(draw):
     for take_up in (snapshot.load, snapshot.transfer_heights):
         state = take_up(system, spoil_state(draw, data))
         for _ in range(PERIODS):
-            (trace,) = trace_fingers(
-                system, interpolate_poses(finger, system.instants / system.period)
-            )
+            poses = interpolate_poses(finger, system.instants / system.period)
+            (trace,) = system.trace(poses, state.period)
             state = advance(system, state, trace)
         snapshot.dump(system, state)
 

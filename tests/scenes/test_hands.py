@@ -9,7 +9,7 @@ import pytest
 from digiclay.core.base.arrays import Floats
 from digiclay.core.control.blister import Blister
 from digiclay.core.control.methods import find_method
-from digiclay.core.engine.simulation import advance, begin, trace_fingers
+from digiclay.core.engine.simulation import advance, begin
 from digiclay.core.engine.state import State
 from digiclay.core.engine.system import System
 from digiclay.core.files.tables import parse_tables
@@ -62,7 +62,7 @@ def press(system, places, way, periods):
 def follow(system, poses, state=None):
     """Simulate poses; return the last state, and the forces of the fingers, (t, f), N."""
     state, forces = state or begin(system), []
-    for finger in trace_fingers(system, poses):
+    for finger in system.trace(poses, 0):
         state = advance(system, state, finger)
         forces.append(state.finger_forces())
     return state, np.array(forces)
@@ -230,7 +230,7 @@ def test_where_blisters_overlap_each_pin_has_the_ground_it_had_before_the_first_
     if later:
         state, _ = follow(one, poses[:100, :, :1])
         state = snapshot.change_fingers(one, two, state, [0, None])
-    for finger in trace_fingers(two, poses[100:] if later else poses):
+    for finger in two.trace(poses[100:] if later else poses, 100 if later else 0):
         state = advance(two, state, finger)
         targets.append(state.row(two.rows.target))
     # They sink 5.5 mm, less the indentation: no pin is commanded deeper, and none is raised.
@@ -272,7 +272,7 @@ def test_pins_that_a_display_raises_against_resting_fingers_press_each_as_alone(
     poses = press(two, [(-17e-3, 3e-3), (15e-3, -2e-3)], (0.0, 0.0), 120)
     poses[..., 2] = REST + np.array([5e-3, 6e-3])
     state, forces = begin(two), []
-    for finger in trace_fingers(two, poses):
+    for finger in two.trace(poses, 0):
         state = advance(two, state, finger)
         forces.append(state.finger_forces())
         # Or pins that are touched may be left out.

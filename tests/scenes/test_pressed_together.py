@@ -5,7 +5,7 @@ from functools import partial
 
 import numpy as np
 import pytest
-from digiclay.core.engine.simulation import advance, begin, trace_fingers
+from digiclay.core.engine.simulation import advance, begin
 from digiclay.core.model.fingertip import compute_forms, compute_underside
 from digiclay.core.model.layout import Layout
 from digiclay.core.model.touch import compute_force
@@ -28,7 +28,7 @@ def test_a_finger_presses_as_its_law_says_in_the_period_in_which_another_one_lan
     poses, touch = press(system, [(-3e-3, 1e-3), (3e-3, -1e-3)], (0.0, 0.0), 60), system.cell.touch
     poses[:30, :, 1, 2] += 30e-3  # it lands within a period, 3 mm deep
     state, rows, together = begin(system), system.rows.pressing, 0
-    for finger, at_end in zip(trace_fingers(system, poses), poses[:, -1], strict=True):
+    for finger, at_end in zip(system.trace(poses, 0), poses[:, -1], strict=True):
         state = advance(system, state, finger)
         active, near, first = state.active, state.active.near, system.cell.pulp_rows.start
         pressing = active.block[rows, :near]
@@ -82,7 +82,7 @@ def rock(finger):
 def play(system, poses):
     """Return heights and forces, (t, n), and how often the first two fingers press each cell, (n,)."""
     state, rows, pressed = begin(system), [], np.zeros(system.grid.count)
-    for finger in trace_fingers(system, poses):
+    for finger in system.trace(poses, 0):
         state = advance(system, state, finger)
         rows.append((state.row(0), state.row(system.rows.force)))
         own = np.array([state.row(row) for row in range(system.rows.count)[system.rows.pressing]])

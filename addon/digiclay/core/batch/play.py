@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.errors import DivergenceError
+from ..base.errors import DivergenceError, ParameterError
 from ..engine.simulation import CHUNK, find_divergence, simulate_period
 from ..engine.state import State
 from ..engine.system import System
@@ -117,6 +117,8 @@ class Play:
 
 def begin_play(scenes: Mapping[int, Scene], systems: Mapping[int, System]) -> Play:
     """Return a batch before its first control period; `scenes`: by the numbers of the runs."""
+    if any(scene.bodies for scene in scenes.values()):
+        raise ParameterError("Batch", "scenes", "must have no bodies: run them alone", "some")
     batch = make_batch([systems[run] for run in scenes])
     trajectories = {run: require_one(scene.trajectories()) for run, scene in scenes.items()}
     return Play(trajectories, tuple(scenes), batch, begin(batch))

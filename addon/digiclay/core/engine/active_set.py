@@ -68,6 +68,12 @@ class Selection:
         active, window, disc = state.active, finger and finger.window, self.join(control)
         if self.serves(active, state.period, window, disc):
             return state
+        return self.renew(state, active, window, disc)
+
+    def renew(
+        self, state: State, active: ActiveSet, window: Window | None, disc: Discs | None
+    ) -> State:
+        """Return a state, in the same arrays, with another set; `active`: the present one."""
         moving = self.release(state)
         peak = self.larger(state.peak, active.block[0].max(axis=0, initial=-np.inf))
         chosen = self.choose(active, state.period, window, disc, moving, peak)

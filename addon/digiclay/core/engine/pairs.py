@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..base.arrays import TIE, Cells, Flags, Floats, any_true, find_copies
-from ..model.fingers import HandPeriod, HandTouch, gather_positions
+from ..model.fingers import HandTouch, gather_positions, trace_hands
 from ..model.layout import RELATIVE_TOLERANCE, Discs, join_discs
 from ..model.physics import Cell
 from .active_set import Selection
@@ -72,7 +72,10 @@ class HandSelection(Selection):
         self, active: ActiveSet, moving: Flags, reach: Discs | None, control: Discs | None
     ) -> tuple[Cells, int]:
         """Return the near cells, then the moving and the controlled ones, and the number of near ones."""
-        (first,) = self.grid.cover(reach).nonzero()
+        near = self.grid.cover(reach)
+        if active.under is not None:
+            near |= active.under.any(axis=0)
+        (first,) = near.nonzero()
         others = self.grid.cover(control)
         others[active.cells[moving]] = True
         others[first] = False
@@ -83,6 +86,7 @@ class HandSelection(Selection):
         active, near, touch = state.active, state.active.near, self.cell.touch
         # Without discs, after a change of the number of fingertips, no pulp has aged.
         timed = active.reach is not None and any_true(np.asarray(active.reach[2]) >= 0.0)
+        timed |= active.under is not None
         if near and timed and isinstance(touch, HandTouch):
             rows = [finger.pulp.rows for finger in touch.each]
             apart = ~find_pairs(active)
@@ -100,12 +104,16 @@ class HandSelection(Selection):
 
 
 def find_pairs(active: ActiveSet) -> Flags:
-    """Return which near cells each of the fingertips may touch, (f, k)."""
+    """Return which near cells each of the fingertips and bodies may touch, (f, k)."""
     if active.reach is None:
         return np.zeros((active.rows.fingers, 0), np.bool_)
     x, y, radius = (np.asarray(part)[:, None] for part in active.reach)
     _, at_x, at_y = active.quadratic_basis[:3, : active.near]
-    return (at_x - x) ** 2 + (at_y - y) ** 2 <= radius * np.abs(radius) * (1.0 + RELATIVE_TOLERANCE)
+    square = (at_x - x) ** 2 + (at_y - y) ** 2
+    inside: Flags = square <= radius * np.abs(radius) * (1.0 + RELATIVE_TOLERANCE)
+    if active.under is not None:
+        inside |= active.under[:, active.cells[: active.near]]
+    return inside
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,9 +127,19 @@ class HandSystem(System):
     """None without contact."""
 
     @property
+    def pairs(self) -> type[Pairs]:
+        """Kind of the pairs."""
+        return Pairs
+
+    @property
     def fingers(self) -> int:
         """Number of fingers."""
         return len(self.cells)
+
+    def trace(self, poses: Floats, first: int) -> list[Any]:
+        """Return the fingertip paths in each of t periods; see `System.trace`."""
+        touch: Any = self.cell.touch
+        return [None] * len(poses) if touch is None else list(trace_hands(touch, poses))
 
     def move(self, active: ActiveSet, finger: Any) -> None:
         """Move active cells through a control period under their queued commands, in place."""
@@ -170,14 +188,19 @@ class Pairs:
         self.lag = slice(self.pulp.stop, self.pulp.stop + cell.lag.rows)
         self.move = system.stepper.prepare(system.plans[fingers[0]], self.rows, count)
 
-    def advance(self, block: Floats, finger: HandPeriod | None, instants: int) -> Moved:
+    def find_under(self, finger: Any) -> Floats:
+        """Return the undersides over the pairs in a period, (p, k), m."""
+        under: Floats = finger.under(self.positions)
+        return under
+
+    def advance(self, block: Floats, finger: Any, instants: int) -> Moved:
         """Move the pairs of a block; sets their filters and forces in place, but not the heights."""
         flat, count = block.reshape(-1), self.cells.size
         np.take(flat, self.index, out=self.rows, mode="clip")  # another mode copies
         before, forces = self.rows.copy(), flat.take(self.forces)
         under = np.empty((instants, 0))
         if self.cells.size and finger is not None:
-            under = finger.under(self.positions)
+            under = self.find_under(finger)
         after = self.move(under)
         flat[self.forces] = after
         flat[self.filters] = self.rows[self.pulp, :count]
@@ -211,7 +234,9 @@ class HandMovement:
         others = np.arange(active.near, active.cells.size)
         groups, inside = list(alike.values()), find_pairs(active)
         self._groups = [
-            Pairs(system, active, inside, fingers, others if fingers is groups[0] else others[:0])
+            system.pairs(
+                system, active, inside, fingers, others if fingers is groups[0] else others[:0]
+            )
             for fingers in groups
         ]
         self._fingers = np.concatenate([group.fingers for group in self._groups])
@@ -221,7 +246,7 @@ class HandMovement:
         self._distinct = self._copies != self._copies[0]
         self._distinct[0] = True
 
-    def __call__(self, finger: HandPeriod | None) -> None:
+    def __call__(self, finger: Any) -> None:
         """Move the cells on by one control period, in place."""
         system, active = self._system, self._active
         rows, block, near = system.rows, active.block, active.near

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..base.arrays import Floats
 from ..base.errors import DivergenceError
-from ..model.fingertip import require_one
-from ..model.touch import FingerPeriod, trace_finger
+from ..model.touch import FingerPeriod
 from ..model.trajectory import Trajectory, sample_poses
 from .state import State, make_initial_state
 from .system import System
@@ -35,25 +33,12 @@ def begin(system: System) -> State:
     return make_initial_state(system.rows, system.grid.count, rest, system.controller.begin())
 
 
-def trace_fingers(system: System, poses: Floats) -> list[Any]:
-    """Return the fingertip path in each of t periods, of poses (t, p, f, 7); None: no touch."""
-    touch: Any = system.cell.touch
-    if touch is None:
-        return [None] * len(poses)
-    if system.fingers > 1:
-        from ..model.fingers import trace_hands
-
-        return list(trace_hands(touch, poses))
-    path = trace_finger(touch.fingertip, require_one(tuple(poses.transpose(2, 0, 1, 3))))
-    return [path.at(period) for period in range(len(poses))]
-
-
 def step(system: System, state: State, poses: Floats) -> State:
     """Simulate one control period with poses (p, f, 7) at `System.instants`; `state` does not change.
 
     Raises DivergenceError when a height, force or opening is no longer finite.
     """
-    return advance(system, state.copy(), trace_fingers(system, poses[None])[0])
+    return advance(system, state.copy(), system.trace(poses[None], state.period)[0])
 
 
 def advance(system: System, state: State, finger: FingerPeriod | None) -> State:
@@ -144,7 +129,7 @@ def periods(
         starts = (state.period + np.arange(chunk)) * system.period
         times = (starts[:, None] + system.instants).ravel()
         poses = sample_poses(trajectories, times).reshape(chunk, -1, len(trajectories), 7)
-        for finger in trace_fingers(system, poses):
+        for finger in system.trace(poses, state.period):
             state = advance(system, state, finger)
             yield state
         done += chunk

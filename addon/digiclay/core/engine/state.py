@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.arrays import Cells, Floats
+from ..base.arrays import Cells, Flags, Floats
 from ..base.modes import LOCKED, REST
 from ..model.control_interface import Commands, Measurement
 from ..model.layout import Discs
@@ -111,6 +111,9 @@ class ActiveSet:
     runs: tuple[ActiveSet, ...] = ()
     """In a batch whose runs keep the sets they have alone: these sets, without block, modes and basis. Their
     cells are the first of each run; others fill the columns."""
+    under: Flags | None = None
+    """(f, n): Cells of the bed that bodies may touch while this set serves, in the rows behind those of the
+    fingertips; None without bodies."""
 
     # Parts of the block, all of them views, made once, since a set serves for many periods.
 

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
 from ..base.arrays import Floats
 from ..model.control_interface import Controller
+from ..model.fingertip import require_one
 from ..model.interfaces import Movement, Segment, Sensors, Stepper
 from ..model.layout import Grid
 from ..model.physics import Cell
-from ..model.touch import FingerPeriod
+from ..model.touch import FingerPeriod, trace_finger
 from .active_set import Selection
 from .state import ActiveSet, Rows
 
@@ -49,6 +51,18 @@ class System:
     def fingers(self) -> int:
         """Number of fingers."""
         return 1
+
+    def trace(self, poses: Floats, first: int) -> list[Any]:
+        """Return what presses in each of t periods from the period `first` on; None: nothing.
+
+        `poses` (t, p, f, 7): the fingertips at the periods' instants.
+        """
+        if self.cell.touch is None:
+            return [None] * len(poses)
+        path = trace_finger(
+            self.cell.touch.fingertip, require_one(tuple(poses.transpose(2, 0, 1, 3)))
+        )
+        return [path.at(period) for period in range(len(poses))]
 
     def move(self, active: ActiveSet, finger: FingerPeriod | None) -> None:
         """Move active cells through a control period under their queued commands, in place."""

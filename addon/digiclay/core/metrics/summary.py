@@ -272,10 +272,14 @@ def split_fingers(history: Mapping[str, Any]) -> Iterator[Mapping[str, Any]]:
     if "finger_force" not in history:
         yield history
         return
+    if "body_force" in history:
+        force = history["force"] - np.add.reduce(history["body_force"], axis=1)
+        history = {**history, "force": np.maximum(force, 0.0)}
     common = {name: values for name, values in history.items() if name != "finger_force"}
     felt = (history["force"] > 0.0) | (history["mode"] == Mode.FORCE_FOLLOW)
     cells = np.flatnonzero(felt.any(axis=0))  # of a large bed they are few
     tips, (x, y) = history["fingertip"], history["position"][cells].T
+    tips = tips.reshape(len(tips), -1, 7)
     given, low = history["force"][:, cells], history["height"][:, cells] - BALL
     pressed, least = given > 0.0, np.full(given.shape, np.inf)
 
@@ -285,7 +289,7 @@ def split_fingers(history: Mapping[str, Any]) -> Iterator[Mapping[str, Any]]:
 
     for finger in range(tips.shape[1]):
         np.minimum(least, square(finger), out=least)
-    for finger, total in enumerate(history["finger_force"].T):
+    for finger, total in enumerate(history["finger_force"].reshape(len(tips), -1).T):
         own = square(finger) <= least
         lacking = np.flatnonzero((total > 0.0) & pressed.any(axis=1) & ~(own & pressed).any(axis=1))
         if lacking.size:
@@ -300,6 +304,18 @@ def split_fingers(history: Mapping[str, Any]) -> Iterator[Mapping[str, Any]]:
             own * history["mode"][:, cells],
         )
         yield {**common, **rows, "total_force": total, "fingertip": tips[:, finger]}
+
+
+def measure_bodies(history: Mapping[str, Any]) -> list[dict[str, float]]:
+    """Return of each body the largest force, N, in total and on a pin, and most pins pressed at once."""
+    return [
+        {
+            "max_total_force": float(force.sum(axis=1).max()),
+            "max_cell_force": float(force.max()),
+            "pressed_pins": int(np.count_nonzero(force, axis=1).max()),
+        }
+        for force in history["body_force"].swapaxes(0, 1)
+    ]
 
 
 def take_worst(each: Sequence[Mapping[str, float | None]]) -> dict[str, float | None]:

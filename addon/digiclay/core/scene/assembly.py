@@ -8,6 +8,8 @@ from __future__ import annotations
 from dataclasses import fields, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+import numpy as np
+
 from ..base.arrays import Floats
 from ..base.errors import ParameterError
 from ..control.methods import find_method
@@ -16,7 +18,7 @@ from ..engine.state import Rows
 from ..engine.system import System, make_segments
 from ..model.control_interface import Controller
 from ..model.delay import Queue, split_delay
-from ..model.fingertip import require_one
+from ..model.fingertip import Fingertip, require_one
 from ..model.interfaces import Flow, Segment, Sensors, Stepper
 from ..model.laws import import_part, select_law
 from ..model.layout import Grid, make_grid
@@ -76,6 +78,8 @@ def _make_control(scene: Scene, bed: Grid, motion: Motion) -> tuple[Controller, 
 
 def assemble(scene: Scene) -> System:
     """Return the system of a scene."""
+    if scene.bodies:
+        return _assemble_bodies(scene)
     if len(scene.fingers) != 1:
         return _assemble_hands(scene)
     motion, period = make_motion(scene), scene.simulation.control_period
@@ -100,6 +104,49 @@ def assemble(scene: Scene) -> System:
         by_set=bool(noisy or (scene.control and find_method(scene.method).by_set)),
         latency=latency + (scene.sensors.delay * period if scene.sensors else 0.0),
         height_floor=scene.sensors.height_floor if scene.sensors else 0.0,
+    )
+
+
+def _assemble_bodies(scene: Scene) -> System:
+    """Return the system of a scene with bodies, which press like further fingers."""
+    from ..engine.bodies import BodySelection, BodySystem, MovedMesh, PathUndersides
+    from ..engine.pairs import HandSystem
+    from ..model.fingers import join_touches
+    from ..shapes.body import read_body
+
+    bodies = [each.body for each in scene.bodies]
+    # The law and the relaxation of a finger; without a mesh a fingertip touches nothing of its own.
+    pressing = [
+        Finger(Fingertip(), each.contact, each.relaxation, place.trajectory)
+        for each, place in zip(bodies, scene.bodies, strict=True)
+    ]
+    tips = any(finger.fingertip for finger in scene.fingers)
+    fingers = scene.fingers if tips else tuple(pressing[:1] * len(scene.fingers))
+    system = _assemble_hands(replace(scene, fingers=(*fingers, *pressing), bodies=()))
+    assert isinstance(system, HandSystem)
+    moved = tuple(
+        MovedMesh(
+            read_body(body, f"body #{number}"),
+            place.trajectory.trajectory(),
+            body.samples,
+            body.tip_radius,
+            body.travel,
+        )
+        for number, (body, place) in enumerate(zip(bodies, scene.bodies, strict=True), 1)
+    )
+    caps = np.array([body.cap for body in bodies])
+    ceiling = scene.actuator.stroke + float(caps.max())
+    undersides = PathUndersides(moved, system.grid, system.instants, ceiling)
+    for number, lowest in enumerate(undersides.find(0).start.min(axis=1).tolist(), 1):
+        if lowest < 0.0:
+            rule = "must begin above the floor of the bed, z = 0"
+            raise ParameterError(f"body #{number}", "trajectory", rule, f"{lowest:.3g} m")
+    common = {field.name: getattr(system, field.name) for field in fields(system)}
+    selection = BodySelection(system.grid, system.rows, system.cell, system.period, system.fastest)
+    touches = [cell.touch for cell in system.cells[: len(scene.fingers)] if cell.touch]
+    hand = join_touches(touches) if tips else None
+    return BodySystem(
+        **{**common, "selection": selection}, hand=hand, undersides=undersides, caps=caps
     )
 
 

@@ -36,13 +36,13 @@ class Stretch(NamedTuple):
     cells: NDArray[np.intp]
     """(w,)."""
     felt: Floats
-    """(t, 2, w): Heights and forces in t rows."""
+    """(t, r, w): Heights, forces and those of each body in t rows."""
     command: Floats
     mode: Modes
     """(s, w): Commands and modes of the periods that begin with s rows."""
     last: Floats
     last_mode: Modes
-    """(2, w) and (w,): Heights and forces, and modes, after the last period."""
+    """(r, w) and (w,): Heights and forces, and modes, after the last period."""
 
     def split(self) -> list[Stretch]:
         """Return the stretches of b runs, each in its own memory."""
@@ -53,9 +53,12 @@ class Stretch(NamedTuple):
 class Recording:
     """Collects rows from states, and passes them to `keep` in stretches, in their order."""
 
-    def __init__(self, recorder: Recorder, rows: Rows, keep: Callable[[Stretch], None]) -> None:
+    def __init__(
+        self, recorder: Recorder, rows: Rows, keep: Callable[[Stretch], None], bodies: int = 0
+    ) -> None:
         self.every = recorder.every
-        self._command, self._felt_rows = rows.command, (0, rows.force)
+        self._command = rows.command
+        self._felt_rows = (0, rows.force, *range(rows.count - bodies, rows.count))
         self._keep = keep
         self._active: ActiveSet | None = None
         self._felt: list[Floats] = []
@@ -78,7 +81,7 @@ class Recording:
         if active is None:
             return
         shape, given = active.cells.shape, self._given
-        felt = np.array(self._felt).reshape(len(self._felt), 2, *shape)
+        felt = np.array(self._felt).reshape(len(self._felt), len(self._felt_rows), *shape)
         command = np.array([command for command, _ in given]).reshape(len(given), *shape)
         mode = np.array([mode for _, mode in given], np.int8).reshape(len(given), *shape)
         last = active.block.take(self._felt_rows, axis=0)
@@ -87,25 +90,26 @@ class Recording:
 
 
 class HistoryWriter:
-    """Rows of one session, preallocated for at most `count` of them.
+    """Rows of one session, with forces of `bodies`, preallocated for at most `count` of them.
 
     Row i is the state at its time; its command and mode are those of the control period that
     begins then. No period follows the last row: its command is 0, and its mode that of the
     previous period.
     """
 
-    def __init__(self, count: int, cells: int) -> None:
+    def __init__(self, count: int, cells: int, bodies: int = 0) -> None:
         self.count = count
         # Uninitialized: numpy then gets memory in large pages, which cost a quarter at their first
         # use.
-        self._felt, self._command = np.empty((2, count, cells)), np.empty((count, cells))
+        self._felt = np.empty((2 + bodies, count, cells))
+        self._command = np.empty((count, cells))
         self._mode = np.empty((count, cells), np.int8)
-        self._now, self._mode_now = np.zeros((2, cells)), np.empty(cells, np.int8)
+        self._now, self._mode_now = np.zeros((2 + bodies, cells)), np.empty(cells, np.int8)
         self._done = self._given = 0
 
     def begin(self, height: Floats, mode: Modes) -> None:
         """Begin again with heights and modes (n,) before a session, without forces."""
-        self._now[:], self._mode_now[:] = (height, np.zeros_like(height)), mode
+        self._now[0], self._now[1:], self._mode_now[:] = height, 0.0, mode
         self._felt[:, 0] = self._now
         self._done, self._given = 1, 0
 
@@ -121,14 +125,16 @@ class HistoryWriter:
         self._done, self._given = felt.stop, given.stop
 
     def finish(self, period: int, every: int) -> dict[str, Array]:
-        """Return the rows: period (t,), height, force, command, mode (t, n); valid until `begin`.
+        """Return the rows: period (t,), height, force, command, mode (t, n), of bodies their force (t, b, n).
+
+        They are valid until `begin`.
 
         A session that ends between two rows, of `every` periods each, gets another one.
         """
         count = 1 - (-period // every)
         self._felt[:, count - 1] = self._now
         self._command[count - 1], self._mode[count - 1] = 0.0, self._mode_now
-        (height, force), command, mode = (
+        (height, force, *bodies), command, mode = (
             self._felt[:, :count],
             self._command[:count],
             self._mode[:count],
@@ -140,16 +146,19 @@ class HistoryWriter:
             "force": force,
             "command": command,
             "mode": mode,
+            **({"body_force": np.stack(bodies, axis=1)} if bodies else {}),
         }
 
 
 class RunRecording(Recording):
     """Recording of one run of at most `periods`, which writes its history at the same time."""
 
-    def __init__(self, recorder: Recorder, rows: Rows, state: State, periods: int) -> None:
-        self._history = HistoryWriter(recorder.rows(periods), state.rows.shape[1])
+    def __init__(
+        self, recorder: Recorder, rows: Rows, state: State, periods: int, bodies: int = 0
+    ) -> None:
+        self._history = HistoryWriter(recorder.rows(periods), state.rows.shape[1], bodies)
         self._history.begin(state.row(0), state.mode())
-        super().__init__(recorder, rows, self._history.write)
+        super().__init__(recorder, rows, self._history.write, bodies)
         self._pressing = [np.zeros(rows.fingers)]
         self._last = state
 

@@ -23,6 +23,7 @@ from ..files.tables import (
 from .schema import FINGER_SECTIONS, SECTIONS, Scene
 from .toml_table import (
     ABSENT,
+    BODIES,
     FINGERS,
     FORMAT,
     UNCERTAINTY,
@@ -180,17 +181,20 @@ def read_table(path: Path) -> Record:
 
 
 def _find_beside(table: Table, folder: Path) -> Table:
-    """Return the table with the path of a shape's file beside the scene file, or in a folder there."""
-    shape = table.get("shape")
-    name = shape.get("file") if isinstance(shape, dict) else None
+    """Return the table with the paths of shapes' and bodies' files beside the scene file, or below."""
+    bodies = table.get(BODIES)
+    if isinstance(bodies, list):
+        table = {**table, BODIES: [_place_file(body, folder) for body in bodies]}
+    return {**table, "shape": _place_file(table["shape"], folder)} if "shape" in table else table
+
+
+def _place_file(part: Any, folder: Path) -> Any:
+    """Return a table whose file, if it is in the folder, has its whole path."""
+    name = part.get("file") if isinstance(part, dict) else None
     if not isinstance(name, str) or not Path(name).suffix or "\0" in name:
-        return table
+        return part
     file = folder / name
-    return (
-        {**table, "shape": {**table["shape"], "file": str(file.resolve())}}
-        if file.is_file()
-        else table
-    )
+    return {**part, "file": str(file.resolve())} if file.is_file() else part
 
 
 def _override(table: Table, settings: Sequence[Setting]) -> Record:

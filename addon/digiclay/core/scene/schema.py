@@ -28,6 +28,7 @@ if TYPE_CHECKING:  # a part that is left out is never imported, see `import_part
     from ..model.relaxation import Relaxation
     from ..model.sensors import Sensing
     from ..model.valve import Fluid, Valve
+    from ..shapes.body import Body
     from ..shapes.request import Shape
     from .recorder import Recorder
 
@@ -78,6 +79,8 @@ FINGER_SECTIONS = ("fingertip", "contact", "relaxation", "trajectory")
 UNASKED = ("sensors", "shape")
 #: Parts that are omitted together with another one.
 NEEDS = {"contact": "fingertip", "relaxation": "fingertip", "blister": "control"}
+#: Parameters of a body: module and class.
+BODY = ("shapes.body", "Body")
 #: Steppers: module and class.
 STEPPERS: dict[str, tuple[str, str]] = {
     "bernoulli": ("steppers.bernoulli", "BernoulliExponential"),
@@ -170,6 +173,14 @@ class Finger:
     trajectory: Path
 
 
+@dataclass(frozen=True)
+class Presser:
+    """Body that presses the pins, and the path of its mesh's origin."""
+
+    body: Body
+    trajectory: Path
+
+
 @dataclass(frozen=True, repr=False)
 class Scene(Described):
     """Complete definition of a session; equal scenes give equal sessions, bit for bit.
@@ -197,6 +208,7 @@ class Scene(Described):
     method: str = "virtual_master"
     sensors: Sensing | None = None
     shape: Shape | None = None
+    bodies: tuple[Presser, ...] = ()
 
     def __post_init__(self) -> None:
         self._refuse_wrong_parts()
@@ -210,7 +222,11 @@ class Scene(Described):
         if self.blister and 2.0 * self.blister.radius > longer_side * (1.0 + 1e-9):
             rule = f"must be at most half the bed's longer side, {longer_side / 2:g} m"
             raise ParameterError("blister", "radius", rule, f"{self.blister.radius:g} m")
-        lasts = max((path.duration for path in self.trajectories()), default=0.0)
+        if self.bodies and self.control and find_method(self.method).blister is not None:
+            rule = f"must be left out: the method {self.method} follows a fingertip, not a surface"
+            hint = "Set control.method to plastic, elastic, viscous, push_pull or force_display."
+            raise ParameterError("body", "", rule, f"{len(self.bodies)} of them", hint)
+        lasts = self.lasting
         if self.simulation.duration == 0.0:
             if lasts == 0.0:
                 rule = "must be above 0 s where no finger has a path with a duration"
@@ -257,9 +273,16 @@ class Scene(Described):
             "bed": f"{bed.rows} x {bed.columns} pins, {bed.pitch * 1e3:g} mm apart, {bed.arrangement}",
             "method": control,
             "fingers": str(len(self.fingers)),
+            **({"bodies": str(len(self.bodies))} if self.bodies else {}),
             "time": f"{time.duration:g} s, {self.periods} periods of {time.control_period * 1e3:g} ms",
             "absent": ", ".join(absent) or "nothing",
         }
+
+    @property
+    def lasting(self) -> float:
+        """Duration of the longest path, s."""
+        movers: tuple[Finger | Presser, ...] = (*self.fingers, *self.bodies)
+        return max((each.trajectory.trajectory().duration for each in movers), default=0.0)
 
     @property
     def periods(self) -> int:

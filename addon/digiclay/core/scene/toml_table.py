@@ -16,15 +16,18 @@ from ..files.tables import (
     shorten,
     show_value,
 )
+from ..model.laws import import_part
 from ..model.layout import Layout
 from ..model.trajectory import Path, Waypoint
 from .schema import (
+    BODY,
     FINGER_SECTIONS,
     NEEDS,
     OPTIONAL,
     SECTIONS,
     UNASKED,
     Finger,
+    Presser,
     Scene,
     import_parameters,
 )
@@ -50,9 +53,11 @@ FORMAT = "format"
 UNCERTAINTY = "uncertainty"
 #: List of tables with the sections of several fingers.
 FINGERS = "finger"
+#: List of tables of bodies, each with the keys of `shapes.body.Body` and its path.
+BODIES = "body"
 #: Sections of a finger that are parts; the other one is its path.
 FINGER_PARTS = tuple(section for section in FINGER_SECTIONS if section in SECTIONS)
-TOP_LEVEL = (FORMAT, UNCERTAINTY, *TEXTS, *SECTIONS, "trajectory", FINGERS)
+TOP_LEVEL = (FORMAT, UNCERTAINTY, *TEXTS, *SECTIONS, "trajectory", FINGERS, BODIES)
 
 
 def resolve(table: Table, name: str = "", cache: ReadParts | None = None) -> Scene:
@@ -73,6 +78,7 @@ def resolve(table: Table, name: str = "", cache: ReadParts | None = None) -> Sce
         )
     if table.get(FORMAT, 1) not in (1, 2) or isinstance(table.get(FORMAT), (bool, float)):
         raise ParameterError(FORMAT, "", "must be 1 or 2", show_value(table[FORMAT]))
+    bodies = _read_bodies(table.get(BODIES, []), cache)
     tables = _split_fingers(table)
     shared = {
         section: _read_section(section, table.get(section, ABSENT if section in UNASKED else {}))
@@ -87,7 +93,27 @@ def resolve(table: Table, name: str = "", cache: ReadParts | None = None) -> Sce
     fingers = tuple(
         _read_finger(owner, given, defaults, rest_height, cache) for owner, given in tables
     )
-    return Scene(**parts, **texts, fingers=fingers, method=method)
+    if bodies and not any(name in table for name in (*FINGER_SECTIONS, FINGERS)):
+        # Nothing but bodies presses; what is recorded as a fingertip's path is the first one's.
+        fingers = (Finger(None, None, None, bodies[0].trajectory),)
+    return Scene(**parts, **texts, fingers=fingers, method=method, bodies=bodies)
+
+
+def _read_bodies(given: object, cache: ReadParts) -> tuple[Presser, ...]:
+    """Return the bodies of a list of tables, each with a path."""
+    if not isinstance(given, list) or not all(isinstance(table, dict) for table in given):
+        rule = f"must be a list of tables, [[{BODIES}]]"
+        raise ParameterError(BODIES, "", rule, show_value(given))
+    bodies = []
+    for number, table in enumerate(given, 1):
+        owner, keys = f"{BODIES} #{number}", dict(table)
+        path = keys.pop("trajectory", None)
+        if not isinstance(path, dict) or "waypoints" not in path:
+            shown = "none" if path is None else show_value(path)
+            raise ParameterError(owner, "trajectory", "must be a path with waypoints", shown)
+        body = cache.read(read_part, owner, import_part(*BODY), {}, keys)
+        bodies.append(Presser(body, cache.read(_read_path, f"{owner}.trajectory", path, 0.0)))
+    return tuple(bodies)
 
 
 def _find_defaults(preset: str, method: str) -> dict[str, Table]:
@@ -153,16 +179,24 @@ def tabulate(scene: Scene) -> Record:
     def tabulate_finger(finger: Finger) -> Record:
         path, tables = finger.trajectory, tabulate_parts(FINGER_PARTS, finger)
         if path != press:
-            points = list(map(vars, path.waypoints))
-            tables["trajectory"] = {"interpolation": path.interpolation, "waypoints": points}
+            tables["trajectory"] = tabulate_path(path)
         return tables
+
+    def tabulate_path(path: Path) -> Record:
+        points = list(map(vars, path.waypoints))
+        return {"interpolation": path.interpolation, "waypoints": points}
 
     tables = tabulate_parts((name for name in SECTIONS if name not in FINGER_PARTS), scene)
     tables |= {key: getattr(scene, key) for key in TEXTS}
     if scene.control:
         tables["control"]["method"] = scene.method
-    if scene.simulation.duration == max(path.duration for path in scene.trajectories()):
+    if scene.simulation.duration == scene.lasting:
         tables["simulation"].pop("duration", None)
+    if scene.bodies:
+        tables[BODIES] = [
+            {**vars(each.body), "trajectory": tabulate_path(each.trajectory)}
+            for each in scene.bodies
+        ]
     fingers = [tabulate_finger(finger) for finger in scene.fingers]
     return {**tables, **fingers[0]} if len(fingers) == 1 else {**tables, FINGERS: fingers}
 
@@ -339,6 +373,9 @@ def _write_lines(scene: Scene) -> Iterator[str]:
         for name, part in parts.items():
             yield from _write_part(f"{FINGERS}.{name}", part)
         yield from _write_part(f"{FINGERS}.trajectory", finger.trajectory)
+    for each in scene.bodies:
+        yield from _write_part(f"[{BODIES}]", each.body)
+        yield from _write_part(f"{BODIES}.trajectory", each.trajectory)
 
 
 def _write_part(section: str, part: Parameters | Path | None, method: str = "") -> Iterator[str]:

@@ -16,7 +16,7 @@ import numpy as np
 
 from ..base.arrays import Array, Floats
 from ..base.errors import DigiclayError, ParameterError
-from ..engine.simulation import Progress, Stopped, begin, periods, repeat_period, trace_fingers
+from ..engine.simulation import Progress, Stopped, begin, periods, repeat_period
 from ..engine.state import State
 from ..engine.system import System
 from ..model.control_interface import Commands, Measurement
@@ -139,8 +139,13 @@ def reference_settings(simulation: Simulation) -> Simulation:
 
 
 def make_reference(scene: Scene) -> Scene:
-    """Return the reference of a run: its parts and `reference_settings`, without a controller."""
-    return replace(scene, control=None, shape=None, simulation=reference_settings(scene.simulation))
+    """Return the reference of a run: its parts and `reference_settings`, without a controller.
+
+    The undersides of its bodies are computed in every control period.
+    """
+    bodies = tuple(replace(each, body=replace(each.body, travel=0.0)) for each in scene.bodies)
+    settings = reference_settings(scene.simulation)
+    return replace(scene, control=None, shape=None, simulation=settings, bodies=bodies)
 
 
 def compare(height: Floats, force: Floats, other_height: Floats, other_force: Floats) -> Floats:
@@ -273,7 +278,8 @@ def catch_up(monitor: ErrorMonitor, after: State, count: int) -> tuple[ErrorMoni
         with np.errstate(over="ignore", invalid="ignore"):
             (leader, path), *waiting = monitor.waiting
             poses = interpolate_poses(path, system.instants / system.period)
-            state = repeat_period(system, state, trace_fingers(system, poses)[0], leader)
+            (finger,) = system.trace(poses, state.period)
+            state = repeat_period(system, state, finger, leader)
         if not np.isfinite(state.active.block).all():
             return begin_stretch(reset(monitor), after), None
         compared = [0, system.rows.force]

@@ -31,7 +31,7 @@ class HistoryArray(NamedTuple):
     """Array of a history."""
 
     axes: str
-    """Shape: t rows, n pins, f fingers; of one finger without the axis f."""
+    """Shape: t rows, n pins, b bodies, f fingers; of one finger without the axis f."""
     unit: str
     meaning: str
     kinds: str = "if"
@@ -61,6 +61,10 @@ HISTORY_ARRAYS: dict[str, HistoryArray] = {
     ),
     "total_force": HistoryArray("t", "N", "force of all fingers on all pins"),
     "finger_force": HistoryArray("t, f", "N", "force of each of several fingers", optional=True),
+    "body": HistoryArray(
+        "t, b, 7", "m, 1", "pose of each body: its mesh's origin, its quaternion", optional=True
+    ),
+    "body_force": HistoryArray("t, b, n", "N", "force of each body on each pin", optional=True),
     "beyond_a_finger": HistoryArray(
         "t", "1", "whether a finger presses beyond the range of the contact law", "b", optional=True
     ),
@@ -130,7 +134,7 @@ def _refuse(path: Path, scene: Scene, heads: Mapping[str, Head]) -> None:
     if not 0 < rows <= most:
         rule = f"must have from 1 to the {most:,} rows of its scene's {scene.periods:,} control periods"
         raise OutputError(f"{path} {rule} (got {rows:,}).")
-    sizes = {"n": scene.cells, "t": rows, "f": len(scene.fingers)}
+    sizes = {"n": scene.cells, "t": rows, "f": len(scene.fingers), "b": len(scene.bodies)}
     for name, head in heads.items():
         axes = HISTORY_ARRAYS[name].axes.split(", ")
         several = len(scene.fingers) > 1

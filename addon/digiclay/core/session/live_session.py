@@ -13,7 +13,7 @@ import numpy as np
 from ..base.arrays import Floats
 from ..base.modes import BLISTER, LOCKED
 from ..control.orders import ORDER, SURFACED, LockingControl, Orders, order_periods
-from ..engine.simulation import advance, trace_fingers
+from ..engine.simulation import advance
 from ..engine.state import State
 from ..engine.system import System
 from ..model.trajectory import interpolate_poses
@@ -162,7 +162,8 @@ def simulate_path(
     system: System, state: State, path: Floats, orders: Orders | None = None
 ) -> Iterator[State]:
     """Yield the states along the path (t + 1, f, 7), each valid until the next one; overwrites `state`."""
-    fingers = trace_fingers(system, interpolate_poses(path, system.instants / system.period))
+    poses = interpolate_poses(path, system.instants / system.period)
+    fingers = system.trace(poses, state.period)
     locked = bool((state.mode() == LOCKED).any())
     systems: Iterator[System] = repeat(system, len(fingers))
     if orders is not None or locked:

@@ -31,6 +31,7 @@ from ..metrics.summary import (
     compute_metrics,
     find_contact_rows,
     find_losses,
+    measure_bodies,
     split_fingers,
     take_worst,
 )
@@ -100,7 +101,8 @@ class Result(Described):
     def finger_force(self) -> Floats:
         """Total force on each finger over time, (t, f), N."""
         self.require_history("finger_force")
-        return self.history.get("finger_force", self.history["total_force"][:, None])
+        total = self.history["total_force"]
+        return self.history.get("finger_force", total).reshape(len(total), -1)
 
     @property
     def fingers(self) -> tuple[Contact, ...]:
@@ -218,10 +220,17 @@ def evaluate(
         return report(scene, ended, {}, versions)
     moments = rows.pop("period") * scene.simulation.control_period
     poses = sample_poses(scene.trajectories(), moments)
+    if scene.bodies:
+        tips = any(finger.fingertip for finger in scene.fingers)
+        pressing = rows.pop("finger_force")[:, : len(scene.fingers)]
+        if tips:
+            rows["finger_force"] = pressing if len(scene.fingers) > 1 else pressing[:, 0]
+        paths = [each.trajectory.trajectory() for each in scene.bodies]
+        rows["body"] = sample_poses(paths, moments)
     history = {
         "time": moments,
         **rows,
-        "fingertip": poses[:, 0] if system.fingers == 1 else poses,
+        "fingertip": poses[:, 0] if len(scene.fingers) == 1 else poses,
         "total_force": rows["force"].sum(axis=1),
         "position": system.grid.positions,
     }
@@ -232,8 +241,10 @@ def evaluate(
         if system.cell.touch is not None and finger.fingertip:
             depths.append(find_indentations(finger.fingertip, of_finger))
     metrics: Record = take_worst(each)
-    if system.fingers > 1:
+    if len(scene.fingers) > 1:
         metrics["fingers"] = each
+    if scene.bodies:
+        metrics["bodies"] = measure_bodies(history)
     metrics |= measure_losses(scene, system.fastest, moments, felt)
     if depths:
         depth = np.max(depths, axis=0)
@@ -242,7 +253,7 @@ def evaluate(
             metrics["max_total_force"], metrics["max_indentation"]
         )
         if metrics["beyond_a_finger"]:
-            pressing = history.get("finger_force", history["total_force"][:, None])
+            pressing = history.get("finger_force", history["total_force"]).reshape(len(depth), -1)
             history["beyond_a_finger"] = is_beyond(pressing.max(axis=1), depth)
     return replace(report(scene, ended, metrics, versions), history=history)
 
@@ -305,7 +316,9 @@ def run(
     check_memory(scene, system.rows)
     start = begin(system)
     recording = (
-        RunRecording(scene.recorder, system.rows, start, scene.periods) if scene.recorder else None
+        RunRecording(scene.recorder, system.rows, start, scene.periods, len(scene.bodies))
+        if scene.recorder
+        else None
     )
     started = time.perf_counter()
     for state in periods(system, scene.trajectories(), start, scene.periods):

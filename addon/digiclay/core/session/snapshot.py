@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from ..base.arrays import Array, Floats
+from ..base.arrays import Array, Flags, Floats
 from ..base.errors import StateError
 from ..base.modes import HOLD, LOCKED, REST, Mode
 from ..control.pin_division import Hands
@@ -122,6 +122,7 @@ def dump(system: System, state: State) -> bytes:
     arrays: list[Array] = []
     memory = flatten(state.memory, arrays)
     locks = None if state.locks is None else flatten(state.locks, arrays)
+    under = None if active.under is None else flatten(np.packbits(active.under), arrays)
     values = state.rows, state.modes, state.aged, active.cells, active.block, active.mode
     body = [
         np.ascontiguousarray(array, kind)
@@ -153,6 +154,7 @@ def dump(system: System, state: State) -> bytes:
         },
         "memory": memory,
         **({"locks": locks} if locks else {}),
+        **({"under": under} if under else {}),
         "thin": thin,
         "arrays": [[array.dtype.str, list(array.shape)] for array in arrays],
     }
@@ -186,6 +188,7 @@ def load(system: System, data: bytes) -> State:
         control,
         gathered["peak"],
         gathered["until"],
+        under=stored.arrays.get("under"),
     )
     memory = rebuild(system.controller.begin(), header["memory"], stored.memory)
     bed = arrays["rows"], arrays["modes"], arrays["aged"]
@@ -265,6 +268,9 @@ def _read(data: bytes) -> Snapshot:
             stored.arrays[name] = _fill(stored.arrays[name], bits, whole[name])
         if "locks" in header:
             stored.arrays["locks"] = stored.memory[header["locks"]["array"]]
+        if "under" in header:
+            shape = len(gathered["fingers"]), cells
+            stored.arrays["under"] = _unpack(stored.memory[header["under"]["array"]], shape)
         # An empty memory is None; a missing one is damage.
         sound = (
             "memory" in header and gathered["near"] <= taken and all(map(math.isfinite, numbers))
@@ -278,12 +284,17 @@ def _read(data: bytes) -> Snapshot:
 
 def _fill(values: Array, bits: Array, shape: tuple[int, ...]) -> Floats:
     """Return an array with the values (k,) where the packed bits are 1, and 0 elsewhere."""
+    filled, whole = _unpack(bits, shape), np.zeros(shape)
+    whole[filled] = values
+    return whole
+
+
+def _unpack(bits: Array, shape: tuple[int, ...]) -> Flags:
+    """Return packed bits as an array."""
     count = math.prod(shape)
     if bits.shape != (-(-count // 8),):
         raise ValueError("another number of bits")
-    filled, whole = np.unpackbits(bits, count=count).astype(bool), np.zeros(count)
-    whole[filled] = values
-    return whole.reshape(shape)
+    return np.unpackbits(bits, count=count).astype(np.bool_).reshape(shape)
 
 
 def _read_arrays(

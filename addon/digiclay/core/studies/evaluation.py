@@ -176,6 +176,8 @@ def _find_reason(scene: Scene) -> str:
     """Return why a run cannot be in a batch, or ``""``."""
     if len(scene.fingers) != 1:
         return "they have several fingers"
+    if scene.bodies:
+        return "they have bodies"
     return (
         ""
         if find_method(scene.method).batched

@@ -1,0 +1,242 @@
+"""Engine of a bed under meshes, beside fingertips: pairs of body and cell, as of fingertips.
+
+The underside of a mesh is computed at times some control periods apart, counted from the start of
+the session. Between them it rises and falls with the mesh, and else is linear in time. So neither
+chunks nor a stored state in mid-press change a result. A pin is indented by at most the cap, from its
+height at the start of a control period: one that a body meets sideways slips under it, at a bounded
+force.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+
+from ..base.arrays import Cells, Flags, Floats, any_true
+from ..model.fingers import HandPeriod, HandTouch, trace_hands
+from ..model.fingertip import make_matrices
+from ..model.layout import Grid
+from ..model.trajectory import Trajectory
+from ..model.underside import Mesh, rasterize
+from .pairs import HandSelection, HandSystem, Pairs
+from .state import State
+
+#: Longest time between two computed undersides, s.
+LONGEST = 0.1
+#: Time, s, for which a set includes the cells that bodies are to touch.
+AHEAD = 0.06
+#: Largest speed of a smooth path, per mean speed between two waypoints.
+FASTER = 1.5
+#: Window of what no fingertip touches: its paraboloid is beyond all pins.
+FAR = (0.0, 0.0, 0.0, 1e9, 0.0, 1.0)
+
+
+class Stretch(NamedTuple):
+    """Undersides of bodies over all cells in a control period: lines in time, and deviations from them."""
+
+    start: Floats
+    end: Floats
+    low: Floats
+    """(b, n): At the ends of the lines, m, and the lower ends; inf where nothing is above a pin."""
+    parts: Floats
+    bend: Floats
+    """(b, p): Of the period's instants on these lines, 0 to 1; rise of the bodies beyond the lines, m."""
+
+    def at(self, bodies: Cells | int, cells: Cells) -> Floats:
+        """Return the undersides of bodies over cells (k,), (p, k), m."""
+        start, end, low = (rows[bodies, cells] for rows in self[:3])
+        parts, bend = (rows[bodies].T.reshape(rows.shape[1], -1) for rows in self[3:])
+        return np.where(low < np.inf, start + parts * (end - start) + bend, start)
+
+
+class Undersides(Protocol):
+    """Undersides of bodies over a bed, by the number of the control period."""
+
+    def find(self, period: int) -> Stretch:
+        """Return the undersides in a period."""
+
+    def find_lowest(self, period: int) -> Floats:
+        """Return the lowest undersides in this period and, as far as known, in later ones, (b, n), m."""
+
+
+@dataclass(frozen=True, eq=False)
+class MovedMesh:
+    """Mesh along a path of its origin."""
+
+    mesh: Mesh
+    trajectory: Trajectory
+    samples: int
+    tip_radius: float
+    travel: float
+    """See `shapes.body.Body`."""
+
+    def count_periods(self, period: float) -> int:
+        """Return the number of control periods, s, between two computed undersides."""
+        path, radius = self.trajectory, np.linalg.norm(self.mesh.vertices, axis=1).max()
+        sideways = np.hypot(*np.diff(path.positions[:, :2], axis=0).T)
+        cosine = np.abs((path.orientations[1:] * path.orientations[:-1]).sum(axis=1))
+        way = FASTER * sideways + 2.0 * np.arccos(np.minimum(cosine, 1.0)) * radius
+        speed = float((way / np.diff(path.times)).max(initial=0.0))
+        time = LONGEST if self.travel >= speed * LONGEST else self.travel / speed
+        return max(1, math.floor(time / period + 1e-9))
+
+
+class PathUndersides:
+    """Undersides of meshes along their paths, computed when they are needed."""
+
+    def __init__(
+        self, bodies: tuple[MovedMesh, ...], grid: Grid, instants: Floats, ceiling: float
+    ) -> None:
+        self._bodies, self._grid, self._ceiling = bodies, grid, ceiling
+        self._period, self._instants = float(instants[-1]), instants
+        self._strides = [body.count_periods(self._period) for body in bodies]
+        self._known: list[dict[bytes, Floats]] = [{} for _ in bodies]
+        self._lines: tuple[list[int], tuple[Floats, Floats, Floats]] | None = None
+
+    def find(self, period: int) -> Stretch:
+        """Return the undersides in a period."""
+        numbers = [period // stride for stride in self._strides]
+        if self._lines is None or self._lines[0] != numbers:
+            start, end = (
+                np.stack([self._compute(body, at + more) for body, at in enumerate(numbers)])
+                for more in (0, 1)
+            )
+            low = np.minimum(start, end)
+            low[low >= self._ceiling] = np.inf
+            self._lines = numbers, (start, end, low)
+        strides = np.array(self._strides)[:, None]
+        parts = (period % strides + self._instants / self._period) / strides
+        moments = period * self._period + self._instants
+        bend = []
+        for body, number, stride, part in zip(
+            self._bodies, numbers, self._strides, parts, strict=True
+        ):
+            ends = np.array([number, number + 1]) * stride * self._period
+            start, end, *heights = body.trajectory.poses(np.append(ends, moments))[:, 2]
+            bend.append(heights - (start + part * (end - start)))
+        return Stretch(*self._lines[1], parts, np.array(bend))
+
+    def find_lowest(self, period: int) -> Floats:
+        """Return the lowest undersides from a period on for the time `AHEAD`, (b, n), m."""
+        lowest = []
+        for body, stride in enumerate(self._strides):
+            last = math.ceil((period + AHEAD / self._period) / stride)
+            each = [self._compute(body, at) for at in range(period // stride, last + 1)]
+            lowest.append(np.minimum.reduce(each))
+        return np.stack(lowest)
+
+    def _compute(self, number: int, at: int) -> Floats:
+        """Return the underside of a body at a multiple of its periods, (n,), m, at most the ceiling."""
+        body, known, time = (
+            self._bodies[number],
+            self._known[number],
+            self._strides[number] * self._period,
+        )
+        (pose,) = body.trajectory.poses(np.array([at * time]))
+        under = known.pop(pose.tobytes(), None)
+        if under is None:
+            vertices = body.mesh.vertices @ make_matrices(pose[None, 3:])[0].T + pose[:3]
+            under = rasterize(
+                vertices,
+                body.mesh.triangles,
+                self._grid,
+                body.samples,
+                body.tip_radius,
+                self._ceiling,
+            )
+            np.minimum(under, self._ceiling, out=under)
+        known[pose.tobytes()] = under  # the last one used is the last one to go
+        if len(known) > 4 + AHEAD / time:
+            del known[next(iter(known))]
+        return under
+
+
+@dataclass(frozen=True, eq=False)
+class BodyPeriod:
+    """Fingertips and bodies in one control period."""
+
+    hand: HandPeriod | None
+    undersides: Undersides
+    number: int
+    window: Floats
+    """(6, f): Of fingertips and bodies; see `FAR`."""
+
+    def near(self, height: Floats) -> Flags:
+        """Return which of all pins with heights (n,), m, the bodies touch, (b, n)."""
+        stretch = self.undersides.find(self.number)
+        return stretch.low + stretch.bend.min(axis=1, keepdims=True) <= height
+
+
+@dataclass(frozen=True, eq=False)
+class BodySelection(HandSelection):
+    """Selection of the active cells of a bed under bodies: the cells below their undersides."""
+
+    def update(self, state: State, finger: Any, control: Any) -> State:
+        """Return a state, in the same arrays, whose active cells include all that can change in a period."""
+        active, height = state.active, state.row(0)
+        near = finger.near(height + float(self.period * self.fastest))
+        known = active.under if state.period < active.until else None
+        if known is not None and not any_true(near & ~known[-len(near) :]):
+            return super().update(state, finger, control)
+        under = np.zeros((self.rows.fingers, self.grid.count), np.bool_)
+        under[-len(near) :] = near | (
+            finger.undersides.find_lowest(state.period) <= height + self.rise
+        )
+        return self.renew(state, replace(active, under=under), finger.window, self.join(control))
+
+
+class BodyPairs(Pairs):
+    """Pairs of equal bodies, or of equal fingertips, and cells."""
+
+    def __init__(self, system: BodySystem, active: Any, *given: Any) -> None:
+        super().__init__(system, active, *given)
+        self._cells, self._caps = active.cells[self.cells], system.caps
+        self._bodies = self.fingers - system.fingers + len(system.caps)
+
+    def find_under(self, finger: BodyPeriod) -> Floats:
+        """Return the undersides over the pairs in a period, (p, k), m, not below the cap."""
+        height, bodies = self.rows[0, : self.cells.size], self._bodies
+        if bodies[0] >= 0:
+            under = finger.undersides.find(finger.number).at(bodies, self._cells)
+            return np.maximum(under, height - self._caps[bodies])
+        assert finger.hand is not None
+        under = finger.hand.under(self.positions)
+        # A fingertip on a pin that a body presses is capped too.
+        pressed, stretch = np.zeros(height.size, np.bool_), finger.undersides.find(finger.number)
+        for body in range(len(self._caps)):
+            pressed |= (stretch.at(body, self._cells) < height).any(axis=0)
+        floor = np.where(pressed, height - self._caps.min(), -np.inf)
+        return np.maximum(under, floor)
+
+
+@dataclass(frozen=True, eq=False)
+class BodySystem(HandSystem):
+    """Constants of a session with bodies, behind its fingers, with or without fingertips."""
+
+    hand: HandTouch | None
+    """Of the fingertips; None: there are none."""
+    undersides: Undersides
+    caps: Floats
+    """(b,): Largest indentation by each body, m."""
+
+    @property
+    def pairs(self) -> type[Pairs]:
+        """Kind of the pairs."""
+        return BodyPairs
+
+    def trace(self, poses: Floats, first: int) -> list[Any]:
+        """Return fingertips and bodies in each of t periods; see `System.trace`."""
+        hands: list[HandPeriod | None] = [None] * len(poses)
+        windows = np.tile(np.array(FAR)[:, None], (len(poses), 1, self.fingers))
+        if self.hand:
+            hands[:] = trace_hands(self.hand, poses)
+            for window, hand in zip(windows, hands, strict=True):
+                assert hand is not None
+                window[:, : poses.shape[2]] = hand.window
+        return [
+            BodyPeriod(hand, self.undersides, first + number, window)
+            for number, (hand, window) in enumerate(zip(hands, windows, strict=True))
+        ]

@@ -1,0 +1,134 @@
+"""Sections [[body]] of a scene: meshes that press the pins, their contact, and the reading of their files."""
+
+from __future__ import annotations
+
+import base64
+import binascii
+import zlib
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..base.errors import ParameterError
+from ..base.quantity import Parameters, quantity
+from ..files.tables import shorten
+from ..mesh_io import mesh_reader
+from ..mesh_io.mesh_reader import READERS
+from ..model.contact import Contact
+from ..model.relaxation import Relaxation
+from ..model.underside import MOST_SAMPLES, Mesh, check_mesh
+from .request import AUTO, LENGTHS, UPWARDS
+
+#: Most triangles of a body, whose underside is computed many times per second, and bytes of a
+#: packed mesh.
+MOST_TRIANGLES, MOST_BYTES = 1_000_000, 100_000_000
+#: Thickness of a body, as a share of its length, below which it is flat.
+THIN = 1e-6
+#: Rate of stiffening of a body's contact, 1/m: at the cap a spring is straight to 0.1 %.
+STRAIGHT = 1.0
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Body(Parameters):
+    """Rigid body: a mesh, and its contact with a pin, a spring and a damper up to the cap."""
+
+    file: str = quantity("", "file of a mesh")
+    mesh: str = quantity("", "vertices, m, and triangles, packed as text, in place of the file")
+    up: str = quantity(AUTO, "upward direction of the file", choices=(AUTO, *UPWARDS))
+    unit: str = quantity(AUTO, "unit of length of the file", choices=(AUTO, *LENGTHS))
+    scale: float = quantity(1.0, "scale of the mesh", above=0.0, at_most=1e6)
+    stiffness: float = quantity(
+        400.0, "force of a pin per indentation", unit="N/m", symbol="k_b", above=0.0
+    )
+    damping: float = quantity(
+        0.0, "force of a pin per speed of indentation", unit="N s/m", symbol="c_b", at_least=0.0
+    )
+    cap: float = quantity(
+        1.6e-3, "largest indentation, e.g. of a pin met sideways", unit="m", symbol="x_b", above=0.0
+    )
+    tip_radius: float = quantity(
+        0.0, "radius of a pin's end; at 0 a pin is its axis", unit="m", symbol="r_p", at_least=0.0
+    )
+    samples: int = quantity(
+        3, "sample points per pitch of a rounded end, odd", at_least=1, at_most=MOST_SAMPLES
+    )
+    travel: float = quantity(
+        1.5e-3, "motion sideways between two computed undersides", unit="m", at_least=0.0
+    )
+
+    def check(self) -> None:
+        """Refuse a body without a mesh or with two, and an even number of samples."""
+        if bool(self.file) == bool(self.mesh):
+            rule = "must be left out where mesh is given" if self.mesh else "or mesh must be given"
+            raise ParameterError("Body", "file", rule, self.file or "none")
+        if self.samples % 2 == 0:
+            raise ParameterError("Body", "samples", "must be odd", str(self.samples))
+
+    @property
+    def contact(self) -> Contact:
+        """Law of the contact at once: with damping twice as stiff as in the end."""
+        stiffness = 2.0 * self.stiffness if self.relaxation else self.stiffness
+        return Contact(stiffness, STRAIGHT, share=1.0)
+
+    @property
+    def relaxation(self) -> Relaxation | None:
+        """Damper, in series with a second spring of the same stiffness, so that impacts stay finite."""
+        time = self.damping / self.stiffness
+        return Relaxation((time,), (0.5, 0.5)) if time > 1e-9 else None
+
+
+def pack_mesh(vertices: ArrayLike, triangles: ArrayLike) -> str:
+    """Return vertices (v, 3), m, z up, and triangles (t, 3) as `Body.mesh`; ParameterError if unsound."""
+    mesh = check_mesh(vertices, triangles)
+    head = np.array([len(mesh.vertices)], "<i4").tobytes()
+    body = mesh.vertices.astype("<f8").tobytes() + mesh.triangles.astype("<i4").tobytes()
+    return base64.b64encode(zlib.compress(head + body)).decode("ascii")
+
+
+def _unpack(text: str, owner: str) -> Mesh:
+    """Return the mesh of a text of `pack_mesh`."""
+    opened = zlib.decompressobj()
+    try:
+        data = opened.decompress(base64.b64decode(text, validate=True), MOST_BYTES)
+        end = 4 + 24 * int(np.frombuffer(data, "<i4", 1)[0])
+        vertices = np.frombuffer(data[4:end], "<f8").reshape(-1, 3)
+        triangles = np.frombuffer(data[end:], "<i4").reshape(-1, 3)
+        whole = opened.eof
+    except (binascii.Error, ValueError, zlib.error):
+        whole = False
+    if not whole:
+        rule = f"must be a mesh packed as text, of at most {MOST_BYTES / 1e6:g} MB"
+        raise ParameterError(owner, "mesh", rule, repr(shorten(text)))
+    return check_mesh(vertices, triangles, owner)
+
+
+def read_body(body: Body, owner: str = "body") -> Mesh:
+    """Return the mesh of a body in its own axes, m, z up; ParameterError if it cannot press pins."""
+    field = "mesh" if body.mesh else "file"
+    if body.mesh:
+        mesh = _unpack(body.mesh, owner)
+    else:
+        path = Path(body.file)
+        if path.suffix.lower() not in READERS or not path.is_file():
+            rule = f"must be the file of a mesh ({', '.join(READERS)})"
+            raise ParameterError(owner, "file", rule, body.file)
+        try:
+            read = mesh_reader.read(path)
+        except OSError as error:
+            rule = "must be a file that can be read"
+            raise ParameterError(owner, "file", rule, f"{path}: {error.strerror}") from None
+        except ParameterError as error:
+            raise ParameterError(owner, "file", error.rule, error.value, error.hint) from None
+        axes, signs = UPWARDS[read.up if body.up == AUTO else body.up]
+        length = read.length or LENGTHS["mm"] if body.unit == AUTO else LENGTHS[body.unit]
+        mesh = check_mesh(read.vertices[:, axes] * signs * length, read.faces, owner)
+    if len(mesh.triangles) > MOST_TRIANGLES:
+        rule = f"must have at most {MOST_TRIANGLES:,} triangles"
+        raise ParameterError(owner, field, rule, f"{len(mesh.triangles):,}")
+    used = mesh.vertices[np.unique(mesh.triangles)]
+    low, _, high = np.sqrt(np.abs(np.linalg.eigvalsh(np.cov(used.T))))
+    if low < THIN * high:
+        raise ParameterError(owner, field, "must have a thickness", "a flat mesh")
+    return mesh._replace(vertices=mesh.vertices * body.scale)

@@ -1,0 +1,384 @@
+"""Scenes with bodies: imprints, walls, several bodies and fingers, stored states, and what is refused."""
+
+import struct
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import trimesh
+from digiclay.core.base.errors import DigiclayError
+from digiclay.core.batch.run_together import run_together
+from digiclay.core.engine.bodies import MovedMesh, PathUndersides
+from digiclay.core.engine.simulation import begin, periods
+from digiclay.core.model.fingertip import Fingertip, compute_forms, compute_underside
+from digiclay.core.model.trajectory import make_level
+from digiclay.core.model.underside import check_mesh
+from digiclay.core.scene.assembly import assemble
+from digiclay.core.scene.scene_source import Setting, load
+from digiclay.core.scene.toml_table import format_scene, resolve, tabulate
+from digiclay.core.session import snapshot
+from digiclay.core.session.accuracy import Replay, estimate_errors, make_reference
+from digiclay.core.session.finished_run import HISTORY_ARRAYS, read_run
+from digiclay.core.session.run_scene import run, save
+from digiclay.core.shapes.body import pack_mesh
+
+BALL = trimesh.creation.icosphere(4, radius=12e-3)
+BOX = trimesh.creation.box((12e-3, 12e-3, 20e-3))
+REST = 40e-3
+
+
+def hand():
+    """Return a mesh like a hand: a palm with five fingers, a bumpy underside, all of one piece."""
+    points, faces = np.array(BALL.vertices), np.array(BALL.faces)
+    points = points * (1.6, 1.4, 0.8)
+    around = np.arctan2(points[:, 1], points[:, 0])
+    points[:, :2] *= (1.0 + 0.3 * np.cos(5.0 * around) * np.hypot(*points[:, :2].T) / 19e-3)[
+        :, None
+    ]
+    points[:, 2] += 0.6e-3 * np.sin(points[:, 0] / 2e-3) * np.cos(points[:, 1] / 3e-3)
+    return trimesh.Trimesh(points, faces, process=False)
+
+
+def path(*places):
+    """Return a path of straight lines through (time, x, y, z)."""
+    points = [{"time": time, "position": place} for time, *place in places]
+    return {"interpolation": "linear", "waypoints": points}
+
+
+#: The lowest point goes from 2 mm above the pins to 8 mm below, stays, and leaves.
+PRESS = path((0, 0, 0, 54e-3), (0.4, 0, 0, 44e-3), (0.7, 0, 0, 44e-3), (0.9, 0, 0, 60e-3))
+
+
+def body(mesh, way=PRESS, **values):
+    """Return the table of a body."""
+    return {"mesh": pack_mesh(mesh.vertices, mesh.faces), "trajectory": way, **values}
+
+
+def table(*bodies, method="plastic", size=21, **sections):
+    """Return the tables of a scene of bodies."""
+    bed = {"layout": {"rows": size, "columns": size}, "control": {"method": method}}
+    return {**bed, "body": list(bodies), **sections}
+
+
+def drag(speed=0.1, depth=15e-3):
+    """Return the path of a box that is dragged through the pins."""
+    height = REST - depth + 10e-3
+    return path((0, -45e-3, 0, height), (65e-3 / speed, 20e-3, 0, height))
+
+
+@pytest.fixture(scope="module")
+def press():
+    """Return a run in which a hand presses."""
+    return run(resolve(table(body(hand()))))
+
+
+def find_under(scene, time):
+    """Return the undersides of the bodies of a scene at a time, (b, n), m."""
+    system = assemble(scene)
+    stretch = system.undersides.find(round(time / system.period))
+    cells = np.arange(system.grid.count)
+    return np.array([stretch.at(number, cells)[0] for number in range(len(scene.bodies))])
+
+
+def test_a_mesh_of_a_ball_is_a_fingertip_of_its_size():
+    # 20,480 triangles are within 3 µm of the ball, measured across them; its sides are steeper.
+    ball, grid = trimesh.creation.icosphere(5, radius=12e-3), assemble(resolve({})).grid
+    moved = MovedMesh(
+        check_mesh(ball.vertices, ball.faces),
+        make_level(np.array([0.0]), np.array([[1e-3, 2e-3, 47e-3]])),
+        1,
+        0.0,
+        1e-3,
+    )
+    under = PathUndersides((moved,), grid, np.array([0.0, 5e-3]), 0.1).find(0).start[0]
+    tip = Fingertip(12e-3, 12e-3, 12e-3)
+    pose = np.array([[1e-3, 2e-3, 35e-3, 1.0, 0.0, 0.0, 0.0]])
+    exact = compute_underside(
+        *compute_forms(tip.outline(pose)), grid.compute_basis(np.arange(grid.count))
+    )[0]
+    inside = np.hypot(grid.x - 1e-3, grid.y - 2e-3) < 0.8 * 12e-3
+    assert inside.sum() > 30
+    assert np.abs(under - exact)[inside].max() < 5e-6
+
+
+def test_clay_keeps_the_form_of_the_body(press):
+    under = find_under(press.scene, 0.5)[0]
+    height, pressed = press.history["height"][-1], under < REST
+    assert pressed.sum() > 80
+    assert np.corrcoef(height[pressed], under[pressed])[0, 1] > 0.999
+    assert np.sqrt(np.mean((height - under)[pressed] ** 2)) < 0.3e-3
+    # Pins beside the body stay.
+    assert (height[~pressed] == REST).all()
+
+
+def test_the_force_is_that_of_the_body_and_its_metrics_are_recorded(press):
+    history, (felt,) = press.history, press.metrics["bodies"]
+    assert np.array_equal(history["body_force"][:, 0], history["force"])
+    assert felt["max_total_force"] == press.metrics["max_total_force"] > 5.0
+    assert felt["pressed_pins"] == (history["force"] > 0.0).sum(axis=1).max() > 80
+    assert np.array_equal(history["body"][:, 0], history["fingertip"])
+    assert press.metrics["duration"] == pytest.approx(0.9)
+
+
+def test_the_force_is_stiffness_times_indentation_up_to_the_cap():
+    # A pin behind a shut valve does not move.
+    scene = resolve(table(body(BALL, stiffness=300.0, cap=1e-3)))
+    done = run(replace(scene, control=None))
+    under = find_under(done.scene, 0.5)[0]
+    wanted = 300.0 * np.clip(REST - under, 0.0, 1e-3)
+    # The spring is straight to 0.1 %.
+    assert done.history["force"][100] == pytest.approx(wanted, rel=1e-3, abs=1e-12)
+    assert (done.history["height"][-1] == REST).all()
+
+
+def test_damping_adds_to_the_force_of_a_fast_press_and_not_to_that_of_a_held_one():
+    way = path((0, 0, 0, 52e-3), (0.04, 0, 0, 51e-3), (0.4, 0, 0, 51e-3))
+    forces = [
+        run(replace(resolve(table(body(BALL, way, damping=c))), control=None)).history[
+            "total_force"
+        ]
+        for c in (0.0, 0.4)
+    ]
+    middle = (
+        0.4
+        * 25e-3
+        * (
+            run(replace(resolve(table(body(BALL, way))), control=None)).history["force"][8] > 0
+        ).sum()
+    )
+    assert forces[1][8] - forces[0][8] == pytest.approx(middle, rel=0.2)
+    assert forces[1][-1] == pytest.approx(forces[0][-1], rel=1e-6)
+
+
+@pytest.mark.parametrize("damping", [0.0, 0.2])
+@pytest.mark.parametrize("method", ["plastic", "elastic", "viscous", "push_pull", "force_display"])
+def test_a_wall_that_meets_pins_sideways_presses_them_at_a_bounded_force(method, damping):
+    done = run(resolve(table(body(BOX, drag(), damping=damping), method=method)))
+    (felt,) = done.metrics["bodies"]
+    assert 0.3 < felt["max_cell_force"] < 2.0
+    assert felt["pressed_pins"] >= 16
+
+
+def test_a_pin_toy_of_friction_keeps_the_form():
+    control = {"method": "plastic", "yield_force": 0.1}
+    done = run(resolve({**table(body(BALL)), "control": control}))
+    under = find_under(done.scene, 0.5)[0]
+    pressed = under < REST - 0.5e-3
+    assert np.corrcoef(done.history["height"][-1][pressed], under[pressed])[0, 1] > 0.999
+
+
+def test_turned_sides_of_triangles_change_nothing(press):
+    mesh = hand()
+    mesh.faces = mesh.faces[:, ::-1]
+    again = run(resolve(table(body(mesh))))
+    assert np.array_equal(again.history["height"], press.history["height"])
+
+
+def test_a_thin_blade_presses_pins_with_round_ends():
+    blade = trimesh.creation.box((1e-3, 40e-3, 20e-3))
+    way = path((0, 1.4e-3, 0, 52e-3), (0.4, 1.4e-3, 0, 46e-3))
+    felt = [
+        run(resolve(table(body(blade, way, tip_radius=radius)))).metrics["bodies"][0]
+        for radius in (0.0, 0.5e-3)
+    ]
+    assert felt[0]["pressed_pins"] == 0
+    assert felt[1]["pressed_pins"] >= 12
+
+
+FINGER = {"trajectory": path((0, 0.02, 0.02, 42e-3), (0.4, 0.02, 0.02, 38e-3))}
+
+
+def place(mesh, x, y):
+    """Return a path of a press at a place."""
+    points = [{**point, "position": [x, y, point["position"][2]]} for point in PRESS["waypoints"]]
+    return body(mesh, {**PRESS, "waypoints": points})
+
+
+def test_several_bodies_press_as_one_mesh_of_all():
+    left, right = place(BALL, -9e-3, 0.0), place(BOX, 12e-3, 3e-3)
+    two = trimesh.util.concatenate(
+        [
+            BALL.copy().apply_translation((-9e-3, 0, 0)),
+            BOX.copy().apply_translation((12e-3, 3e-3, 0)),
+        ]
+    )
+    apart, joint = run(resolve(table(left, right))), run(resolve(table(body(two))))
+    # They touch no pin in common; the mesh's vertices are rounded elsewhere.
+    assert np.abs(apart.history["height"] - joint.history["height"]).max() < 1e-9
+    each = apart.history["body_force"].sum(axis=2).max(axis=0)
+    assert each.min() > 1.0
+
+
+def test_a_body_and_a_finger_are_felt_apart():
+    both = run(resolve(table(place(BALL, -15e-3, -15e-3), **FINGER)))
+    body_alone = run(resolve(table(place(BALL, -15e-3, -15e-3))))
+    finger_alone = run(resolve(table(**FINGER) | {"simulation": {"duration": 0.9}}))
+    height = body_alone.history["height"] + finger_alone.history["height"] - REST
+    # 0.00 µm from both alone.
+    assert np.abs(both.history["height"] - height).max() < 5e-9
+    assert both.history["finger_force"] == pytest.approx(
+        finger_alone.history["total_force"], abs=1e-6
+    )
+    for name in ("max_cell_force", "max_total_force", "contact_share"):
+        assert both.metrics[name] == pytest.approx(finger_alone.metrics[name], rel=1e-5)
+
+
+def test_a_fingertip_on_a_pin_that_a_body_presses_is_capped_too():
+    deep = {"trajectory": path((0, 0, 0, 42e-3), (0.05, 0, 0, 25e-3), (0.9, 0, 0, 25e-3))}
+    way = path((0, 0, 0, 38e-3 + 12e-3), (0.9, 0, 0, 38e-3 + 12e-3))
+    alone = run(replace(resolve(table(**deep)), control=None))
+    both = run(replace(resolve(table(body(BALL, way), **deep)), control=None))
+    assert alone.metrics["max_cell_force"] > 1e6
+    middle = len(both.history["position"]) // 2
+    # 0.64 N of the body, and at most 1 N of a fingertip 1.6 mm deep.
+    assert both.history["force"][:, middle].max() < 1.7
+
+
+def press_on(scene, state, system, count):
+    """Return the state after more control periods."""
+    *_, last = periods(system, scene.trajectories(), state, count)
+    return last
+
+
+@pytest.mark.parametrize("others", [{}, FINGER], ids=["alone", "beside a finger"])
+def test_a_stored_state_in_mid_press_goes_on_to_the_last_bit(others):
+    turned = drag()
+    turned["waypoints"][1]["orientation"] = [0.9, 0.1, 0.2, 0.3]
+    scene = resolve(table(body(BOX, turned, damping=0.2), body(BALL), **others))
+    whole = press_on(scene, begin(assemble(scene)), assemble(scene), 110)
+    for count in (47, 58):  # neither is a multiple of the periods between two undersides
+        first = assemble(scene)
+        data = snapshot.dump(first, press_on(scene, begin(first), first, count))
+        second = assemble(scene)
+        after = press_on(scene, snapshot.load(second, data), second, 110 - count)
+        assert snapshot.dump(second, after) == snapshot.dump(second, whole)
+
+
+def test_the_error_estimate_covers_the_error():
+    way = path((0, -20e-3, 0, 44e-3), (0.15, 10e-3, 5e-3, 43e-3))
+    scene = resolve(table(body(hand(), way)))
+    done = run(scene)
+    fine = make_reference(replace(scene, simulation=scene.simulation.refined(5)))
+    system = assemble(fine)
+    system = replace(system, controller=Replay(system.grid, done.history["command"]))
+    exact = [state.row(0) for state in periods(system, scene.trajectories(), begin(system), 30)]
+    error = np.abs(exact - done.history["height"][1:]).max()
+    assert 1e-6 < error < estimate_errors(scene, done.history).height < 1e-4
+
+
+@pytest.mark.parametrize("stepper", ["richardson", "runge_kutta_4"])
+def test_other_steppers_agree(stepper):
+    heights = [
+        run(resolve(table(body(BOX, drag()), simulation=simulation))).history["height"][-1]
+        for simulation in ({}, {"stepper": stepper, "physics_step": 1e-3})
+    ]
+    # The default step is 5 ms: the closed form is then within some micrometers.
+    assert np.abs(heights[1] - heights[0]).max() < 10e-6
+
+
+def test_only_pins_below_the_outline_are_active():
+    mesh = trimesh.creation.box((100e-3, 9e-3, 20e-3))
+    way = path((0, 0, 0, 51e-3), (0.2, 0, 0, 46e-3))
+    way["waypoints"] = [{**at, "orientation": [0.92388, 0, 0, 0.382683]} for at in way["waypoints"]]
+    scene = resolve(table(body(mesh, way), size=41))
+    system = assemble(scene)
+    state = press_on(scene, begin(system), system, 40)
+    pressed = np.count_nonzero(state.row(system.rows.force))
+    # A bounding ball includes all pins within 50 mm, some 870.
+    assert 90 < pressed <= state.active.near < 1.3 * pressed
+
+
+def test_a_scene_of_bodies_is_written_read_and_changed(tmp_path, press):
+    (tmp_path / "ball.stl").write_bytes(BALL.export(file_type="stl"))
+    given = {"file": "ball.stl", "unit": "m", "scale": 0.5, "trajectory": PRESS}
+    scene = resolve(table(given))
+    (tmp_path / "mine.toml").write_text(format_scene(scene), encoding="utf-8")
+    found = load(tmp_path / "mine.toml", [Setting("body.1.stiffness", "'0.3 N/m'")])
+    assert found.bodies[0].body.file == str(tmp_path / "ball.stl")
+    assert found.bodies[0].body.stiffness == 0.3
+    assert find_under(found, 0.5).min() == pytest.approx(44e-3 - 6e-3, abs=1e-7)
+    assert resolve(tabulate(found)) == found
+    save(press, tmp_path)
+    again = read_run(tmp_path, *HISTORY_ARRAYS).history
+    assert all(np.array_equal(again[name], rows) for name, rows in press.history.items())
+    assert "body" not in format_scene(resolve({}))
+
+
+def change(**values):
+    """Return a table whose body has other values."""
+    return table({**body(BALL), **values})
+
+
+def stl(folder, triangles):
+    """Write a binary STL of equal triangles."""
+    one = struct.pack("<12fH", 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0)
+    (folder / "many.stl").write_bytes(bytes(80) + struct.pack("<I", triangles) + one * triangles)
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        (change(scale=0.0), "body #1.scale must be above 0"),
+        (change(scale=-2.0), "body #1.scale must be above 0"),
+        (change(scale=float("nan")), "body #1.scale must be a finite number"),
+        (change(stiffness=0), "body #1.stiffness must be above 0"),
+        (change(damping=-1.0), "body #1.damping must be at least 0"),
+        (change(cap=0.0), "body #1.cap must be above 0"),
+        (change(samples=4), "body #1.samples must be odd"),
+        (change(stifness=3.0), "body #1.stifness must be a known key"),
+        (change(file="x.stl"), "body #1.file must be left out where mesh is given"),
+        (change(mesh=""), "body #1.file or mesh must be given"),
+        (change(mesh="abc"), "body #1.mesh must be a mesh packed as text"),
+        (change(mesh="", file="none.stl"), "body #1.file must be the file of a mesh"),
+        (change(mesh="", file="note.txt"), "body #1.file must be the file of a mesh"),
+        (change(mesh="", file="empty.stl"), "body #1.file must"),
+        (change(mesh="", file="many.stl"), "body #1.file must have at most 1,000,000 triangles"),
+        (change(trajectory={}), "body #1.trajectory must be a path with waypoints"),
+        (
+            change(trajectory=path((0, 0, 0, float("nan")))),
+            "body #1.trajectory.waypoints #1.position",
+        ),
+        (
+            change(trajectory=path((0, 0, 0, -0.01), (1, 0, 0, 0))),
+            "body #1.trajectory must begin above",
+        ),
+        (
+            table(body(trimesh.creation.box((0.01, 0.01, 1e-12)))),
+            "body #1.mesh must have a thickness",
+        ),
+        (table(3), "body must be a list of tables"),
+        (
+            table(body(BALL), method="virtual_master"),
+            "body must be left out: the method virtual_master",
+        ),
+        (table(body(BALL), method="cell_states"), "body must be left out: the method cell_states"),
+        (table(body(BALL), method="hybrid"), "body must be left out: the method hybrid"),
+    ],
+    ids=lambda value: value if isinstance(value, str) else "",
+)
+def test_what_cannot_press_is_refused_in_one_line(given, words, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "note.txt").write_text("no mesh", encoding="utf-8")
+    (tmp_path / "empty.stl").write_bytes(b"")
+    if "many.stl" in str(given["body"][:1]):
+        stl(tmp_path, 2_000_000)
+    with pytest.raises(DigiclayError) as raised:
+        assemble(resolve(given))
+    assert words in str(raised.value)
+    assert len(str(raised.value)) <= 400
+    assert "\n" not in str(raised.value)
+
+
+@pytest.mark.parametrize(
+    "vertices",
+    [np.full((3, 3), np.nan), np.zeros((3, 2)), np.zeros((0, 3))],
+    ids=["NaN", "two coordinates", "none"],
+)
+def test_arrays_that_are_no_mesh_are_refused(vertices):
+    with pytest.raises(DigiclayError, match="mesh must"):
+        pack_mesh(vertices, [[0, 1, 2]])
+
+
+def test_a_batch_refuses_bodies():
+    with pytest.raises(DigiclayError, match="must have no bodies"):
+        list(run_together([resolve(table(body(BALL)))] * 2))
