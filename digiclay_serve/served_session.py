@@ -15,7 +15,12 @@ from typing import Any
 
 import numpy as np
 from digiclay.core.base.arrays import Floats
-from digiclay.core.base.errors import DigiclayError, DivergenceError, OutputError
+from digiclay.core.base.errors import (
+    DigiclayError,
+    DivergenceError,
+    OutputError,
+    ParameterError,
+)
 from digiclay.core.control.travel import measure_square
 from digiclay.core.engine.simulation import begin
 from digiclay.core.engine.system import System
@@ -80,6 +85,9 @@ class Session(live_session.LiveSession):
 
 def begin_session(scene: Scene, limits: Limits = LIMITS, tracking: Tracking = TRACKING) -> Session:
     """Begin a session at rest, its fingertips where the paths of the scene begin. Raises DigiclayError."""
+    if scene.bodies:
+        rule = "must be left out: a server's clients move fingertips"
+        raise ParameterError("body", "", rule, f"{len(scene.bodies)} of them")
     return _begin_at_rest(scene, assemble(scene), limits, tracking, accuracy.start(scene))
 
 

@@ -21,6 +21,9 @@ from digiclay.core.session.accuracy import Replay, estimate_errors, make_referen
 from digiclay.core.session.finished_run import HISTORY_ARRAYS, read_run
 from digiclay.core.session.run_scene import run, save
 from digiclay.core.shapes.body import pack_mesh
+from digiclay.plots.run import session_figure
+
+from digiclay_serve.served_session import begin_session
 
 BALL = trimesh.creation.icosphere(4, radius=12e-3)
 BOX = trimesh.creation.box((12e-3, 12e-3, 20e-3))
@@ -382,3 +385,17 @@ def test_arrays_that_are_no_mesh_are_refused(vertices):
 def test_a_batch_refuses_bodies():
     with pytest.raises(DigiclayError, match="must have no bodies"):
         list(run_together([resolve(table(body(BALL)))] * 2))
+
+
+def test_a_server_refuses_bodies():
+    with pytest.raises(DigiclayError, match="must be left out"):
+        begin_session(resolve(table(body(BALL))))
+
+
+@pytest.mark.parametrize("others", [{}, FINGER], ids=["alone", "beside a finger"])
+def test_the_plot_of_a_session_has_the_force_of_each_body(others):
+    done = run(resolve(table(place(BALL, -15e-3, -15e-3), place(BALL, 15e-3, 0.0), **others)))
+    axes = {axes.get_label(): axes for axes in session_figure(done.history, None).axes}
+    lines = {line.get_label(): line.get_ydata() for line in axes["force"].get_lines()}
+    for number, force in enumerate(done.history["body_force"].sum(axis=2).T, 1):
+        assert np.array_equal(lines[f"body {number}"], force)

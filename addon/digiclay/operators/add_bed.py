@@ -7,6 +7,7 @@ from typing import Any
 
 from .. import bridge, preferences
 from ..compat import Context, Event, Menu, NodeTree, Object, Operator, UILayout, bpy
+from ..core.base.errors import ParameterError
 from ..core.control.methods import METHODS
 from ..core.files.tables import Record
 from ..core.model.layout import ARRANGEMENTS, Layout
@@ -314,6 +315,9 @@ class AddSceneAction(Placed, Action):
 
     def add_scene(self, context: Context, scene: Scene) -> None:
         """Add the bed of a scene, its fingertips where their paths begin."""
+        if scene.bodies:
+            rule = "must be left out in Blender, where meshes press after Add Presser"
+            raise ParameterError("body", "", rule, f"{len(scene.bodies)} of them")
         scene = embed_heights(scene)
         taken = takes.simulate(scene) if self.take else None
         bed = add(context, scene)

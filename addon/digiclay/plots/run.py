@@ -111,7 +111,8 @@ def session_figure(history: History, set_point: SetPoint | None) -> Figure:
             label = f"set point {set_point.force:g} N{' per cell' if set_point.per_cell else ''}"
         draw_force(force, history, wanted, label)
         force.set(xlabel="time (s)", ylabel="force (N)", ylim=(0.0, None), xlim=ends(time, 0.1))
-        force.set_title("Forces" if several else "Total force on the fingertip")
+        presser = "bodies" if "body_force" in history else "fingertip"
+        force.set_title("Forces" if several else f"Total force on the {presser}")
         legend_above(heights)
         for axes in (heights, force):
             axes.yaxis.set_label_coords(-0.085, 0.5)
@@ -128,7 +129,7 @@ def draw_force(axes: Axes, history: History, wanted: ArrayLike | None, label: st
     time, asked = array(history, "time"), LINES[1]
     if "finger_force" in history:
         asked = INK
-        for number, force in enumerate(array(history, "finger_force").T):
+        for number, force in enumerate(array(history, "finger_force").reshape(len(time), -1).T):
             again, color = divmod(number, len(LINES))
             look: dict[str, Any] = {
                 "color": LINES[color],
@@ -140,6 +141,11 @@ def draw_force(axes: Axes, history: History, wanted: ArrayLike | None, label: st
         axes.plot(
             time, array(history, "total_force"), color=INK, linewidth=1.3, label="total force"
         )
+    bodies = array(history, "body_force").sum(axis=2).T if "body_force" in history else ()
+    alone = len(bodies) == 1 and "finger_force" not in history
+    for number, force in enumerate(() if alone else bodies):
+        look = {"color": INK, "linestyle": STYLES[number % len(STYLES)], "linewidth": 1.1}
+        axes.plot(time, force, label=f"body {number + 1}", **look)
     if wanted is not None:
         axes.plot(time, wanted, color=asked, linewidth=1.3, linestyle=DASHES, label=label)
     full = len(axes.get_lines()) > 4 * len(LINES)  # of the legend's line
