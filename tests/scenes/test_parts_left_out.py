@@ -49,6 +49,7 @@ def imported(*settings):
         ),
         ((), ("simulation.stepper=heun",), {"steppers.explicit"}),
         ((), ("sensors.delay=1",), {"model.sensors"}),
+        ((), ("hand.mass=5 g",), {"model.yielding_hand"}),
         (("sensors.delay=1",), ("sensors.observer=valve",), {"model.observer"}),
     ],
 )  # fmt: skip

@@ -195,7 +195,7 @@ def test_pins_at_their_ends_are_taken_up_and_a_memory_of_no_number_of_the_world_
     state.rows[system.cell.lag_rows, :2] = state.rows[system.rows.commands, :2] = -1.0, 1.0
     assert same(load(system, dump(system, state)), state)
     # A field that is added to a state must be added to what is kept, and to `packed_parts`.
-    fields = {"period", "rows", "modes", "aged", "peak", "active", "memory", "locks"}
+    fields = {"period", "rows", "modes", "aged", "peak", "active", "memory", "locks", "deflection"}
     assert set(State._fields) == fields
     system = system_of("hybrid")
     state = run(system, begin(system), 70)

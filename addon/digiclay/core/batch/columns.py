@@ -15,6 +15,7 @@ import numpy as np
 from ..base.arrays import Cells, Flags, Floats
 from ..control.side_by_side import join_controllers, merge_parts, merge_values
 from ..engine.active_set import Selection
+from ..engine.hand_steps import HandStep
 from ..engine.state import ActiveSet, State, make_initial_state
 from ..engine.system import System
 from ..model.interfaces import Movement
@@ -180,7 +181,8 @@ def begin(batch: Batch) -> State:
     """Return the state before the sessions."""
     memory = [system.controller.begin() for system in batch.systems]
     heights = np.array([system.cell.actuator.rest_height for system in batch.systems], np.float64)
-    return make_initial_state(batch.rows, batch.grid.count, heights, memory)
+    state = make_initial_state(batch.rows, batch.grid.count, heights, memory)
+    return state._replace(deflection=batch.hands[0].swing.rest()) if batch.hands else state
 
 
 def make_batch(systems: Sequence[System]) -> Batch:
@@ -191,6 +193,7 @@ def make_batch(systems: Sequence[System]) -> Batch:
     ).T
     common = first.grid, first.rows, cell, period, fastest
     selections = tuple(system.selection for system in systems)
+    steps = zip(*(system.hands for system in systems), strict=True)
     return Batch(
         grid=first.grid,
         cell=cell,
@@ -206,5 +209,13 @@ def make_batch(systems: Sequence[System]) -> Batch:
         by_set=first.by_set,
         latency=first.latency,
         height_floor=first.height_floor,
+        hands=tuple(_join_steps(alike) for alike in steps),
         systems=tuple(systems),
     )
+
+
+def _join_steps(steps: Sequence[HandStep]) -> HandStep:
+    """Return a step of the hands of all runs."""
+    constants = zip(*(step.swing for step in steps), strict=True)
+    swing = type(steps[0].swing)(*map(np.concatenate, constants))
+    return replace(steps[0], system=make_batch([step.system for step in steps]), swing=swing)

@@ -93,7 +93,11 @@ def select_runs(state: State, runs: Sequence[int]) -> State:
     several = (state.rows, state.modes, state.aged)
     rows, modes, aged = (np.ascontiguousarray(rows[..., chosen]) for rows in several)
     memory = [state.memory[run] for run in runs]
-    return State(state.period, rows, modes, aged, state.peak[chosen], active, memory)
+    chosen_state = State(state.period, rows, modes, aged, state.peak[chosen], active, memory)
+    if state.deflection is None:
+        return chosen_state
+    deflection = type(state.deflection)(*(row[chosen] for row in state.deflection))
+    return chosen_state._replace(deflection=deflection)
 
 
 @dataclass(frozen=True, eq=False)

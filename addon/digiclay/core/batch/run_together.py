@@ -43,6 +43,7 @@ class Histories:
         self._scenes, self._runs, self._present = scenes, play.runs, play.runs
         self._first, self._mode = play.state.row(0), play.state.mode()
         self._stretches: dict[int, list[Stretch]] = {run: [] for run in play.runs}
+        self._rises: dict[int, list[Floats]] = {run: [np.zeros(1)] for run in play.runs}
         self._recording = Recording(recorder, play.batch.rows, self._store) if recorder else None
         self._history: HistoryWriter | None = None
 
@@ -59,6 +60,10 @@ class Histories:
             self._recording.flush()
             self._present = now.play.runs
         self._recording.observe(now.play.state)
+        state = now.play.state
+        if state.deflection and state.period % self._recording.every == 0:
+            for run, rise in zip(self._present, state.deflection.rise[:, None], strict=True):
+                self._rises[run].append(rise)
 
     def finish(self, now: Instant, index: int) -> Result:
         """Return the result of a run at its end; its history is valid until the next result.
@@ -66,7 +71,11 @@ class Histories:
         To allocate memory for each run would take longer than to write it.
         """
         run = now.play.runs[index]
-        rows = self._write(self._recording, run, now.play.state.period) if self._recording else {}
+        state = now.play.state
+        rows = self._write(self._recording, run, state.period) if self._recording else {}
+        if state.deflection and rows:
+            rises = [*self._rises.pop(run), state.deflection.rise[index, None]]
+            rows["deflection"] = np.array(rises[: len(rows["period"])])
         return evaluate(self._scenes[run], now.play.batch.systems[index], rows, now.ended(index))
 
     def _write(self, recording: Recording, run: int, period: int) -> dict[str, Array]:
@@ -92,6 +101,7 @@ class Sums:
         self._first = play.state.row(0)
         self._sums = np.zeros((count, 5, len(play.runs)))
         self._following = np.zeros((count, len(play.runs)), np.intp)
+        self._rises = np.zeros((count, len(play.runs)))
         # Times, poses and nearest cells by path, which most runs of a batch share.
         self._ways: dict[Any, tuple[Floats, Floats, NDArray[np.intp]]] = {}
 
@@ -105,6 +115,8 @@ class Sums:
             self._following[(period - 1) // self._every, self._columns] = _count_following(active)
         if period % self._every == 0:
             self._sums[period // self._every, :, self._columns] = self._sum(active).T
+            if bent := now.play.state.deflection:
+                self._rises[period // self._every, self._columns] = bent.rise
 
     def finish(self, now: Instant, index: int) -> Result:
         """Return the result of a run at its end, without a history."""
@@ -114,6 +126,8 @@ class Sums:
         rows, following = self._sums[:count, :, column], self._following[:count, column].copy()
         if count > 1:
             rows[-1], following[-1] = self._sum(active)[:, index], _count_following(active)[index]
+            if bent := play.state.deflection:
+                self._rises[count - 1, column] = bent.rise[index]
         # Contiguous, since they are read many times.
         total, x, y, height, strongest = np.ascontiguousarray(rows.T)
         first, last = self._first[:, column], play.state.row(0)[:, index]
@@ -127,6 +141,9 @@ class Sums:
             near = [np.argmin((grid.x - x) ** 2 + (grid.y - y) ** 2) for x, y in points]
             self._ways[same] = moments, tip, np.unique(near)
         moments, tip, cells = self._ways[same]
+        if play.state.deflection:
+            tip = tip.copy()
+            tip[:, 2] += self._rises[:count, column]
         metrics = {
             **compute_metrics_from_sums(sums, moments, tip, grid.positions, scene.set_point, cells),
             **measure_losses(

@@ -61,11 +61,12 @@ def describe_structure(scene: Scene, system: System | None = None) -> Any:
         scene.simulation.stepper,
     )
     if scene.simulation.stepper not in CLOSED_FORM:
-        return (*common, physics, replace(scene.simulation, duration=0.0))
+        hand = classify(scene.section("hand"))
+        return (*common, physics, hand, replace(scene.simulation, duration=0.0))
     system = system or assemble(scene)
     plan: Any = system.plan
     plans = (plan,) if isinstance(plan, BernoulliPlan) else (plan.coarse, plan.fine)
     nodes = tuple(
         (plan.laminar, *((part.start, part.stop) for part in plan.nodes)) for plan in plans
     )
-    return (*common, classify(physics), system.rows, nodes, system.instants.size)
+    return (*common, classify(physics), system.rows, nodes, system.instants.size, len(system.hands))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,8 +13,12 @@ from ..base.arrays import Floats
 from ..base.errors import DivergenceError
 from ..model.touch import FingerPeriod
 from ..model.trajectory import Trajectory, sample_poses
+from .hand_steps import lower_reach, move_hands
 from .state import State, make_initial_state
 from .system import System
+
+if TYPE_CHECKING:
+    from ..model.yielding_hand import Deflection
 
 #: Called after each control period, or piece of work, with the number done and the number of all.
 Progress = Callable[[int, int], None] | None
@@ -30,7 +35,8 @@ THREADED = 10_000
 def begin(system: System) -> State:
     """Return the state before a session."""
     rest = system.cell.actuator.rest_height
-    return make_initial_state(system.rows, system.grid.count, rest, system.controller.begin())
+    state = make_initial_state(system.rows, system.grid.count, rest, system.controller.begin())
+    return state._replace(deflection=system.hands[0].swing.rest()) if system.hands else state
 
 
 def step(system: System, state: State, poses: Floats) -> State:
@@ -71,15 +77,26 @@ def simulate_period(
     sensors, controller = system.sensors, system.controller
     touched = sensors.read(state.active.touched, state.period)
     memory, disc = controller.locate(state.memory, touched)
+    finger = lower_reach(system.hands, state, finger)
     state = system.selection.update(state, finger, disc)
     active = state.active
     if active.cells.size:
         measured = sensors.read(active.all, state.period)
         memory, orders = controller.command(memory, measured)
         active.follow(orders)
-        system.move(active, finger)
+    deflection = move(system, state, finger)
+    if active.cells.size:
         sensors.note(active.all, state.period + 1)
-    return state.end_period(memory)
+    return state.end_period(memory, deflection)
+
+
+def move(system: System, state: State, finger: FingerPeriod | None) -> Deflection | None:
+    """Move the active cells through a control period, in place; return the deflection of the hands."""
+    if system.hands:
+        return move_hands(system.hands, state, finger)
+    if state.active.cells.size:
+        system.move(state.active, finger)
+    return None
 
 
 def repeat_period(
@@ -96,8 +113,7 @@ def repeat_period(
         state = state._replace(active=system.selection.take(state, leader.active))
     if state.active.cells.size:
         state.active.queue_commands(leader.active.all.command)
-        system.move(state.active, finger)
-    return state.end_period(state.memory)
+    return state.end_period(state.memory, move(system, state, finger))
 
 
 def find_divergence(

@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,9 @@ from ..base.arrays import Cells, Flags, Floats
 from ..base.modes import LOCKED, REST
 from ..model.control_interface import Commands, Measurement
 from ..model.layout import Discs
+
+if TYPE_CHECKING:
+    from ..model.yielding_hand import Deflection
 
 
 @dataclass(frozen=True)
@@ -204,9 +207,11 @@ class State(NamedTuple):
     """The controller's memory."""
     locks: Floats | None = None
     """(n,): Shares below 1 by which pins are locked in part, 0 of all others; None: no pin is."""
+    deflection: Deflection | None = None
+    """Of the hands that hold the fingertips; None: the paths are prescribed."""
 
-    def end_period(self, memory: Any) -> State:
-        """Return the state one control period later, with the controller's memory."""
+    def end_period(self, memory: Any, deflection: Deflection | None) -> State:
+        """Return the state one control period later, with the memory of the controller."""
         return State(
             self.period + 1,
             self.rows,
@@ -216,6 +221,7 @@ class State(NamedTuple):
             self.active,
             memory,
             self.locks,
+            deflection,
         )
 
     def row(self, index: int) -> Floats:

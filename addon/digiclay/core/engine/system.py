@@ -16,6 +16,7 @@ from ..model.layout import Grid
 from ..model.physics import Cell
 from ..model.touch import FingerPeriod, trace_finger
 from .active_set import Selection
+from .hand_steps import HandStep
 from .state import ActiveSet, Rows
 
 
@@ -46,6 +47,8 @@ class System:
     """Time from a valve's command to the reading of its effect, s: dead time, lag, sensors' delay."""
     height_floor: float
     """Largest error of a height reading, m."""
+    hands: tuple[HandStep, ...]
+    """Physics steps of a period in which fingertips give way; none: their paths are prescribed."""
 
     @property
     def fingers(self) -> int:

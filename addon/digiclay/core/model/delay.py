@@ -1,7 +1,10 @@
 """Dead time between controller and valve, at its exact value (the t - t_d of equation 9)."""
 
-from dataclasses import dataclass
+from __future__ import annotations
 
+from dataclasses import dataclass, replace
+
+from ..base.arrays import TINY
 from ..base.quantity import Parameters, quantity
 
 
@@ -24,11 +27,17 @@ class Queue:
     """Number of commands, at least 1."""
     cut: float = 0.0
     """Time into the period at which the valve changes to the next command, s; 0 when the dead time is a whole
-    number of periods, and the valve sees the oldest in all of the period."""
+    number of periods, and the valve sees the oldest in all of the period; below 0: the next in all."""
 
     def seen(self, time: float) -> int:
         """Return the index of the command that the valve sees at a time into the period, s."""
-        return 1 if self.cut > 0.0 and time >= self.cut * (1.0 - 1e-12) else 0
+        return 1 if self.cut != 0.0 and time >= self.cut * (1.0 - 1e-12) else 0
+
+    def start_at(self, time: float) -> Queue:
+        """Return the queue of the part of a period from a time on, s."""
+        if self.cut == 0.0:
+            return self
+        return replace(self, cut=self.cut - time if time < self.cut * (1.0 - 1e-12) else -TINY)
 
 
 def split_delay(delay: Delay, period: float) -> Queue:

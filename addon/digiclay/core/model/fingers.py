@@ -89,6 +89,8 @@ class HandPath:
     """(f, t, 2, p, 1)."""
     windows: Floats
     """(t, 6, f)."""
+    heights: Floats
+    """(t, p, f): Intended heights of the lowest points, m."""
 
     def __post_init__(self) -> None:
         self._ahead = Ahead()
@@ -118,6 +120,16 @@ class HandPeriod(NamedTuple):
         """Return the undersides at the positions of all fingers, (p, k), m."""
         return self.path.under(self.number, positions)
 
+    @property
+    def heights(self) -> Floats:
+        """Intended heights at the period's instants, (p, f), m."""
+        return self.path.heights[self.number]
+
+    @staticmethod
+    def spread(values: Floats, positions: Positions) -> Floats:
+        """Return values (p, f) of the fingers for their positions, (p, k)."""
+        return values[:, positions.fingers[positions.at // max(1, positions.basis.shape[2])]]
+
 
 def join_touches(touches: Sequence[Touch]) -> HandTouch:
     """Return the touch of several fingers."""
@@ -138,5 +150,6 @@ def trace_hands(touch: HandTouch, poses: Floats) -> list[HandPeriod]:
         )
         for rows, of_alike in zip((forms, join, windows), traced, strict=True):
             rows[alike] = of_alike.reshape(len(alike), *rows.shape[1:])
-    path = HandPath(forms, join, np.ascontiguousarray(windows.transpose(1, 2, 0)))
+    windows = np.ascontiguousarray(windows.transpose(1, 2, 0))
+    path = HandPath(forms, join, windows, poses[..., 2])
     return [HandPeriod(path, number, window) for number, window in enumerate(path.windows)]

@@ -71,6 +71,8 @@ class FingerPath:
     """(t, 2, p, 1[, b])."""
     windows: Any
     """(t, 6, b): One per period."""
+    heights: Floats
+    """(t, p[, b]): Intended heights of the lowest point, m."""
 
     def __post_init__(self) -> None:
         self._ahead = Ahead()
@@ -103,11 +105,22 @@ class FingerPeriod(NamedTuple):
         """Return the underside at the period's p instants at positions (6, k[, b]), (p, k[, b]), m."""
         return self.path.under(self.number, basis)
 
+    @property
+    def heights(self) -> Floats:
+        """Intended heights at the period's p instants, (p, 1) or (p, b), m."""
+        heights = self.path.heights[self.number]
+        return heights.reshape(len(heights), -1)
+
+    @staticmethod
+    def spread(values: Floats, basis: Floats) -> Floats:
+        """Return values (p, 1) or (p, b) of the fingers for positions (6, k[, b])."""
+        return values if basis.ndim == 2 else values[:, None]
+
 
 def trace_finger(fingertip: Fingertip, poses: Floats, first: int = 0) -> FingerPath:
     """Return the path of a fingertip with poses (t, p, 7) at the p instants of t periods."""
     forms, join, windows = trace_periods(fingertip, poses)
-    return FingerPath(first, forms, join, windows.tolist())
+    return FingerPath(first, forms, join, windows.tolist(), poses[..., 2])
 
 
 def trace_periods(fingertip: Fingertip, poses: Floats) -> tuple[Floats, Floats, Floats]:
@@ -127,7 +140,10 @@ def trace_periods(fingertip: Fingertip, poses: Floats) -> tuple[Floats, Floats, 
 
 def join_paths(paths: Sequence[FingerPath]) -> FingerPath:
     """Return the path of a batch from those of its runs, or from a single one that all have."""
-    parts = zip(*((path.forms, path.join, np.array(path.windows)) for path in paths), strict=True)
+    parts = zip(
+        *((path.forms, path.join, np.array(path.windows), path.heights) for path in paths),
+        strict=True,
+    )
     return FingerPath(paths[0].first, *(np.stack(part, axis=-1) for part in parts))
 
 

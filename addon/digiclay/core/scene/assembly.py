@@ -5,6 +5,7 @@ Modules of optional parts are imported only where a scene has the part.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import fields, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -14,6 +15,7 @@ from ..base.arrays import Floats
 from ..base.errors import ParameterError
 from ..control.methods import find_method
 from ..engine.active_set import Selection
+from ..engine.hand_steps import HandStep
 from ..engine.state import Rows
 from ..engine.system import System, make_segments
 from ..model.control_interface import Controller
@@ -89,7 +91,7 @@ def assemble(scene: Scene) -> System:
     noisy = scene.sensors and scene.sensors.noisy
     latency = scene.delay.dead_time if scene.delay else 0.0
     latency += scene.valve_lag.time_constant if scene.valve_lag else 0.0
-    return System(
+    system = System(
         grid=bed,
         cell=motion.cell,
         sensors=sensors,
@@ -104,7 +106,37 @@ def assemble(scene: Scene) -> System:
         by_set=bool(noisy or (scene.control and find_method(scene.method).by_set)),
         latency=latency + (scene.sensors.delay * period if scene.sensors else 0.0),
         height_floor=scene.sensors.height_floor if scene.sensors else 0.0,
+        hands=(),
     )
+
+    def move_alone(part: Segment, line: Queue) -> System:
+        plan = motion.stepper.plan(motion.cell, line, (part,))
+        return replace(system, plan=plan, instants=system.instants[: part.nodes[-1] + 1])
+
+    return replace(system, hands=_make_hand_steps(scene, motion, move_alone))
+
+
+def _make_hand_steps(
+    scene: Scene, motion: Motion, move_alone: Callable[[Segment, Queue], System]
+) -> tuple[HandStep, ...]:
+    """Return the steps of a period in which fingertips give way; `move_alone`: system of one step."""
+    if motion.cell.touch is None or not any(scene.list_parts("hand")):
+        return ()
+    from ..model.yielding_hand import make_swing
+
+    steps, before = [], motion.steps[-1]
+    for part in motion.steps:
+        first, last = part.nodes[0], part.nodes[-1]
+        alone = replace(part, start=0.0, nodes=tuple(node - first for node in part.nodes))
+        steps.append(
+            HandStep(
+                move_alone(alone, motion.line.start_at(part.start)),
+                slice(first, last + 1),
+                make_swing(scene.list_parts("hand"), part.length, before.length),
+            )
+        )
+        before = part
+    return tuple(steps)
 
 
 def _assemble_bodies(scene: Scene) -> System:
@@ -182,7 +214,21 @@ def _assemble_hands(scene: Scene) -> System:
     joint = {"cell": cell, "controller": controller, "selection": selection, "rows": rows}
     together = import_part(*TOGETHER)(cells, first.line, first.steps) if touches else None
     plans = tuple(motion.plan for motion in motions)
-    return HandSystem(**common | joint, cells=cells, plans=plans, press_together=together)
+    common |= {"hands": ()}
+    hands = HandSystem(**common | joint, cells=cells, plans=plans, press_together=together)
+
+    def move_alone(part: Segment, line: Queue) -> System:
+        alone = {
+            id(each): each.stepper.plan(each.cell, line, (part,)) for each in different.values()
+        }
+        return replace(
+            hands,
+            plans=tuple(alone[id(each)] for each in motions),
+            instants=hands.instants[: part.nodes[-1] + 1],
+            press_together=import_part(*TOGETHER)(cells, line, (part,)) if touches else None,
+        )
+
+    return replace(hands, hands=_make_hand_steps(scene, first, move_alone))
 
 
 def _pad_relaxations(fingers: tuple[Finger, ...]) -> tuple[Finger, ...]:

@@ -160,12 +160,15 @@ class RunRecording(Recording):
         self._history.begin(state.row(0), state.mode())
         super().__init__(recorder, rows, self._history.write, bodies)
         self._pressing = [np.zeros(rows.fingers)]
+        self._rises = [state.deflection.rise] if state.deflection else []
         self._last = state
 
     def observe(self, state: State) -> None:
         """Record the state after a control period; of several fingers also the force of each."""
         super().observe(state)
         self._last = state
+        if state.deflection and state.period % self.every == 0:
+            self._rises.append(state.deflection.rise)
         if state.active.rows.fingers and state.period % self.every == 0:
             self._pressing.append(state.finger_forces())
 
@@ -176,6 +179,9 @@ class RunRecording(Recording):
         if self._last.active.rows.fingers:
             forces = [*self._pressing, self._last.finger_forces()]
             rows["finger_force"] = np.array(forces[: len(rows["period"])])
+        if self._last.deflection:
+            rises = [*self._rises, self._last.deflection.rise]
+            rows["deflection"] = np.array(rises[: len(rows["period"])])
         return rows
 
 

@@ -28,6 +28,7 @@ if TYPE_CHECKING:  # a part that is left out is never imported, see `import_part
     from ..model.relaxation import Relaxation
     from ..model.sensors import Sensing
     from ..model.valve import Fluid, Valve
+    from ..model.yielding_hand import Hand
     from ..shapes.body import Body
     from ..shapes.request import Shape
     from .recorder import Recorder
@@ -44,6 +45,7 @@ PARTS: dict[str, tuple[str, str]] = {
     "delay": ("model.delay", "Delay"),
     "fingertip": ("model.fingertip", "Fingertip"),
     "relaxation": ("model.relaxation", "Relaxation"),
+    "hand": ("model.yielding_hand", "Hand"),
     "sensors": ("model.sensors", "Sensing"),
     "blister": ("control.blister", "Blister"),
     "shape": ("shapes.request", "Shape"),
@@ -63,6 +65,7 @@ SECTIONS = (
     "fingertip",
     "contact",
     "relaxation",
+    "hand",
     "sensors",
     "control",
     "blister",
@@ -74,11 +77,18 @@ SECTIONS = (
 REQUIRED = ("layout", "actuator", "supply", "fluid", "valve", "contact", "blister", "simulation")
 OPTIONAL = tuple(name for name in SECTIONS if name not in REQUIRED)
 #: Sections of a finger.
-FINGER_SECTIONS = ("fingertip", "contact", "relaxation", "trajectory")
+FINGER_SECTIONS = ("fingertip", "contact", "relaxation", "hand", "trajectory")
 #: Optional parts that a scene has only if it names them.
-UNASKED = ("sensors", "shape")
+UNASKED = ("hand", "sensors", "shape")
+#: Parts of which a file that is written says nothing if they are absent: older versions read it.
+LATER = ("hand",)
 #: Parts that are omitted together with another one.
-NEEDS = {"contact": "fingertip", "relaxation": "fingertip", "blister": "control"}
+NEEDS = {
+    "contact": "fingertip",
+    "relaxation": "fingertip",
+    "hand": "fingertip",
+    "blister": "control",
+}
 #: Parameters of a body: module and class.
 BODY = ("shapes.body", "Body")
 #: Steppers: module and class.
@@ -162,15 +172,17 @@ def _set_duration(simulation: Simulation, duration: float) -> Simulation:
 
 @dataclass(frozen=True)
 class Finger:
-    """A finger: its tip, contact law and relaxation of the pulp, and its path.
+    """A finger: its tip, contact law and relaxation of the pulp, its path, and the hand that holds it.
 
     Without a fingertip it touches nothing, but its path is recorded, and determines the duration.
+    Without a hand its path is prescribed.
     """
 
     fingertip: Fingertip | None
     contact: Contact | None
     relaxation: Relaxation | None
     trajectory: Path
+    hand: Hand | None = None
 
 
 @dataclass(frozen=True)
@@ -232,6 +244,9 @@ class Scene(Described):
                 rule = "must be above 0 s where no finger has a path with a duration"
                 raise ParameterError("simulation", "duration", rule, "0 s")
             object.__setattr__(self, "simulation", _set_duration(self.simulation, lasts))
+        if self.bodies and any(self.list_parts("hand")):
+            rule = "must be left out beside [[body]], where paths are prescribed"
+            raise ParameterError("hand", "", rule, "a hand")
         longest = MOST_STEPS * self.simulation.control_period
         if self.delay and self.delay.dead_time > longest:
             rule = f"must be at most {MOST_STEPS} control periods, {longest:g} s"

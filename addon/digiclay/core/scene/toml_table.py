@@ -22,6 +22,7 @@ from ..model.trajectory import Path, Waypoint
 from .schema import (
     BODY,
     FINGER_SECTIONS,
+    LATER,
     NEEDS,
     OPTIONAL,
     SECTIONS,
@@ -172,7 +173,7 @@ def tabulate(scene: Scene) -> Record:
             if part is not None:
                 usual = import_parameters(section, scene.method)(**defaults.get(section, {}))
                 tables[section] = list_changed(part, usual)
-            elif section in OPTIONAL:
+            elif section in OPTIONAL and section not in LATER:
                 tables[section] = ABSENT
         return tables
 
@@ -273,7 +274,10 @@ def _read_finger(
 ) -> Finger:
     """Return a finger from its sections; `owner`: prefix of their names in messages."""
     tables = {
-        section: _read_section(section, table.get(section, {}), owner) for section in FINGER_PARTS
+        section: _read_section(
+            section, table.get(section, ABSENT if section in UNASKED else {}), owner
+        )
+        for section in FINGER_PARTS
     }
     parts = _read_parts(tables, defaults, cache, owner=owner)
     path = cache.read(_read_path, f"{owner}trajectory", table.get("trajectory", {}), rest_height)
@@ -355,7 +359,8 @@ def _write_lines(scene: Scene) -> Iterator[str]:
     sections = [name for name in SECTIONS if alone or name not in FINGER_SECTIONS]
     yield "# Every parameter of the scene, in SI units."
     yield from (f"{key} = {format_value(getattr(scene, key))}" for key in TEXTS)
-    absent = [name for name in sections if name in OPTIONAL and scene.section(name) is None]
+    optional = [name for name in OPTIONAL if name not in LATER]
+    absent = [name for name in sections if name in optional and scene.section(name) is None]
     yield from (f'{name} = "{ABSENT}"' for name in absent)
     if not scene.fingers:
         yield f"{FINGERS} = []"
@@ -368,7 +373,7 @@ def _write_lines(scene: Scene) -> Iterator[str]:
             break
         yield f"\n[[{FINGERS}]]"
         parts = {name: getattr(finger, name) for name in FINGER_PARTS}
-        absent = [name for name in parts if name in OPTIONAL and parts[name] is None]
+        absent = [name for name in parts if name in optional and parts[name] is None]
         yield from (f'{name} = "{ABSENT}"' for name in absent)
         for name, part in parts.items():
             yield from _write_part(f"{FINGERS}.{name}", part)

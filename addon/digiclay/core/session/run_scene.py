@@ -220,6 +220,10 @@ def evaluate(
         return report(scene, ended, {}, versions)
     moments = rows.pop("period") * scene.simulation.control_period
     poses = sample_poses(scene.trajectories(), moments)
+    if "deflection" in rows:
+        intended = poses[..., 2].copy()
+        poses[..., 2] += rows.pop("deflection")
+        rows["intended_height"] = intended[:, 0] if len(scene.fingers) == 1 else intended
     if scene.bodies:
         tips = any(finger.fingertip for finger in scene.fingers)
         pressing = rows.pop("finger_force")[:, : len(scene.fingers)]

@@ -98,6 +98,8 @@ ARRAYS = {"rows": "<f8", "modes": "i1", "aged": "<f8", "cells": "<i8", "block": 
 #: Arrays of which, with several fingers, only values other than 0 are written: at most one finger
 #: presses most cells.
 THIN = ("rows", "block")
+#: Numbers of a hand's deflection.
+DEFLECTION = 5
 #: Tolerance of rounding beyond the ends of a height, m, or an opening.
 SLACK = 1e-6
 #: Largest number of a state: a session ends when the square of one is no longer finite.
@@ -123,6 +125,7 @@ def dump(system: System, state: State) -> bytes:
     memory = flatten(state.memory, arrays)
     locks = None if state.locks is None else flatten(state.locks, arrays)
     under = None if active.under is None else flatten(np.packbits(active.under), arrays)
+    hands = state.deflection and flatten(np.array(state.deflection), arrays)
     values = state.rows, state.modes, state.aged, active.cells, active.block, active.mode
     body = [
         np.ascontiguousarray(array, kind)
@@ -155,6 +158,7 @@ def dump(system: System, state: State) -> bytes:
         "memory": memory,
         **({"locks": locks} if locks else {}),
         **({"under": under} if under else {}),
+        **({"hands": hands} if hands else {}),
         "thin": thin,
         "arrays": [[array.dtype.str, list(array.shape)] for array in arrays],
     }
@@ -193,7 +197,10 @@ def load(system: System, data: bytes) -> State:
     memory = rebuild(system.controller.begin(), header["memory"], stored.memory)
     bed = arrays["rows"], arrays["modes"], arrays["aged"]
     locks = stored.arrays.get("locks")
-    return State(header["period"], *bed, header["peak"], active, memory, locks)
+    deflection = begin(system).deflection
+    if deflection and "hands" in stored.arrays:
+        deflection = type(deflection)(*stored.arrays["hands"])
+    return State(header["period"], *bed, header["peak"], active, memory, locks, deflection)
 
 
 def count_fingers(data: bytes) -> int:
@@ -266,8 +273,8 @@ def _read(data: bytes) -> Snapshot:
         stored = Snapshot(header, dict(zip(ARRAYS, arrays, strict=False)), arrays[len(ARRAYS) :])
         for name, bits in zip(thin, stored.memory[len(stored.memory) - len(thin) :], strict=True):
             stored.arrays[name] = _fill(stored.arrays[name], bits, whole[name])
-        if "locks" in header:
-            stored.arrays["locks"] = stored.memory[header["locks"]["array"]]
+        for name in {"locks", "hands"} & header.keys():
+            stored.arrays[name] = stored.memory[header[name]["array"]]
         if "under" in header:
             shape = len(gathered["fingers"]), cells
             stored.arrays["under"] = _unpack(stored.memory[header["under"]["array"]], shape)
@@ -315,6 +322,8 @@ def _is_sound(stored: Snapshot, count: int) -> bool:
     """Return whether the values of the arrays are those of a state."""
     arrays = stored.arrays
     cells, locks = arrays["cells"], arrays.get("locks", np.zeros(count))
+    fingers = len(stored.header["gathered"]["fingers"])
+    hands = arrays.get("hands", np.zeros((DEFLECTION, fingers)))
     return bool(
         all((np.abs(arrays[name]) < LARGEST).all() for name in ("rows", "aged", "block"))
         and all(
@@ -325,6 +334,9 @@ def _is_sound(stored: Snapshot, count: int) -> bool:
         and locks.shape == (count,)
         and locks.dtype == np.float64
         and ((locks >= 0.0) & (locks < 1.0)).all()
+        and hands.shape == (DEFLECTION, fingers)
+        and hands.dtype == np.float64
+        and (np.abs(hands) < LARGEST_KEPT).all()
     )
 
 
@@ -390,7 +402,11 @@ def change_fingers(
     # What is pressed and what still moves goes on.
     chosen = replace(fresh.active, cells=state.active.cells, near=state.active.near)
     bed = State(state.period, rows, state.modes, state.aged, float(rows[0].max()), chosen, memory)
-    return bed._replace(active=system.selection.take(bed, chosen), locks=state.locks)
+    deflection, taken = begin(system).deflection, system.selection.take(bed, chosen)
+    if deflection and state.deflection:
+        for row, before in zip(deflection, state.deflection, strict=True):
+            _take_fingers(row, before, former.fingers, origins)
+    return bed._replace(active=taken, locks=state.locks, deflection=deflection)
 
 
 def _take_fingers(into: Floats, of: Floats, former: int, origins: Sequence[int | None]) -> None:
