@@ -17,6 +17,7 @@ ENTRIES = (
     ("bpy.ops.import_scene.digital_clay_run", ""),
     ("bpy.ops.digiclay.add_fingertip", "#several-fingertips"),
     ("bpy.ops.digiclay.add_hand", "#several-fingertips"),
+    ("bpy.ops.digiclay.*_presser", "#pressers"),
     ("bpy.ops.digiclay.session", "#first-ridge"),
     ("bpy.ops.digiclay.session_go_on", "#first-ridge"),
     ("bpy.ops.digiclay.session_*", "#keys"),

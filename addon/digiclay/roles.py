@@ -28,6 +28,8 @@ FINGER, BALL = "digiclay_fingertip", "digiclay_ellipsoid"
 HAND = "digiclay_hand"
 #: Those by which beds and palms hold their fingertips, by number, from 1 on.
 FINGERS = (FINGER, *(f"{FINGER}_{number}" for number in range(2, MOST_FINGERS + 1)))
+#: Property by which a mesh object that presses a bed holds that bed.
+PRESSES = "digiclay_presses"
 #: Marks what was seen to belong to a bed: only that can be left behind by one. What older files
 #: have lying about without a bed stays.
 OWNED = "digiclay_owned"
@@ -47,7 +49,10 @@ def bed_of(context: Context) -> Any:
 
 
 def find_whole(part: Object) -> Object | None:
-    """Return what an object is a part of: its parent, or the bed of a fingertip or palm."""
+    """Return what an object is a part of: its parent, or the bed of a fingertip or palm, or of a presser."""
+    if part.get(PRESSES) is not None:
+        pressed: Object = part[PRESSES]
+        return pressed
     return owner_of(part) if part.get(ROLE) in (FINGERTIP, PALM) else part.parent
 
 
@@ -76,6 +81,13 @@ def fingertips_of(bed: Object) -> dict[int, Object]:
 def fingertip_of(bed: Object) -> Object | None:
     """Return the first fingertip that belongs to a bed, or None when the user has deleted all of them."""
     return next(iter(fingertips_of(bed).values()), None)
+
+
+def list_pressers(bed: Object) -> list[Object]:
+    """Return the mesh objects that press a bed and stand in a scene with it, by name."""
+    things = {thing for scene in bed.users_scene for thing in scene.objects}
+    pressing = (thing for thing in things if thing.type == "MESH" and thing.get(PRESSES) == bed)
+    return sorted(pressing, key=lambda presser: presser.name)
 
 
 def ellipsoid(tip: Object) -> Object | None:

@@ -78,7 +78,7 @@ def test_the_tab_shows_what_a_sculptor_needs_and_keeps_what_a_researcher_needs_c
     for kind in sorted(drawn, key=lambda kind: kind.bl_order):
         tree.setdefault(kind.bl_parent_id.removeprefix("DIGICLAY_PT_"), []).append(kind.bl_label)
     assert tree[""] == ["Digital Clay", "Session", "Show", "Export", "Laboratory"]
-    assert (tree["session"], tree["export"]) == (["Shapes", "Takes"], ["Features"])
+    assert (tree["session"], tree["export"]) == (["Shapes", "Takes", "Pressers"], ["Features"])
     assert tree["laboratory"] == ["View Details", "Fingertip", "Device", "Control"]
     opened = {kind.bl_label for kind in drawn if "DEFAULT_CLOSED" not in kind.bl_options}
     assert opened == {"Digital Clay", "Session", "Show", "Export"}

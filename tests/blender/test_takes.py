@@ -368,23 +368,24 @@ def test_an_animated_fingertip_is_read_once_a_control_period(bed):
         for key in curve.keyframe_points:
             key.interpolation = "LINEAR"
     bpy.context.scene.frame_set(3)
-    *_, poses = bake.sample_path(bpy.context.scene, bed, 1, 21, 5e-3)
+    *_, path = bake.sample_path(bpy.context.scene, bed, 1, 21, resolve({}))
+    assert path.knots == ()
     # 20 frames at 40 a second are 100 periods; a subframe is read to 1e-4 of a frame or better.
-    assert np.abs(poses[:, 0, 2] - np.linspace(45e-3, 37e-3, 101)).max() < 1e-7
+    assert np.abs(path.poses[:, 0, 2] - np.linspace(45e-3, 37e-3, 101)).max() < 1e-7
     assert bpy.context.scene.frame_current == 3
 
 
 @pytest.mark.parametrize("first, last", [(5, 5), (9, 2), (1, 300_000)])
 def test_a_range_of_frames_that_cannot_be_is_refused(bed, first, last):
     with pytest.raises(DigiclayError, match="The frames to bake must have from 1 to"):
-        next(bake.sample_path(bpy.context.scene, bed, first, last, 5e-3))
+        next(bake.sample_path(bpy.context.scene, bed, first, last, resolve({})))
 
 
 def test_a_scene_whose_time_is_stretched_is_not_baked(bed, monkeypatch):
     render = bpy.context.scene.render
     monkeypatch.setattr(render, "frame_map_new", 200)
     with pytest.raises(DigiclayError, match=r"must have two equal numbers \(got 100 to 200\)"):
-        next(bake.sample_path(bpy.context.scene, bed, 1, 10, 5e-3))
+        next(bake.sample_path(bpy.context.scene, bed, 1, 10, resolve({})))
 
 
 def test_each_frame_shows_the_nearest_period():

@@ -13,7 +13,7 @@ from .. import bridge, preferences
 from ..compat import Context, Object
 from ..core.base.arrays import Floats
 from ..core.base.errors import DigiclayError, DivergenceError, MethodError
-from ..device import repair, view
+from ..device import pressers, repair, view
 from ..device.instant import find_ellipsoids
 from ..recorded import takes
 from ..recorded.bake import is_baked
@@ -78,7 +78,8 @@ def start(context: Context, bed: Object) -> list[Note]:
         base,
     )
     begun = stored.add_strokes(begun, lines)
-    show(bed, replace(begun, settings=settings))
+    aim = pressers.read_undersides(context, bed, begun.scene, begun.system.grid)
+    show(bed, replace(begun, settings=settings, aim=aim))
     if lines:
         place_fingers(context, bed, begun)
     damaged = len(lines) - len(begun.strokes)
@@ -293,6 +294,8 @@ def _read_changes(context: Context, bed: Object, session: Running) -> tuple[str,
             if session.recording is not None and back.recording is None:
                 words = localize("The recording ended: undo or redo left what was recorded")
             session = back
+        aim = pressers.read_undersides(context, bed, session.scene, session.system.grid)
+        session = replace(session, aim=aim)
     except DigiclayError as error:
         return str(error), session, words
     return "", session, words

@@ -7,7 +7,7 @@ import importlib
 import pkgutil
 
 from ..compat import bpy
-from . import add_bed, add_fingers, export_mesh, press_curves, session_loop
+from . import add_bed, add_fingers, add_pressers, export_mesh, press_curves, session_loop
 
 MODULES = [
     importlib.import_module(f"{__name__}.{module.name}")
@@ -27,6 +27,7 @@ MENUS = (
     ("TOPBAR_MT_file_import", add_bed.import_entry),
     ("TOPBAR_MT_file_export", export_mesh.entry),
     ("VIEW3D_MT_object", press_curves.entry),
+    ("VIEW3D_MT_object", add_pressers.entry),
     ("VIEW3D_MT_editor_menus", session_loop.leave_entry),
 )
 

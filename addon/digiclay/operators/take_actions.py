@@ -377,16 +377,16 @@ class Bake(TimedAction, Operator):
             take = read_fitting_take(bed, self.take)
         else:
             made = properties.scene_of(bed)
-            period = made.simulation.control_period
-            poses = np.empty((0, 1, 7))
-            for step in bake.sample_path(scene, bed, self.first, self.last, period):
+            for step in bake.sample_path(scene, bed, self.first, self.last, made):
                 if isinstance(step, float):
                     yield 0.3 * step
                 else:
-                    poses = step
+                    path = step
             system = assemble(made)
             # How the path ends is unknown before its simulation, and nothing asks for it.
-            take = Take(made, snapshot.dump(system, begin(system)), poses, b"")
+            take = Take(
+                made, snapshot.dump(system, begin(system)), path.poses, b"", knots=path.knots
+            )
         rate = bake.read_rate(scene)
         for part in bake.simulate_frames(take, rate):
             if isinstance(part, float):

@@ -79,6 +79,8 @@ class Readings:
     beyond: bool = False
     #: Largest force of several fingertips now, N; None of one, whose force is the total.
     hardest: float | None = None
+    #: How many pins are pressed, where meshes press them too; None: only fingertips do.
+    pressed: int | None = None
     #: Numbers and colors of several fingertips, and the force of each, (t, f), N.
     fingers: tuple[tuple[int, Color], ...] = ()
     finger_force: Floats = field(default_factory=lambda: np.empty((0, 0)))
@@ -255,6 +257,8 @@ def _tell_force(readings: Readings) -> str:
     """Return the text of the total force now; empty before there is one."""
     if not readings.force.size:
         return ""
+    if readings.pressed is not None:
+        return localize("{:.2f} N on {} pins", float(readings.force[-1]), readings.pressed)
     return force_message(
         float(readings.force[-1]), beyond=readings.beyond, hardest=readings.hardest
     )

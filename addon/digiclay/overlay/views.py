@@ -111,7 +111,13 @@ def read_session(
         top=view.read_setting(bed, TOP_FORCE, None) if view.shows_force(bed) else None,
         hardest=float(session.state.finger_forces().max()) if session.system.fingers > 1 else None,
         beyond=exceeds_law(session.system, session.state, session.pose),
+        pressed=_count_pressed(session) if scene.bodies else None,
     )
+
+
+def _count_pressed(session: running.Running) -> int:
+    """Return the number of pins with a force."""
+    return int(np.count_nonzero(session.state.row(session.system.rows.force)))
 
 
 def _list_numbers(session: running.Running) -> tuple[int, ...]:

@@ -4,11 +4,12 @@ from ..compat import Context, UILayout
 from ..live import beds, follow
 from ..overlay.sections import correction_message, effort_message, error_message
 from ..recorded import bake, takes
-from ..roles import bed_of
+from ..roles import bed_of, list_pressers
 from ..sessions import running
 from ..sessions.running import Running
+from ..settings.groups import PRESSER_FIELDS
 from ..ui_text import localize
-from .base import LABORATORY, SESSION, Sidebar, draw_lines, panel
+from .base import LABORATORY, SESSION, Sidebar, draw_lines, draw_property, panel
 
 
 @panel(SESSION, "Session", 10, closed=False)
@@ -127,4 +128,19 @@ def takes_panel(sidebar: Sidebar, context: Context) -> None:
         layout.operator("digiclay.bake", text="Bake Animated Fingertip").source = "FINGERTIP"
 
 
-CLASSES = (session_panel, takes_panel, laboratory)
+@panel("DIGICLAY_PT_pressers", "Pressers", 2, parent=SESSION)
+def pressers_panel(sidebar: Sidebar, context: Context) -> None:
+    """Meshes that press the bed, and the contact of the active one."""
+    layout = sidebar.layout
+    layout.operator("digiclay.add_presser", icon="ADD")
+    for presser in list_pressers(bed_of(context)):
+        row = layout.row(align=True)
+        row.label(text=presser.name, icon="MESH_DATA")
+        row.operator("digiclay.remove_presser", text="", icon="X").presser = presser.name
+        if presser == context.object:
+            column = layout.column(align=True)
+            for name in PRESSER_FIELDS:
+                draw_property(column, presser.digiclay.presser, name)
+
+
+CLASSES = (session_panel, takes_panel, pressers_panel, laboratory)

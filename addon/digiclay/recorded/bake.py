@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,10 +22,12 @@ from ..compat import (
 )
 from ..core.base.arrays import Cells, Floats, Modes
 from ..core.base.errors import DigiclayError
+from ..core.engine.bodies import Knot
 from ..core.model.fingertip import Fingertip
 from ..core.model.layout import make_grid
+from ..core.scene.schema import Scene as DeviceScene
 from ..core.session.take import Take, play
-from ..device import view
+from ..device import pressers, view
 from ..device.node_tree import (
     attribute,
     enabled,
@@ -80,8 +82,17 @@ def playback_nodes(bake: Object, moments: int) -> NodeTree:
 
 #: Name of the modifier.
 MODIFIER = "Baked session"
+#: Longest time between two readings of the undersides of pressers, s.
+INTERVAL = 15e-3
 #: Frame ranges longer than this are a slip of the hand: an hour at 60 frames a second.
 MOST_FRAMES = 216_000
+
+
+class Path(NamedTuple):
+    """Poses of animated fingertips (t + 1, f, 7), and undersides of pressers."""
+
+    poses: Floats
+    knots: tuple[Knot, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -199,14 +210,19 @@ def read_rate(scene: Scene) -> float:
 
 
 def sample_path(
-    scene: Scene, bed: Object, first: int, last: int, period: float
-) -> Iterator[float | Floats]:
-    """Read the paths of the fingertips as animated; yield the share done, at last the poses (t + 1, f, 7)."""
+    scene: Scene, bed: Object, first: int, last: int, made: DeviceScene
+) -> Iterator[float | Path]:
+    """Read the paths of fingertips and pressers as animated; yield the share done, at last the `Path`.
+
+    `made`: the scene of the bed.
+    """
     if not 0 < last - first <= MOST_FRAMES:
         rule = f"must have from 1 to {MOST_FRAMES} frames after its first"
         raise DigiclayError(f"The frames to bake {rule} (got {first} to {last}).")
     rate = read_rate(scene)
+    period, grid = made.simulation.control_period, make_grid(made.layout)
     count = int(np.floor((last - first) / rate / period + 1e-6))
+    every, knots = max(1, int(INTERVAL / period)), []
     frame_before = scene.frame_current, scene.frame_subframe
     tips = len(fingertips_of(bed))
     if not tips:
@@ -217,10 +233,14 @@ def sample_path(
             whole, part = divmod(first + row * period * rate, 1.0)
             scene.frame_set(int(whole), subframe=part)
             poses[row] = bridge.poses(bed)
+            if made.bodies and (row % every == 0 or row == count):
+                under = pressers.read_undersides(bpy.context, bed, made, grid)
+                assert under is not None  # there are bodies
+                knots.append((row, under))
             yield row / count
     finally:
         scene.frame_set(frame_before[0], subframe=frame_before[1])
-    yield poses
+    yield Path(poses, tuple(knots))
 
 
 def _modifier(bed: Object) -> Modifier | None:

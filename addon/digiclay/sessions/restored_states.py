@@ -3,13 +3,14 @@
 from dataclasses import replace
 
 from ..core.base.arrays import Floats
-from ..core.base.errors import StateError
+from ..core.base.errors import ParameterError, StateError
 from ..core.engine.simulation import begin
 from ..core.engine.state import State
 from ..core.engine.system import System
 from ..core.scene.assembly import assemble
-from ..core.scene.schema import Scene
+from ..core.scene.schema import Presser, Scene
 from ..core.session import snapshot
+from ..core.shapes.body import Body
 from ..ui_text import localize
 
 #: Message when the state of other parts is taken up.
@@ -42,12 +43,21 @@ def change_fingers(
     scene: Scene, system: System, stored: bytes | None, was: Numbers, numbers: Numbers
 ) -> bytes | None:
     """Return a snapshot with the state of each fingertip moved to the place of its number in a system."""
-    if stored is None or was == numbers:
+    if stored is None:
         return stored
-    former = assemble(replace(scene, fingers=scene.fingers[:1] * len(was)))
+    bodies = len(scene.bodies)
     try:
+        had = snapshot.count_fingers(stored) - len(was)
+        if was == numbers and had == bodies:
+            return stored
+        form = (scene.bodies or (Presser(Body(), scene.fingers[0].trajectory),))[:1]
+        former = assemble(
+            replace(scene, fingers=scene.fingers[:1] * len(was), bodies=form * max(had, 0))
+        )
         state = snapshot.load(former, stored)
-    except StateError:  # what is wrong with it will be said
+    except (StateError, ParameterError):  # what is wrong with it will be said
         return stored
     places = [was.index(number) if number in was else None for number in numbers]
+    # Of bodies nothing lasts; as many are the same ones.
+    places += [len(was) + body if had == bodies else None for body in range(bodies)]
     return snapshot.dump(system, snapshot.change_fingers(former, system, state, places))

@@ -80,7 +80,7 @@ def begin_session(
         base=base,
         numbers=numbers[:fingers],
         clock=live_session.Clock(),
-        monitor=accuracy.start(whole),
+        monitor=None if scene.bodies else accuracy.start(whole),
         trace=recent_trace.start(system.period, fingers=fingers),
         next_gesture=Moment(state.period, now, poses, tick, base),
     )
@@ -184,7 +184,7 @@ def _give_fingers(running: Running, count: int) -> Running:
         return running
     scene = running.scene.with_fingers(total)
     system = assemble(scene)
-    places = [row if row < had else None for row in range(total)]
+    places = snapshot.place_fingers(had, total, len(scene.bodies))
     state = snapshot.change_fingers(running.system, system, running.state, places)
     poses = np.concatenate([running.poses, np.empty((max(0, total - had), 7))])[:total]
     (x, y, z), above = poses[0, :3].tolist(), float(running.state.row(0).max()) + CLEARANCE
@@ -276,8 +276,8 @@ def restore(
         session_poses = running.poses[: len(running.numbers)]
         running = replace(running, system=system, monitor=monitor, poses=session_poses)
     was = was or name_fingers(running.numbers, len(poses))
+    stored = change_fingers(running.scene, running.system, stored, was, running.numbers)
     if was != running.numbers:
-        stored = change_fingers(running.scene, running.system, stored, was, running.numbers)
         poses = match_poses(poses, was, running.poses, running.numbers)
     state, _ = load_state(running.system, stored)
     now = snapshot.dump(running.system, state)
@@ -340,17 +340,18 @@ def change_scene(
         )
 
     plain = assemble(scene) if images else other.system
+    same = numbers == was and len(scene.bodies) == len(running.scene.bodies)
     # The end of a stroke that was formed with other parameters cannot be restored.
     line = {} if is_resized(running.scene, scene) else {"stroke": ""}
     for name in ("gestures", "undone"):
         some = (replace(gesture, **line) for gesture in getattr(running, name))
-        carried: dict[str, Any] = {name: tuple(some if numbers == was else map(change, some))}
+        carried: dict[str, Any] = {name: tuple(some if same else map(change, some))}
         running = replace(running, **carried)
-    if numbers != was:
+    if not same:
         running = replace(
             running, stroke_start=running.stroke_start and change(running.stroke_start)
         )
-    names = ["clock", "paused", "blocking_reason", "stale"]
+    names = ["clock", "paused", "blocking_reason", "stale", "under", "aim"]
     names += ["begun_strokes", "finished_strokes", "last_place", "correction"]
     names += [] if lost else ["gestures", "undone", "strokes", "stroke_start"]
     if lost:

@@ -46,11 +46,15 @@ flag = _named(bpy.props.BoolProperty)
 text = _named(bpy.props.StringProperty)
 
 
-def group(name: str, kind: type[Parameters], updates: dict[str, Update]) -> type:
-    """Make the property group of a part; `updates` of its fields are called with group and context."""
-    properties = {
-        field.name: _property(field, updates.get(field.name)) for field in dataclasses.fields(kind)
-    }
+def group(
+    name: str, kind: type[Parameters], updates: dict[str, Update], names: Iterable[str] = ()
+) -> type:
+    """Make the property group of a part, or of some fields of it.
+
+    `updates` of its fields are called with group and context.
+    """
+    fields = _fields(kind)
+    properties = {name: _property(fields[name], updates.get(name)) for name in names or fields}
     return make_group(name, kind.__doc__ or "", properties)
 
 
@@ -205,11 +209,16 @@ def fill(
 
 
 def read(
-    group: PropertyGroup, kind: type[Parameters], notes: Notes, section: str
+    group: PropertyGroup,
+    kind: type[Parameters],
+    notes: Notes,
+    section: str,
+    names: Iterable[str] = (),
 ) -> dict[str, Any]:
-    """Return a part's parameters in SI, as a scene file's section would give them."""
-    values = {}
-    for name, field in _fields(kind).items():
+    """Return a part's parameters, or some, in SI, as a scene file's section would give them."""
+    values, fields = {}, _fields(kind)
+    for name in names or fields:
+        field = fields[name]
         stored = getattr(group, name)
         noted = notes.get(name)
         try:

@@ -12,6 +12,7 @@ from ..core.model.fingertip import Fingertip
 from ..core.model.layout import Layout
 from ..core.scene.schema import NEEDS, OPTIONAL, SECTIONS, UNASKED, import_parameters
 from ..core.scene.toml_table import PRESETS
+from ..core.shapes.body import Body
 from ..ui_text import localize
 from . import devices
 from .declared import (
@@ -190,6 +191,9 @@ GROUPS = {
 }
 for axis in dataclasses.fields(Fingertip):
     GROUPS["fingertip"].__annotations__[WHOLE + axis.name] = whole_axis(axis)
+#: Parameters of a mesh object that presses a bed.
+PRESSER_FIELDS = ("stiffness", "damping", "cap", "tip_radius", "samples")
+PRESSER = group("presser", Body, {}, PRESSER_FIELDS)
 METHOD = {"name": "Method", "words": "Control method of the cells; a choice also sets its blister"}
 SETTINGS = make_group(
     "settings",
@@ -230,8 +234,8 @@ SETTINGS = make_group(
         "blister_suits": bpy.props.FloatProperty(options={"HIDDEN"}),
         "notes": bpy.props.StringProperty(options={"HIDDEN"}),
         **use_properties(),
-        **pointers({**GROUPS, "control": CONTROL}),
+        **pointers({**GROUPS, "control": CONTROL, "presser": PRESSER}),
     },
 )
 #: In the order they are registered: a group comes after those it points to.
-CLASSES = (*METHOD_GROUPS.values(), *GROUPS.values(), CONTROL, SETTINGS)
+CLASSES = (*METHOD_GROUPS.values(), *GROUPS.values(), CONTROL, PRESSER, SETTINGS)

@@ -6,6 +6,7 @@ A scene is made of them and of nothing else, so what the panels show is what is 
 import json
 import re
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -19,12 +20,13 @@ from ..core.base.quantity import Parameters, list_quantities
 from ..core.control.methods import METHODS, find_method, list_methods
 from ..core.files.tables import Record
 from ..core.model.layout import Layout, make_grid
-from ..core.scene.schema import NEEDS, OPTIONAL, SECTIONS, Scene, import_parameters
+from ..core.scene.schema import NEEDS, OPTIONAL, SECTIONS, Presser, Scene, import_parameters
 from ..core.scene.toml_table import ABSENT, FINGER_PARTS, FINGERS, resolve
-from ..roles import fingertips_of
+from ..core.shapes.body import Body
+from ..roles import fingertips_of, list_pressers
 from . import devices
 from .declared import Notes, read, title, write
-from .groups import CLASSES, SETTINGS, find_group, method_of
+from .groups import CLASSES, PRESSER_FIELDS, SETTINGS, find_group, method_of
 from .shown_units import convert_units
 
 _NAME = re.compile(rf"\b({'|'.join(SECTIONS)})\.(\w+)")
@@ -70,6 +72,8 @@ class StoredSettings(NamedTuple):
     values: Record
     #: Numbers of the fingertips, and what further ones store of their own.
     fingers: tuple[tuple[int, Record], ...]
+    #: Of the pressers.
+    pressers: tuple[Record, ...]
 
 
 def read_stored_settings(bed: Object) -> StoredSettings:
@@ -78,12 +82,15 @@ def read_stored_settings(bed: Object) -> StoredSettings:
     fingers = tuple(
         (number, read_stored(tip, "digiclay") if number > 1 else {}) for number, tip in tips
     )
-    return StoredSettings(bed.name, bpy.data.filepath, read_stored(bed, "digiclay"), fingers)
+    pressers = tuple(read_stored(presser, "digiclay") for presser in list_pressers(bed))
+    stored = read_stored(bed, "digiclay")
+    return StoredSettings(bed.name, bpy.data.filepath, stored, fingers, pressers)
 
 
 def scene_of(bed: Object) -> Scene:
     """Return the scene a bed's settings describe; the fingertip's path is one press in the middle."""
     scene = read_scene(bed)
+    scene = replace(scene, bodies=tuple(_read_presser(each, scene) for each in list_pressers(bed)))
     reason = find_layout_mismatch(bed, scene.layout)
     if reason:
         plan = scene.layout
@@ -93,6 +100,13 @@ def scene_of(bed: Object) -> Scene:
             "Layout", "", rule, f"{plan.rows} x {plan.columns}, {plan.arrangement}", remedy
         )
     return scene
+
+
+def _read_presser(presser: Object, scene: Scene) -> Presser:
+    """Return the body of a mesh object, whose underside a session reads: it has no path of its own."""
+    group = presser.digiclay.presser
+    values = read(group, Body, {}, presser.name, PRESSER_FIELDS)
+    return Presser(Body(**values), scene.fingers[0].trajectory)
 
 
 def read_scene(bed: Object) -> Scene:

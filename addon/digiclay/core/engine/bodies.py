@@ -10,10 +10,13 @@ force.
 from __future__ import annotations
 
 import math
+from bisect import bisect_right
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..base.arrays import Cells, Flags, Floats, any_true
 from ..model.fingers import HandPeriod, HandTouch, trace_hands
@@ -152,6 +155,47 @@ class PathUndersides:
         if len(known) > 4 + AHEAD / time:
             del known[next(iter(known))]
         return under
+
+
+#: Unit of given undersides, m: whole numbers of it are packed well, and all are exact.
+UNIT = 2.0**-20
+#: Number of a control period, and the undersides when it begins, (b, n), in `UNIT`.
+Knot = tuple[int, NDArray[np.int32]]
+
+
+class GivenUndersides:
+    """Undersides that others give at certain times, at most the ceiling: Blender, or a recording.
+
+    Before the first and after the last of these times they stand still.
+    """
+
+    def __init__(self, instants: Floats, ceiling: float) -> None:
+        self._shares, self._ceiling = instants / instants[-1], ceiling
+        self._knots: Sequence[Knot] = ()
+        self._periods: list[int] = []
+        self._line: tuple[int, tuple[Floats, Floats, Floats]] | None = None
+
+    def give(self, knots: Sequence[Knot]) -> None:
+        """Take other undersides, by ascending periods."""
+        self._knots, self._periods, self._line = knots, [period for period, _ in knots], None
+
+    def find(self, period: int) -> Stretch:
+        """Return the undersides in a period."""
+        at = max(bisect_right(self._periods, period) - 1, 0)
+        ends = self._knots[at : at + 2]
+        if self._line is None or self._line[0] != at:
+            start, end = ends[0][1] * UNIT, ends[-1][1] * UNIT
+            low = np.minimum(start, end)
+            low[low >= self._ceiling - UNIT] = np.inf
+            self._line = at, (start, end, low)
+        lasts = max(ends[-1][0] - ends[0][0], 1)
+        part = ((period - ends[0][0] + self._shares) / lasts).clip(0.0, 1.0)
+        parts = np.tile(part, (len(ends[0][1]), 1))
+        return Stretch(*self._line[1], parts, np.zeros_like(parts))
+
+    def find_lowest(self, period: int) -> Floats:
+        """Return the lowest undersides from this period to the next time, (b, n), m."""
+        return self.find(period).low
 
 
 @dataclass(frozen=True, eq=False)

@@ -33,6 +33,7 @@ from .schema import STEPPERS, Finger, Scene
 if TYPE_CHECKING:
     from ..control.device_info import DeviceInfo
     from ..control.pin_division import PinDivision
+    from ..engine.bodies import Undersides
 
 
 #: Cells that several fingers press: module and function of the plan.
@@ -141,10 +142,9 @@ def _make_hand_steps(
 
 def _assemble_bodies(scene: Scene) -> System:
     """Return the system of a scene with bodies, which press like further fingers."""
-    from ..engine.bodies import BodySelection, BodySystem, MovedMesh, PathUndersides
+    from ..engine.bodies import BodySelection, BodySystem, GivenUndersides
     from ..engine.pairs import HandSystem
     from ..model.fingers import join_touches
-    from ..shapes.body import read_body
 
     bodies = [each.body for each in scene.bodies]
     # The law and the relaxation of a finger; without a mesh a fingertip touches nothing of its own.
@@ -156,23 +156,10 @@ def _assemble_bodies(scene: Scene) -> System:
     fingers = scene.fingers if tips else tuple(pressing[:1] * len(scene.fingers))
     system = _assemble_hands(replace(scene, fingers=(*fingers, *pressing), bodies=()))
     assert isinstance(system, HandSystem)
-    moved = tuple(
-        MovedMesh(
-            read_body(body, f"body #{number}"),
-            place.trajectory.trajectory(),
-            body.samples,
-            body.tip_radius,
-            body.travel,
-        )
-        for number, (body, place) in enumerate(zip(bodies, scene.bodies, strict=True), 1)
-    )
     caps = np.array([body.cap for body in bodies])
-    ceiling = scene.actuator.stroke + float(caps.max())
-    undersides = PathUndersides(moved, system.grid, system.instants, ceiling)
-    for number, lowest in enumerate(undersides.find(0).start.min(axis=1).tolist(), 1):
-        if lowest < 0.0:
-            rule = "must begin above the floor of the bed, z = 0"
-            raise ParameterError(f"body #{number}", "trajectory", rule, f"{lowest:.3g} m")
+    undersides: Undersides = GivenUndersides(system.instants, scene.ceiling)
+    if not any(body.given for body in bodies):
+        undersides = _trace_meshes(scene, system)
     common = {field.name: getattr(system, field.name) for field in fields(system)}
     selection = BodySelection(system.grid, system.rows, system.cell, system.period, system.fastest)
     touches = [cell.touch for cell in system.cells[: len(scene.fingers)] if cell.touch]
@@ -180,6 +167,29 @@ def _assemble_bodies(scene: Scene) -> System:
     return BodySystem(
         **{**common, "selection": selection}, hand=hand, undersides=undersides, caps=caps
     )
+
+
+def _trace_meshes(scene: Scene, system: System) -> Undersides:
+    """Return the undersides of the meshes of a scene along their paths."""
+    from ..engine.bodies import MovedMesh, PathUndersides
+    from ..shapes.body import read_body
+
+    moved = tuple(
+        MovedMesh(
+            read_body(each.body, f"body #{number}"),
+            each.trajectory.trajectory(),
+            each.body.samples,
+            each.body.tip_radius,
+            each.body.travel,
+        )
+        for number, each in enumerate(scene.bodies, 1)
+    )
+    undersides = PathUndersides(moved, system.grid, system.instants, scene.ceiling)
+    for number, lowest in enumerate(undersides.find(0).start.min(axis=1).tolist(), 1):
+        if lowest < 0.0:
+            rule = "must begin above the floor of the bed, z = 0"
+            raise ParameterError(f"body #{number}", "trajectory", rule, f"{lowest:.3g} m")
+    return undersides
 
 
 def _assemble_hands(scene: Scene) -> System:

@@ -300,6 +300,11 @@ class Scene(Described):
         return max((each.trajectory.trajectory().duration for each in movers), default=0.0)
 
     @property
+    def ceiling(self) -> float:
+        """Height above which bodies meet no pin, m."""
+        return self.actuator.stroke + max((each.body.cap for each in self.bodies), default=0.0)
+
+    @property
     def periods(self) -> int:
         """Control periods of the whole session; the last one may end after its duration."""
         return max(1, math.ceil(self.simulation.duration / self.simulation.control_period - 1e-9))

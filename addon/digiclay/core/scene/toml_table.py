@@ -113,6 +113,8 @@ def _read_bodies(given: object, cache: ReadParts) -> tuple[Presser, ...]:
             shown = "none" if path is None else show_value(path)
             raise ParameterError(owner, "trajectory", "must be a path with waypoints", shown)
         body = cache.read(read_part, owner, import_part(*BODY), {}, keys)
+        if body.given:
+            raise ParameterError(owner, "file", "or mesh must be given", "none")
         bodies.append(Presser(body, cache.read(_read_path, f"{owner}.trajectory", path, 0.0)))
     return tuple(bodies)
 

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import repeat
 from typing import TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..base.arrays import Floats
 from ..base.modes import BLISTER, LOCKED
 from ..control.orders import ORDER, SURFACED, LockingControl, Orders, order_periods
+from ..engine.bodies import BodySystem, GivenUndersides, Knot
 from ..engine.simulation import advance
 from ..engine.state import State
 from ..engine.system import System
@@ -205,6 +207,8 @@ class Recording:
     """Rows that the file has in a take."""
     surfaces: tuple[Floats, ...] = ()
     """(n,) each: Heights to which orders move pins, m."""
+    knots: tuple[Knot, ...] = ()
+    """Undersides of bodies, where they are given."""
 
     @classmethod
     def begin(
@@ -273,9 +277,14 @@ class Recording:
     def _first(self, count: int) -> Recording:
         """Return the first rows of the recording."""
         rows = self.rows[1:count, ORDERS]
+        last = self.first + count - 1
         needed = int(rows[np.isin(rows[:, 4], SURFACED), 0].max(initial=-1.0)) + 1
         return replace(
-            self, count=count, saved=min(self.saved, count), surfaces=self.surfaces[:needed]
+            self,
+            count=count,
+            saved=min(self.saved, count),
+            surfaces=self.surfaces[:needed],
+            knots=tuple(knot for knot in self.knots if knot[0] <= last),
         )
 
 
@@ -320,6 +329,10 @@ class LiveSession:
     monitor: accuracy.ErrorMonitor | None = None
     errors: accuracy.Errors | None = None
     """Estimate so far."""
+    under: NDArray[np.int32] | None = None
+    """(b, n): Undersides of bodies that the session has reached, in `bodies.UNIT`; None: no path yet."""
+    aim: NDArray[np.int32] | None = None
+    """Those to which the next path leads; None: there are none."""
 
     @property
     def pose(self) -> Floats:
@@ -342,6 +355,7 @@ def follow_path(
 
     `pause`: control periods between two stretches of its monitor.
     """
+    session = _lead_bodies(session, len(path) - 1)
     system, state, monitor = session.system, session.state, session.monitor
     monitor = monitor and accuracy.begin_stretch(monitor, state, pause)
     errors, first = None, state.period + 1
@@ -360,6 +374,27 @@ def follow_path(
     return replace(
         session, state=state, poses=path[-1], recording=recording, monitor=monitor, errors=errors
     )
+
+
+def give_undersides(system: System, knots: Sequence[Knot]) -> None:
+    """Give a system the undersides of its bodies, if it expects any."""
+    if isinstance(system, BodySystem) and isinstance(system.undersides, GivenUndersides):
+        system.undersides.give(knots)
+
+
+def _lead_bodies(session: Session, count: int) -> Session:
+    """Give the undersides along a path of `count` periods to the system; return the session at its end."""
+    aim, first = session.aim, session.state.period
+    if aim is None:
+        return session
+    under = session.under if session.under is not None and len(session.under) == len(aim) else aim
+    knots, recording = ((first, under), (first + count, aim)), session.recording
+    give_undersides(session.system, knots)
+    if recording:
+        known = recording.knots[-1:]
+        more = knots[1:] if known and known[0][0] == first and known[0][1] is under else knots
+        recording = replace(recording, knots=(*recording.knots, *more))
+    return replace(session, under=aim, recording=recording)
 
 
 def start_recording(session: Session, now: bytes, tick: int = 0, room: int = 255) -> Session:

@@ -362,6 +362,12 @@ def _read_discs(gathered: Record) -> tuple[list[Disc | None], list[Disc | None]]
     ]
 
 
+def place_fingers(had: int, count: int, bodies: int) -> list[int | None]:
+    """Return the `origins` of `change_fingers` for another number of fingers before the same bodies."""
+    fingers: list[int | None] = [finger if finger < had else None for finger in range(count)]
+    return [*fingers, *range(had, had + bodies)]
+
+
 def change_fingers(
     former: System, system: System, state: State, origins: Sequence[int | None]
 ) -> State:

@@ -16,6 +16,7 @@ import numpy as np
 from ..base.arrays import Array, Floats
 from ..base.errors import OutputError, ParameterError
 from ..control.orders import FARTHEST, STRONGEST, Orders, add_verbs, find_fault
+from ..engine.bodies import Knot
 from ..engine.simulation import begin
 from ..engine.state import State
 from ..engine.system import System
@@ -26,7 +27,8 @@ from ..scene.assembly import assemble
 from ..scene.schema import Scene
 from ..scene.toml_table import format_scene, resolve
 from . import snapshot
-from .live_session import AWAY, Recording, simulate_path
+from .given_bodies import BODIES, UNDERSIDES, pack_bodies, unpack_bodies
+from .live_session import AWAY, Recording, give_undersides, simulate_path
 
 #: Waypoints this close to the straight line between their neighbors are left out, m and 1.
 STRAIGHT = 1e-12
@@ -63,6 +65,8 @@ class Take:
     """Orders of brushes, see `control.orders`; None: none in any period."""
     base: Floats | None = None
     """(n,): Heights that strokes count from at the end, m; None: of a session without strokes."""
+    knots: tuple[Knot, ...] = ()
+    """Undersides of the scene's bodies, if it has any."""
 
     def __post_init__(self) -> None:
         fingers = len(self.scene.fingers)
@@ -121,16 +125,24 @@ def play(take: Take, scene: Scene | None = None) -> Iterator[tuple[System, State
     """Yield system and state of a take, as `replay`, at its start and after each period."""
     scene = scene or take.scene
 
+    bodies = len(scene.bodies)
+
+    def prepare(count: int) -> System:
+        system = assemble(scene.with_fingers(count))
+        give_undersides(system, take.knots)
+        return system
+
     def change(system: System, state: State, count: int) -> tuple[System, State]:
-        if count == system.fingers:
+        had = system.fingers - bodies
+        if count == had:
             return system, state
-        other = assemble(scene.with_fingers(count))
-        former = [finger if finger < system.fingers else None for finger in range(count)]
+        other = prepare(count)
+        former = snapshot.place_fingers(had, count, bodies)
         return other, snapshot.change_fingers(system, other, state, former)
 
-    system = assemble(scene.with_fingers(snapshot.count_fingers(take.start)))
+    system = prepare(snapshot.count_fingers(take.start) - bodies)
     state, first = snapshot.load(system, take.start), 0
-    end = take.end and snapshot.count_fingers(take.end)
+    end = take.end and snapshot.count_fingers(take.end) - bodies
     yield system, state
     for count, group in groupby(take.fingers):
         system, state = change(system, state, count)
@@ -154,6 +166,11 @@ def to_scene(take: Take, name: str) -> Scene:
         raise OutputError(
             f"The take {name!r} has strokes in which the valves drive pins by themselves, and a scene file "
             "holds the fingertip's path alone: record a take of the fingertip for export."
+        )
+    if take.scene.bodies:
+        raise OutputError(
+            f"The take {name!r} has pressers, whose undersides it holds, and a scene file holds meshes and "
+            "paths: bake the take, or record one of the fingertip alone for export."
         )
     whole = take.scene.with_fingers(take.poses.shape[1])
     system = assemble(take.scene)
@@ -202,13 +219,16 @@ def to_bytes(take: Take) -> bytes:
     based = {} if take.base is None else {BASE: take.base}
     np.savez(
         written,
-        scene=np.frombuffer(format_scene(take.scene).encode(), np.uint8),
+        scene=np.frombuffer(format_scene(replace(take.scene, bodies=())).encode(), np.uint8),
         start=np.frombuffer(take.start, np.uint8),
         poses=take.poses,
         end=np.frombuffer(take.end, np.uint8),
-        version=np.array(VERSION if several else ORDERED if ordered else PLAIN),
+        version=np.array(
+            VERSION if several or take.scene.bodies else ORDERED if ordered else PLAIN
+        ),
         **ordered,
         **based,
+        **pack_bodies(take.scene, take.knots),
     )
     return written.getvalue()
 
@@ -218,7 +238,7 @@ def from_bytes(data: bytes) -> Take:
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             stored = archive.namelist()
-            optional = ("version", SMOOTHING, ORDERS, SURFACES, BASE)
+            optional = ("version", SMOOTHING, ORDERS, SURFACES, BASE, *UNDERSIDES)
             names = [*PARTS, *(name for name in optional if f"{name}.npy" in stored)]
             heads = read_heads(archive, names)
             # `to_bytes` does not compress: a take unpacks to at most its own size.
@@ -234,8 +254,9 @@ def from_bytes(data: bytes) -> Take:
         elif not PLAIN <= int(parts["version"].reshape(())) <= VERSION:
             raise ValueError(f"its version must be at most {VERSION} (got {parts['version']})")
         resolved = resolve(parse_tables(scene.tobytes().decode()))
+        resolved, knots = unpack_bodies(resolved, parts) if BODIES in parts else (resolved, ())
         states = start.tobytes(), poses, end.tobytes()
-        return Take(resolved, *states, _read_orders(parts), parts.get(BASE))
+        return Take(resolved, *states, _read_orders(parts), parts.get(BASE), knots)
     except (
         OSError,
         EOFError,
@@ -263,4 +284,4 @@ def make_take(
         return None
     orders = recording.orders
     orders = orders and replace(orders, rows=orders.rows.copy())
-    return Take(scene, recording.start, recording.path.copy(), end, orders, base)
+    return Take(scene, recording.start, recording.path.copy(), end, orders, base, recording.knots)

@@ -59,12 +59,17 @@ class Body(Parameters):
     )
 
     def check(self) -> None:
-        """Refuse a body without a mesh or with two, and an even number of samples."""
-        if bool(self.file) == bool(self.mesh):
-            rule = "must be left out where mesh is given" if self.mesh else "or mesh must be given"
-            raise ParameterError("Body", "file", rule, self.file or "none")
+        """Refuse a body with two meshes, and an even number of samples."""
+        if self.file and self.mesh:
+            rule = "must be left out where mesh is given"
+            raise ParameterError("Body", "file", rule, self.file)
         if self.samples % 2 == 0:
             raise ParameterError("Body", "samples", "must be odd", str(self.samples))
+
+    @property
+    def given(self) -> bool:
+        """Whether it has no mesh: its underside is given, see `engine.bodies.GivenUndersides`."""
+        return not (self.file or self.mesh)
 
     @property
     def contact(self) -> Contact:

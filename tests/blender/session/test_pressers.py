@@ -1,0 +1,271 @@
+"""Mesh objects press the bed: live, moved or deformed by whatever, undone, kept, baked and replayed."""
+
+import bpy
+import numpy as np
+import pytest
+from digiclay import bridge
+from digiclay.compat import curves
+from digiclay.core.base.modes import COLORS
+from digiclay.core.session import snapshot
+from digiclay.core.session.take import play
+from digiclay.device import view
+from digiclay.device.pressers import read_cage
+from digiclay.live import handlers, tick
+from digiclay.overlay import views
+from digiclay.recorded import takes
+from digiclay.roles import PRESSES, bed_of, list_pressers
+from digiclay.sessions import running, sculpting
+from mathutils import Vector
+
+from tests.assemble import assert_near
+from tests.blender.at_hand import delete, done, looked, save_and_open, select
+from tests.blender.session.live import exact, goes_on, only_bed, shown, started, waits
+
+#: A ball of 12 mm, its lowest point 45 mm above the floor: 5 mm above the pins.
+RADIUS, ABOVE = 12e-3, 45e-3
+
+
+def place(ball, z, x=0.0):
+    """Put the lowest point of a ball to a height, m."""
+    origin = ball[PRESSES].location if PRESSES in ball else only_bed().location
+    ball.location = origin + Vector((x, 0.0, z + RADIUS)) * bridge.SCALE
+
+
+@pytest.fixture
+def ball(bed):
+    """A ball of 5,120 triangles over the bed, which presses it."""
+    bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=5, radius=RADIUS * bridge.SCALE)
+    made = bpy.context.object
+    made.name = "Ball"
+    place(made, ABOVE)
+    looked()
+    assert bpy.ops.digiclay.add_presser() == {"FINISHED"}
+    done("Add Presser")
+    return made
+
+
+def press(ball, clock, depth=4e-3, lift=True):
+    """Press a ball into the pins at 60 mm/s, and lift it; return the messages."""
+    notes = []
+    down = np.linspace(ABOVE, 40e-3 - depth, 6)
+    for z in [*down, *[down[-1]] * 3, *(down[::-1] if lift else ())]:
+        place(ball, z)
+        notes += clock.tick()
+    return notes
+
+
+def sphere(bed, depth=4e-3):
+    """Return the height of a ball over the pins, at most that at rest, m."""
+    x, y = bridge.read_cells(bed.data)["position"].T
+    square = RADIUS**2 - x**2 - y**2
+    return np.minimum(40e-3 - depth + RADIUS - np.sqrt(np.maximum(square, 0.0)), 40e-3)
+
+
+def test_a_ball_leaves_its_shape_and_is_told_by_force_and_pins(bed, ball, clock):
+    assert bed_of(bpy.context) == bed
+    assert bed.digiclay.method == "plastic"
+    started(bed)
+    assert press(ball, clock, lift=False) == []
+    session = running.find(bed)
+    told = views.read_session(bed, session, COLORS)
+    pressed = sphere(bed) < 39.9e-3
+    forces = session.state.finger_forces()
+    assert told.pressed == np.count_nonzero(pressed)
+    assert (forces[0], told.force[-1]) == (0.0, pytest.approx(forces[1], rel=1e-9))
+    assert forces[1] > 0.2
+    assert press(ball, clock) == []
+    assert np.count_nonzero(running.find(bed).state.row(session.system.rows.force)) == 0
+    # The spring of the contact gives 0.05 mm under the 0.02 N of a pin.
+    assert np.abs(exact(bed) - sphere(bed)).max() < 0.1e-3
+    assert_near(shown(bed), exact(bed), 1e-8)  # Blender's 32 bits
+
+
+def keyed(ball, bed, clock):
+    for frame, z in ((1, ABOVE), (10, 36e-3)):
+        place(ball, z)
+        ball.keyframe_insert("location", frame=frame)
+    for frame in range(1, 12):
+        bpy.context.scene.frame_set(frame)
+        clock.tick()
+
+
+def parented(ball, bed, clock):
+    bpy.ops.object.empty_add(location=(0.3, 0.1, 0.2), rotation=(0.3, 0.2, 0.1))
+    empty, where = bpy.context.object, ball.matrix_world.copy()
+    ball.parent = empty
+    looked()
+    ball.matrix_world = where
+    for _ in range(9):
+        empty.location.z -= 1e-3 * bridge.SCALE
+        clock.tick()
+
+
+def deformed(ball, bed, clock):
+    key = [ball.shape_key_add(name=name) for name in ("Basis", "Down")][1]
+    for point in key.data:
+        point.co.z -= 9e-3 * bridge.SCALE
+    for value in np.linspace(0.0, 1.0, 10):
+        key.value = value
+        clock.tick()
+
+
+def skinned(ball, bed, clock):
+    bpy.ops.object.armature_add(location=ball.location)
+    armature = bpy.context.object
+    ball.vertex_groups.new(name="Bone").add(range(len(ball.data.vertices)), 1.0, "REPLACE")
+    ball.modifiers.new("Armature", "ARMATURE").object = armature
+    bone = armature.pose.bones["Bone"]
+    for _ in range(9):
+        bone.location.y -= 1e-3 * bridge.SCALE  # along the bone, which points up
+        clock.tick()
+
+
+@pytest.mark.parametrize("way", [keyed, parented, deformed, skinned], ids=lambda way: way.__name__)
+def test_whatever_moves_a_mesh_it_presses(bed, ball, clock, way):
+    looked()
+    started(bed)
+    clock.tick()
+    way(ball, bed, clock)
+    clock.tick(3)
+    assert np.abs(exact(bed) - sphere(bed)).max() < 0.1e-3
+
+
+def test_subdivision_is_off_while_a_mesh_presses_and_on_in_renders(bed, ball, clock):
+    bpy.ops.digiclay.remove_presser(presser="Ball")
+    assert list_pressers(bed) == []
+    finer = ball.modifiers.new("Finer", "SUBSURF")
+    bpy.ops.digiclay.add_presser()
+    assert (finer.show_viewport, finer.show_render) == (False, True)
+    looked()
+    assert len(read_cage(bpy.context, bed, ball)[1]) == len(ball.data.polygons)
+
+
+def test_undo_copies_deletion_and_saving_leave_a_session_and_its_pressers_in_order(
+    bed, ball, clock, tmp_path
+):
+    started(bed)
+    clock.tick()
+    done("Start")
+    assert press(ball, clock) == []
+    done("Press")
+    formed = exact(bed)
+    select(ball)
+    bpy.ops.object.duplicate()
+    copy = bpy.context.object
+    looked()
+    assert clock.tick() == []
+    assert list_pressers(bed) == [ball, copy]
+    assert len(running.find(bed).scene.bodies) == 2
+    place(copy, 37e-3, x=9e-3)
+    clock.tick(6)
+    both = exact(bed)
+    assert (both - formed).min() < -2e-3
+    delete(copy)
+    assert clock.tick() == []
+    assert len(running.find(bed).scene.bodies) == 1
+    assert np.abs(exact(bed) - both).max() < 0.2e-3  # the commands under way are carried out
+    bpy.ops.ed.undo()
+    looked()
+    clock.tick(handlers.STALE)
+    np.testing.assert_array_equal(exact(only_bed()), formed)
+    tick.stop(only_bed().session_uid)
+    save_and_open(tmp_path / "pressed.blend")
+    bed = only_bed()
+    assert [presser.name for presser in list_pressers(bed)] == ["Ball"]
+    np.testing.assert_array_equal(exact(bed), formed)
+    started(bed)
+    assert press(bpy.data.objects["Ball"], clock, depth=6e-3) == []
+    # A faster press meets more force: 0.2 mm of indentation.
+    assert np.abs(exact(bed) - sphere(bed, 6e-3)).max() < 0.25e-3
+
+
+ODD = {
+    "is being edited": (
+        lambda ball: bpy.ops.object.mode_set(mode="EDIT"),
+        lambda ball: bpy.ops.object.mode_set(mode="OBJECT"),
+    ),
+    "is hidden": (lambda ball: ball.hide_set(True), lambda ball: ball.hide_set(False)),
+    "must have from 1 to 1,000,000 triangles to press the pins (got 0)": (
+        lambda ball: setattr(ball, "data", bpy.data.meshes.new("None")),
+        lambda ball: setattr(ball, "data", bpy.data.meshes["Icosphere"]),
+    ),
+    "that are finite": (
+        lambda ball: setattr(ball.data.vertices[7], "co", (np.nan, 0.0, 0.0)),
+        lambda ball: setattr(ball.data.vertices[7], "co", (0.0, 0.0, 0.0)),
+    ),
+    "follows a fingertip": (
+        lambda ball: setattr(ball[PRESSES].digiclay, "method", "virtual_master"),
+        lambda ball: setattr(ball[PRESSES].digiclay, "method", "elastic"),
+    ),
+}
+
+
+@pytest.mark.parametrize("what", ODD)
+def test_with_an_odd_presser_the_session_waits_and_says_why(bed, ball, clock, what):
+    spoil, mend = ODD[what]
+    started(bed)
+    press(ball, clock)
+    before = exact(bed)
+    spoil(ball)
+    looked()
+    waits(bed, clock, words=what)
+    mend(ball)
+    looked()
+    np.testing.assert_array_equal(exact(bed) if "follows" not in what else before, before)
+    goes_on(clock)
+
+
+@pytest.mark.parametrize("lift", [True, False])
+def test_a_take_of_a_mesh_is_replayed_to_the_bit_and_baked(bed, ball, clock, lift):
+    started(bed)
+    clock.tick()
+    running.put(sculpting.set_recording(running.find(bed), True))
+    press(ball, clock, lift=lift)
+    place(ball, ABOVE, x=5e-3)
+    clock.tick(2)
+    session = running.find(bed)
+    take = takes.read_recording(session)
+    entry = takes.add(bed, take, session=session)
+    read = takes.read(bed)
+    assert read.scene.bodies == take.scene.bodies
+    tick.stop(bed.session_uid)
+    looked()
+    formed = exact(bed)
+    select(bed)
+    bpy.ops.digiclay.session_reset()
+    assert bpy.ops.digiclay.take_replay() == {"FINISHED"}
+    np.testing.assert_array_equal(exact(bed), formed)
+    *_, (system, state) = play(read)
+    assert snapshot.dump(system, state) == take.end
+    assert bpy.ops.digiclay.bake(source="TAKE", take=entry.number) == {"FINISHED"}
+    bpy.context.scene.frame_set(200)
+    # The last frame shows a period before the end, in which pins still move.
+    assert_near(drawn(bed), formed, 1e-5)
+
+
+def drawn(bed):
+    """Return the pin tops that Blender draws of a bake, m."""
+    next(one for one in bed.modifiers if one.name == view.MODIFIER).show_viewport = False
+    bpy.context.view_layer.update()
+    graph = bpy.context.evaluated_depsgraph_get()
+    return bridge.read_cells(bed.evaluated_get(graph).data)["height"]
+
+
+def test_an_animated_mesh_is_baked_with_subframes(bed, ball):
+    for frame, x in (
+        (1, -30e-3),
+        (4, 30e-3),
+    ):  # 20 mm per frame: it is nowhere in between but on the way
+        place(ball, 36e-3, x=x)
+        ball.keyframe_insert("location", frame=frame)
+    for curve in curves(ball):
+        for line in curve:
+            for key in line.keyframe_points:
+                key.interpolation = "LINEAR"
+    select(bed)
+    assert bpy.ops.digiclay.bake(source="FINGERTIP", first=1, last=6) == {"FINISHED"}
+    bpy.context.scene.frame_set(6)
+    formed = drawn(bed)
+    middle = np.abs(bridge.read_cells(bed.data)["position"][:, 1]) < 1e-3
+    # Valves let pins down by 1.7 mm or so while it is over them, all alike.
+    assert formed[middle].max() < 38.5e-3
