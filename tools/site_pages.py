@@ -225,7 +225,7 @@ def make_parameters_page() -> str:
     """Return the page of all parameters of a scene, from their declarations."""
     extents = [(unit or "1", f"{least:g}", f"{most:g}") for unit, (least, most) in EXTENTS.items()]
     lines = [AHEAD + PARAMETERS, write_table(("Unit", "Least above 0", "Most"), *extents)]
-    for name in SECTIONS:
+    for name in (*SECTIONS, "body"):
         for method in METHODS if name == "control" else ("virtual_master",):
             lines += _section(name, method)
     return "\n".join(lines) + "\n"

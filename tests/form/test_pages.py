@@ -106,7 +106,7 @@ def _definitions() -> dict[str, set[str]]:
 def _parameters() -> dict[tuple[str, str], Quantity]:
     return {
         (section, name): quantity
-        for section in SECTIONS
+        for section in (*SECTIONS, "body")
         for method in METHODS
         for name, quantity in list_quantities(import_parameters(section, method)).items()
     }
@@ -277,7 +277,7 @@ def test_every_symbol_of_pages_and_of_the_paper_is_declared() -> None:
     page = (ROOT / "docs" / "nomenclature.md").read_text(encoding="utf-8")
     declared = {
         quantity.symbol
-        for section in SECTIONS
+        for section in (*SECTIONS, "body")
         for method in METHODS
         for quantity in list_quantities(import_parameters(section, method)).values()
     }

@@ -123,7 +123,7 @@ def import_parameters(section: str, method: str) -> type[Parameters]:
         return law_parameters(section)
     if section == "control":
         return find_method(method).import_parameters()
-    return import_part(*PARTS[section])
+    return import_part(*(BODY if section == "body" else PARTS[section]))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
