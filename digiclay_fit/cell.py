@@ -105,12 +105,10 @@ class CellModel:
         }
         start, far = math.log(orifice.laminar), math.log(1e4)
         found = [Parameter(DIAMETER, "m3/(s Pa)", start, start - far, start + far, log=True)]
-        self.held_first: tuple[int, ...] = ()
         if "stroke" in groups:
             low, high = math.log(10.0), math.log(1e9)
             knee = Parameter(STROKE, "Pa", math.log(KNEES[0]), low, high, True, beside=DIAMETER)
             found.append(knee)
-            self.held_first = (1,)
         if "supply" in groups:
             for key in (HIGH, LOW):
                 found.append(Parameter(key, "Pa", self.usual[key], -1e6, 1e6))
@@ -134,6 +132,9 @@ class CellModel:
             found.append(Parameter(key, "m", rest, low, high, wanted=False, of_trial=True))
         self.parameters, self.zeros = tuple(found), first
         self.index = {each.key: i for i, each in enumerate(found)}
+        self.held_first = tuple(
+            self.index[key] for key in (STROKE, LAG, DELAY) if key in self.index
+        )
 
     def _value(self, free: Floats, key: str) -> float:
         """Return a parameter in SI, or what it is where it is not free."""
@@ -206,8 +207,9 @@ class CellModel:
     def list_starts(self) -> list[Floats]:
         """Return the values at which a fit starts: with a free knee below, about and above the supply."""
         start = np.array([each.start for each in self.parameters])
-        held = np.isin(np.arange(start.size), self.held_first)
-        return [np.where(held, math.log(knee), start) for knee in KNEES[: 1 + 2 * held.any()]]
+        if STROKE not in self.index:
+            return [start]
+        return [np.where(np.arange(start.size) == 1, math.log(knee), start) for knee in KNEES]
 
     def refine(self, free: Floats) -> bool:
         """Return that a fit is final."""

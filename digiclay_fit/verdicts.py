@@ -29,7 +29,7 @@ from .records import Trial, estimate_noise
 #: Likelihood from which a free stroke contradicts a held one.
 CONTRADICTED = 0.999
 #: Noise of the position that matters, as a share of that of the force.
-TOO_NOISY = 0.3
+TOO_NOISY = 0.15
 
 
 class Findings(NamedTuple):
@@ -122,12 +122,14 @@ def fit(
     elif errors[0] > errors[1]:
         code = "NO_IMPROVEMENT"
         why = f"the unchanged scene predicts the held-out trials better: {told}"
+    lost = []
+    if made.unknown:
+        direction = f"known worst: {{{', '.join(made.worst)}}}"
+        lost.append(f"the data do not determine {', '.join(made.unknown)}; {direction}")
     if part == "cell" and _needs_stroke(made, scene, trials, groups):
-        why = "the flow becomes turbulent elsewhere than with valve.stroke: it must be free, too"
-        code = "NOT_IDENTIFIABLE"
-    elif made.unknown:
-        direction = f"; known worst: {{{', '.join(made.worst)}}}"
-        unknown = f"the data do not determine {', '.join(made.unknown)}{direction}"
+        lost.append("the flow is turbulent elsewhere than by valve.stroke, which must be free, too")
+    if lost:
+        unknown = "; ".join(lost)
         code, why = ("NOT_IDENTIFIABLE", unknown) if code == "OK" else (code, f"{why}; {unknown}")
     derived = model.derive(made.free)
     cautions = list(_list_cautions(made, trials))
