@@ -31,9 +31,11 @@ from .arguments import (
     scene_of,
     told_as_options,
 )
+from .evaluation_pool import add_pool
 from .progress import Bar, Line, format_command, table
 from .refusals import refuse_without, refuse_without_blender
 from .stop import STOPPED, Stop
+from .uncertain import FILE, UNCERTAIN, describe, draw, list_words, measure, write
 
 if TYPE_CHECKING:
     from ..core.studies.omissions import Fitted
@@ -99,6 +101,7 @@ examples:
   digiclay run ridge_mound_valley
   digiclay run my.toml --out first --overwrite --export stl,obj --plots --render
   digiclay run ridge_mound_valley --budget 20um
+  digiclay run slow_press --uncertain finger/fitted.toml
   digiclay run tap --set layout.rows=9 --set control.force_setpoint="300 mN" --set conduit=absent
 
 The run folder holds scene.toml (every parameter), history.npz, metrics.json, the files of the options,
@@ -115,6 +118,7 @@ OPTIONS: dict[str, Any] = {
     "--plots": "also plots, session.png and surface.png",
     "--render": "also a picture, pins.png (needs bpy)",
     **NO_ERRORS,
+    **UNCERTAIN,
     "--quiet": QUIET,
 }
 
@@ -124,10 +128,12 @@ OPTIONS: dict[str, Any] = {
     EXAMPLES,
     add_scene,
     OPTIONS,
+    add_pool,
     description="Simulate a scene and write its folder.",
 )
 def carry_out(arguments: Namespace) -> int:
     """Run, write, and print a summary line."""
+    members = draw(arguments)
     scene, path = scene_of(arguments)
     out = arguments.out or Path(find_name(path))
     _refuse_early(arguments, scene)
@@ -140,13 +146,24 @@ def carry_out(arguments: Namespace) -> int:
             result = simulate(arguments, scene, path, stop)
             if fit:
                 result = replace(result, metrics={**result.metrics, "budget": noted(fit)})
-            extras = _plan_extras(arguments, result)
-            return write_run(arguments, claim, result, extras, stop, *list_cautions(scene))
+            extras, lines = _plan_extras(arguments, result), list_cautions(scene)
+            if members:
+                bands = measure(arguments, members, result, stop)
+                lines += describe(bands) if bands else []
+                words = list_words(arguments)
+                later = Extra(
+                    [FILE],
+                    partial(write, bands),
+                    lambda run: ["run", str(run), *words, "--out", str(run), "--overwrite"],
+                )
+                extras.insert(0, later)
+            return write_run(arguments, claim, result, extras, stop, *lines)
 
 
 def _refuse_early(arguments: Namespace, scene: Scene) -> None:
     """Refuse before the session what is bound to fail after it."""
-    extras = [name for name in ("export", "plots", "render") if getattr(arguments, name)]
+    names = "export", "plots", "render", "uncertain"
+    extras = [name for name in names if getattr(arguments, name)]
     for name in extras:
         if scene.recorder is None:
             raise OutputError(f"--{name} needs a recorder, and the scene has recorder = 'absent'.")

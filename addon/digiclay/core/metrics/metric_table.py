@@ -184,6 +184,12 @@ SPEEDS: dict[str, Metric] = {
     ),
     "largest_lift_speed": Metric("m/s", "lower", "fastest lift straight up that is followed"),
 }
+#: Speed limit of every lift.
+FREE: dict[str, Metric] = {
+    "free_rise": Metric(
+        "m/s", "lower", "speed of a pin without load", "speed limit of lifts", "mm/s"
+    )
+}
 #: Metrics of a method beside those of a history.
 METHOD: dict[str, Metric] = {
     "relief_rms": Metric(

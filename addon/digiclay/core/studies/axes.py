@@ -230,28 +230,39 @@ def make_columns(points: Sequence[Point], axes: Sequence[Axis]) -> list[Column]:
     return columns
 
 
-def _find_parts(scene: Scene, key: str) -> tuple[list[Any], str]:
-    """Return the parts with a parameter, of one finger or all, and its name; `key`: as of a setting."""
+def _find_parts(scene: Scene, key: str) -> tuple[list[Any], str, str]:
+    """Return the parts with a parameter, of one finger or all, its name, and its number in a list or ``""``.
+
+    `key`: as of a setting.
+    """
     first, *rest = split_key(key)
-    if first == FINGERS and len(rest) == 3:
-        parts = enumerate(scene.list_parts(rest[1]), 1)
-        return [part for number, part in parts if str(number) == rest[0]], rest[2]
-    return list(scene.list_parts(first)), ".".join(rest)
+    chosen = rest.pop(0) if first == FINGERS and len(rest) > 2 else ""
+    section = rest.pop(0) if chosen else first
+    parts = enumerate(scene.list_parts(section), 1)
+    name, _, number = ".".join(rest).partition(".")
+    return [part for place, part in parts if chosen in ("", str(place))], name, number
 
 
 def find_quantity(scene: Scene, key: str) -> Quantity | None:
     """Return the declaration of a parameter of a scene, or None."""
-    parts, name = _find_parts(scene, key)
+    parts, name, _ = _find_parts(scene, key)
     declared = (list_quantities(part).get(name) for part in parts if isinstance(part, Parameters))
     return next(declared, None)
 
 
 def find_numbers(scene: Scene, key: str) -> list[float]:
     """Return the different values of a parameter that are numbers: those of fingers may differ."""
-    parts, name = _find_parts(scene, key)
-    values = dict.fromkeys(getattr(part, name, None) for part in parts if name)
+    parts, name, number = _find_parts(scene, key)
+    values = [getattr(part, name, None) for part in parts if name]
+    if number:
+        lists = [value for value in values if isinstance(value, tuple)]
+        values = [
+            value for each in lists for place, value in enumerate(each, 1) if str(place) == number
+        ]
     return [
-        value for value in values if isinstance(value, (int, float)) and not isinstance(value, bool)
+        value
+        for value in dict.fromkeys(values)
+        if isinstance(value, (int, float)) and not isinstance(value, bool)
     ]
 
 

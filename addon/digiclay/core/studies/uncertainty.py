@@ -1,0 +1,152 @@
+"""Uncertainty of fitted parameters: members of a scene, drawn from their covariance, and bands of figures."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..base.arrays import Floats
+from ..base.errors import ParameterError, SceneError
+from ..files.tables import refuse_unknown, shorten
+from ..scene.scene_source import Setting, load, read_parts, read_table, write_word
+from ..scene.schema import Scene
+from ..scene.toml_table import UNCERTAINTY
+from .axes import Point, find_numbers, place_points
+
+#: Members by default, with which the width of a band is off by 7 % (standard deviation; four times as
+#: many halve it); the fewest, of which one is beyond each end of a band; the most.
+MEMBERS, LEAST, MOST = 100, 40, 1000
+#: Ends of a 95 % band.
+ENDS = 0.025, 0.975
+#: Correlations below this number are rounding of the file.
+ROUNDING = 1e-6
+
+
+class Fitted(NamedTuple):
+    """Joint normal distribution of the parameters of a fitted file, sorted: a file may have any order."""
+
+    keys: list[str]
+    center: Floats
+    """(k,): Values of the scene, as logarithms where `logarithms`, (k,)."""
+    logarithms: Any
+    root: Floats
+    """(k, k): Multiplied by its transpose it is the covariance."""
+
+    def draw(self, random: np.random.Generator, count: int) -> Floats:
+        """Return the values of members, (n, k)."""
+        values = self.center + random.standard_normal((count, len(self.keys))) @ self.root.T
+        with np.errstate(over="ignore"):  # infinity is outside of every range
+            return np.where(self.logarithms, np.exp(self.logarithms * values), values)
+
+
+class Members(NamedTuple):
+    """Members of a scene: names of what varies, points from 1 on, and how they were drawn."""
+
+    keys: list[str]
+    points: list[Point]
+    note: str
+
+
+def draw_members(
+    files: Sequence[Path], path: Path, settings: Sequence[Setting], count: int, seed: int
+) -> Members:
+    """Draw members of a scene whose settings have the parts of fitted files.
+
+    What the scene does not permit is drawn again. SceneError in one line if that is more than half of all
+    draws, and for a file: its field, rule and value.
+    """
+    scene = load(path, settings)
+    again = load(path, [*settings, *(part for file in files for part in read_parts(file))])
+    every = []
+    for file in files:
+        try:
+            every.append(_read(read_table(file).get(UNCERTAINTY), scene, again))
+        except ParameterError as error:
+            raise SceneError(f"{file}: {error}") from None
+    every.sort(key=lambda fitted: fitted.keys)
+    keys = [key for fitted in every for key in fitted.keys]
+    _require("keys", len(set(keys)) == len(keys), "must not name a parameter twice", keys)
+    random = np.random.default_rng(seed)
+    points = [Point(number, (), None) for number in range(1, count + 1)]
+    outside, why = -count, ""
+    while refused := [point for point in points if point.scene is None]:
+        outside, why = outside + len(refused), why or refused[0].error
+        if outside > count:
+            raise SceneError(f"More than half of all members cannot be, such as {why}")
+        values = np.hstack([fitted.draw(random, len(refused)) for fitted in every])
+        rows = [tuple(map(write_word, row)) for row in values.tolist()]
+        placed = place_points(path, settings, keys, rows, option="--uncertain")
+        for point, drawn in zip(refused, placed, strict=True):
+            points[point.index - 1] = replace(drawn, index=point.index)
+    more = f"; {outside} more drawn again: {why}" if outside else ""
+    return Members(keys, points, f"{count} members, seed {seed}{more}")
+
+
+def _require(field: str, holds: object, rule: str, value: object) -> None:
+    """Refuse a field of the table that breaks a rule."""
+    if not holds:
+        raise ParameterError(UNCERTAINTY, field, rule, shorten(repr(value)))
+
+
+def _read(table: Any, scene: Scene, again: Scene) -> Fitted:
+    """Return the content of a file's table; `again`: the scene with the parts of the files on top."""
+    _require("", isinstance(table, dict), "must be a table, as digiclay fit writes it", table)
+    refuse_unknown(UNCERTAINTY, table, ("keys", "logarithms", "covariance"))
+    given = table.get("keys")
+    size = len(given) if isinstance(given, list) else 0
+
+    def read(field: str, kinds: str, what: str, *shape: int) -> Any:
+        try:
+            values = np.array(table.get(field))
+        except ValueError:  # lists of different lengths
+            values = np.array(None)
+        rule = f"must be {' x '.join(map(str, shape))} {what}"
+        _require(
+            field, values.dtype.kind in kinds and values.shape == shape, rule, table.get(field)
+        )
+        return values
+
+    keys = read("keys", "U", "texts, at least 1", size)
+    flags = read("logarithms", "b", "of true and false", size)
+    covariance = read("covariance", "if", "numbers", size, size)
+    center = np.empty(size)
+    for number, key in enumerate(given):
+        values = find_numbers(scene, key)
+        rule = "must be in the scene, a number that all fingers share"
+        _require("keys", len(values) == 1, rule, key)
+        rule = "must not be changed by other options"
+        _require("keys", values == find_numbers(again, key), rule, key)
+        _require(
+            "logarithms", values[0] > 0.0 or not flags[number], "must be of numbers above 0", key
+        )
+        center[number] = np.log(values[0]) if flags[number] else values[0]
+    order = np.argsort(keys)
+    root = find_root(covariance[np.ix_(order, order)])
+    return Fitted(keys[order].tolist(), center[order], flags[order], root)
+
+
+def find_root(covariance: Floats) -> Floats:
+    """Return the matrix that gives a covariance, multiplied by its transpose; ParameterError if none does."""
+    scale = np.sqrt(np.abs(np.diag(covariance)))
+    with np.errstate(invalid="ignore"):
+        limits = np.outer(scale, scale)
+        alike = np.abs(covariance - covariance.T) <= ROUNDING * limits
+    sound = alike & (np.abs(covariance) <= 1.001 * limits) & np.isfinite(limits) & (limits > 0.0)
+    values, vectors = np.linalg.eigh(covariance / limits if sound.all() else -np.eye(len(scale)))
+    rule = "must be finite, symmetric and positive definite, but for rounding"
+    _require("covariance", values[0] > -ROUNDING, rule, covariance.tolist())
+    root: Floats = scale[:, None] * vectors * np.sqrt(np.where(values > ROUNDING, values, 0.0))
+    return root
+
+
+def find_band(values: Sequence[float]) -> list[float]:
+    """Return both ends of the 95 % band of members' values, or none of fewer than `LEAST`.
+
+    One more member is in it with a probability of 95 %, whatever the distribution.
+    """
+    ends: list[float] = []
+    if len(values) >= LEAST:
+        ends = np.quantile(values, ENDS, method="weibull").tolist()
+    return ends
