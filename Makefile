@@ -89,7 +89,7 @@ guide-pictures: ## follow the tutorial and the guide in a window, and retake the
 
 test-proof: ## judge exports by admesh, assimp and PrusaSlicer, which root installs on Debian, job templates by openjd, studies by grids; reproduce the paper
 	@tools/programs .reports/proof.log "admesh assimp prusa-slicer" "admesh assimp-utils prusa-slicer"
-	@$(ENVIRONMENT) requirements/test.txt $(IN_311)
+	@$(ENVIRONMENT) requirements/proof.txt $(IN_311)
 	@rm -f .reports/proof.txt; $(PART) .reports/proof.txt "exports and job templates judged by other programs, studies by grids, the paper" 600 -- $(HANGS) -n auto --dist loadfile tests/proof
 
 docs: ## build the site in site/, without a warning, and check it: links, search in a browser, commands of all pages

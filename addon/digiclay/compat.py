@@ -77,6 +77,7 @@ KINDS = (
     "worlds",
     "node_groups",
     "images",
+    "actions",
 )
 
 

@@ -14,6 +14,7 @@ ENTRIES = (
     ("bpy.ops.mesh.digital_clay_add", "#first-ridge"),
     ("bpy.ops.mesh.digital_clay_make", "#export"),
     ("bpy.ops.export_mesh.digital_clay", "#export"),
+    ("bpy.ops.export_anim.digital_clay", "#export"),
     ("bpy.ops.import_scene.digital_clay_run", ""),
     ("bpy.ops.digiclay.add_fingertip", "#several-fingertips"),
     ("bpy.ops.digiclay.add_hand", "#several-fingertips"),

@@ -33,6 +33,7 @@ CALLS = {
     "digiclay.preset_save": ({"name": "Another"}, DATA),
     "mesh.digital_clay_make": ({}, PINS, ADDS),
     "export_mesh.digital_clay": ({"filepath": "bed.stl"}, PINS),
+    "export_anim.digital_clay": ({"filepath": "bed.glb", "file_format": "glb"}, PINS),
     "digiclay.find_features": ({}, PINS),
     "digiclay.rebuild": ({}, CHANGES),
     "digiclay.forget_surface": ({}, CHANGES),
@@ -59,7 +60,7 @@ CALLS = {
     "digiclay.take_replay": ({}, FORMS),
     "digiclay.bake": ({"last": 3}, FORMS),
 }
-WRITTEN = "take.toml", "bed.stl"
+WRITTEN = "take.toml", "bed.stl", "bed.glb"
 #: What needs a bed that plays a bake, which nothing else is called on.
 BAKED = {"digiclay.bake_free"}
 #: What needs a hand, a view, a session, or the folder of a run.

@@ -5,6 +5,8 @@ from argparse import ArgumentTypeError, Namespace
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
+import numpy as np
+
 from ..core.base.errors import OutputError
 from ..core.files.run_folder import claim_files
 from ..core.mesh_io.export_model import KINDS, Model, find_features, make_bodies
@@ -12,10 +14,12 @@ from ..core.mesh_io.mesh_writer import FORMATS, UNITS, Format, find_suffix, writ
 from ..core.mesh_io.obj_reader import AXES, UP, make_axes
 from ..core.scene.schema import Scene
 from ..core.session.finished_run import find_row, read_run, require_surface
+from ..core.session.render_settings import Film
 from ..core.session.run_scene import History
 from ..core.surface.features import Finding, make_table, summarize
 from ..core.surface.formed import Body, Formed, make_formed
 from ..core.surface.skins import SKINS
+from ..exchange.animation_file import ANIMATED, SUFFIXES, animate, write_animation
 from .arguments import (
     RUN,
     command,
@@ -27,6 +31,7 @@ from .arguments import (
     whole_number,
 )
 from .progress import table as aligned
+from .refusals import refuse_without_blender
 
 
 def list_choices(
@@ -91,12 +96,21 @@ def read_formed(arguments: Namespace, command: str) -> tuple[Scene, Formed]:
     return run.scene, make_formed(run.history, row, find_row(run.history, time, "--former"))
 
 
+def read_animated(text: str) -> list[str]:
+    """Read the formats of animated files."""
+    names = text.lower().split(",")
+    if not set(names) <= SUFFIXES.keys():
+        raise ArgumentTypeError(f"must be some of {', '.join(SUFFIXES)} (got {text!r})")
+    return names
+
+
 EXAMPLES = """\
 examples:
   digiclay export ridge_mound_valley --format stl,3mf
   digiclay export ridge_mound_valley --skin smooth --resolution 6 --format obj --up z
   digiclay export ridge_mound_valley --kind features --separate --format stl --out parts
   digiclay export ridge_mound_valley --kind pins --format ply --unit m --time 10 --out meshes
+  digiclay export ridge_mound_valley --animated usd,glb --start 8 --stop 18
 """
 #: What a file of each kind is called; each of several features by its own name.
 STEMS = {"solid": "surface", "surface": "skin", "pins": "pins", "features": "features"}
@@ -104,12 +118,15 @@ STEMS = {"solid": "surface", "surface": "skin", "pins": "pins", "features": "fea
 
 OPTIONS = {
     **RUN,
-    "--format F,...": (
-        formats,
-        f"{list_choices(FORMATS, '{} ({[0]})', ', ')}; default stl",
-        ["stl"],
+    "--format F,...": (formats, f"{list_choices(FORMATS, '{} ({[0]})', ', ')}; default stl"),
+    "--kind": (KINDS, f"{list_choices(KINDS)}; default solid; with --animated pins and surface"),
+    "--animated F,...": (
+        read_animated,
+        "the whole session, its pins as instances and its skin: usd, glb, and abc, which needs bpy",
     ),
-    "--kind": (KINDS, f"{list_choices(KINDS)}; default solid", "solid"),
+    "--fps N": (int, "frames per second of --animated; default 25", 25),
+    "--start T": (seconds, "first instant of --animated, s", 0.0),
+    "--stop T": (seconds, "last instant of --animated, s; default: the end", 0.0),
     **SURFACE,
     "--base-thickness L": (
         millimeters,
@@ -149,11 +166,18 @@ def exported(
 @command("write the formed surface of a run as mesh files", EXAMPLES, OPTIONS)
 def carry_out(arguments: Namespace) -> int:
     """Export."""
-    if arguments.separate and arguments.kind != "features":
+    rule = "without" if arguments.animated else "with"
+    for name, default in (OF_INSTANT if arguments.animated else OF_ANIMATED).items():
+        if getattr(arguments, name) != default:
+            raise OutputError(f"--{name} must be given {rule} --animated.")
+    if arguments.animated:
+        return _export_animated(arguments)
+    kind = arguments.kind or "solid"
+    if arguments.separate and kind != "features":
         raise OutputError("--separate needs --kind features.")
     scene, formed = read_formed(arguments, "export")
-    bodies = make_bodies(formed, model_of(arguments, scene, arguments.kind), finding_of(arguments))
-    files: list[tuple[str, list[Body]]] = [(STEMS[arguments.kind], bodies)]
+    bodies = make_bodies(formed, model_of(arguments, scene, kind), finding_of(arguments))
+    files: list[tuple[str, list[Body]]] = [(STEMS[kind], bodies)]
     if arguments.separate:
         files = [(body.name, [body]) for body in bodies]
     with told_as_options("Export"):
@@ -162,12 +186,47 @@ def carry_out(arguments: Namespace) -> int:
     targets = [
         (some, kind, folder / f"{stem}{find_suffix(kind)}")
         for stem, some in files
-        for kind in arguments.format
+        for kind in arguments.format or ["stl"]
     ]
     with claim_files([path for _, _, path in targets]):
         for some, kind, path in targets:
             write(some, path, arguments.unit, kind, arguments.up, arguments.forward)
             say(arguments, f"{path} ({arguments.up} up)" if kind == "obj" else path)
+    return 0
+
+
+#: Options of meshes of an instant, and of animated files, with their defaults.
+OF_INSTANT = {"format": None, "separate": False, "time": None}
+OF_ANIMATED = {"fps": 25, "start": 0.0, "stop": 0.0}
+
+
+def _export_animated(arguments: Namespace) -> int:
+    """Export pins and skin of the whole session."""
+    kinds = [arguments.kind] if arguments.kind else ANIMATED
+    if kinds[0] not in ANIMATED:
+        raise OutputError(f"--kind must be pins or surface with --animated (got {kinds[0]}).")
+    if "abc" in arguments.animated:
+        refuse_without_blender()
+    with told_as_options("Film", rate="fps"):
+        film = Film(rate=arguments.fps, start=arguments.start, stop=arguments.stop)
+        run = read_run(arguments.run, "height", "position")
+        moments = film.moments(run.history["time"])
+    if "surface" in kinds:
+        require_surface(run.scene, "--animated of a skin")
+    time, height, position = (run.history[name] for name in ("time", "height", "position"))
+    frames = np.column_stack([np.interp(moments, time, pin) for pin in height.T])
+    folder = arguments.out or arguments.run
+    targets = [
+        (kind, name, folder / f"animated_{STEMS[kind]}{SUFFIXES[name]}")
+        for kind in kinds
+        for name in dict.fromkeys(arguments.animated)
+    ]
+    with claim_files([path for _, _, path in targets]):
+        for kind, name, path in targets:
+            model = model_of(arguments, run.scene, kind)
+            animation = animate(position, frames, film.rate, model)
+            write_animation(path, animation, name, arguments.unit)
+            say(arguments, path)
     return 0
 
 

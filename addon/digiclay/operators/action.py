@@ -1,8 +1,9 @@
 """Common parts of the operators: polls with a reason, errors, ends in order, files, timer, status bar."""
 
 # No postponed annotations in this package: Blender reads an operator's properties from them.
+import time
 import traceback
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Generator, Iterable
 from functools import wraps
 from typing import Any
 
@@ -183,6 +184,58 @@ class TimedAction(Modal, Action):
         """Give back timer and status bar."""
         context.window_manager.event_timer_remove(self.timer)
         clear_status()
+
+
+#: Time between two looks at the user's keys, s, and the share of it that is worked.
+TICK, SHARE = 0.05, 0.9
+
+
+class SteppedAction(TimedAction):
+    """Mixin of an action that works in steps while Blender draws; Esc stops it before it changes anything."""
+
+    interval = TICK
+    bl_label: str
+    #: Yields the share done, and changes something after the last one only.
+    work: Callable[..., Generator[float, None, None]]
+
+    def perform(self, context: Context) -> None:
+        for _ in self.work(context):
+            pass
+
+    def prepare(self, context: Context, event: Event) -> None:
+        self._steps = self.work(context)
+
+    def borrow(self, context: Context) -> None:
+        super().borrow(context)
+        context.window_manager.progress_begin(0.0, 100.0)
+
+    def modal(self, context: Context, event: Event) -> Result:
+        """Work for a moment, unless the user has had enough."""
+        if event.type == "ESC" and event.value == "PRESS":
+            self.cancel(context)
+            inform(self, "{}: stopped, nothing was changed", localize(self.bl_label))
+            return {"CANCELLED"}
+        if event.type != "TIMER":
+            return {"RUNNING_MODAL"}
+        until = time.perf_counter() + SHARE * TICK
+        try:
+            share = next(self._steps)
+            while time.perf_counter() < until:
+                share = next(self._steps)
+        except StopIteration:
+            self.cancel(context)
+            return {"FINISHED"}
+        context.window_manager.progress_update(100.0 * share)
+        show_status(
+            context, localize("{}: {:.0f} %     Esc: stop", localize(self.bl_label), 100.0 * share)
+        )
+        return {"RUNNING_MODAL"}
+
+    def cancel(self, context: Context) -> None:
+        """Take back what shows the progress."""
+        self._steps.close()
+        context.window_manager.progress_end()
+        super().cancel(context)
 
 
 class Drawing(Modal):

@@ -224,6 +224,13 @@ ENTRIES: tuple[tuple[str, str, dict[str, Any]], ...] = (
     ),
 )
 
+#: Unit of a file.
+UNIT = choice(
+    "Unit",
+    "Length unit of the file; a GLB is always in meters",
+    items=[(name, name, f"Lengths in {name}") for name in UNITS],
+    default="mm",
+)
 #: Axes under the names of Blender's own exporter.
 AXIS_NAMES = {name.upper().replace("-", "NEGATIVE_"): name for name in AXES}
 AXIS_ITEMS = [(key, name.upper(), "") for key, name in AXIS_NAMES.items()]
@@ -251,12 +258,7 @@ class ExportMesh(SurfaceOptions, Operator):
         ],
         default="stl",
     )
-    unit: choice(
-        "Unit",
-        "Length unit of the file; a GLB is always in meters",
-        items=[(name, name, f"Lengths in {name}") for name in UNITS],
-        default="mm",
-    )
+    unit: UNIT
     forward_axis: choice(
         "Forward Axis", "Forward axis of an OBJ", items=AXIS_ITEMS, default="NEGATIVE_Z"
     )
@@ -355,6 +357,9 @@ def exports(entries: Menu, context: Context) -> None:
             setattr(export, name, value)
     entries.layout.separator()
     entries.layout.operator(ExportMesh.bl_idname, text="Other ...")
+    entries.layout.operator(
+        "export_anim.digital_clay", text="Animation ...", icon="RENDER_ANIMATION"
+    )
 
 
 def entry(parent: Menu, context: Context) -> None:

@@ -109,6 +109,10 @@ no_server = Need(
 )
 no_stroke = Need(lambda context: not tick.has_strokes(), "No press stroke is queued")
 no_recording = Need(lambda context: _recording(context) is None, "Record a take first")
+no_motion = Need(
+    lambda context: no_bake(context) and no_take(context) and no_recording(context),
+    "Nothing moves yet: record a take or bake a session first",
+)
 no_tool = Need(lambda context: brush.tool_settings(context) is None, "Select the Press tool")
 no_tool_in_view = Need(
     lambda context: not _has_view(context) or no_tool(context), "Select the Press tool in a 3D view"

@@ -22,6 +22,8 @@ from ..core.session.take import MOST_PARTS, Take, refine, to_scene
 from ..core.session.take import play as play_take
 from ..device import view
 from ..device.instant import find_ellipsoids
+from ..exchange import formed_bed
+from ..exchange.animation_file import SUFFIXES, animate, write_animation
 from ..live import beds, handlers, tick
 from ..recorded import bake, takes
 from ..recorded.pointer_strokes import play_strokes, read_strokes
@@ -30,14 +32,26 @@ from ..sessions import running, sculpting
 from ..settings import properties
 from ..settings.declared import choice, integer, text
 from ..ui_text import localize
-from .action import FileAction, Result, TimedAction, action, file_of, inform, show_status
+from .action import (
+    FileAction,
+    Result,
+    SteppedAction,
+    TimedAction,
+    action,
+    file_of,
+    inform,
+    show_status,
+)
+from .export_mesh import UNIT
 from .poll_messages import (
     baked,
     cannot_change,
     cannot_form,
+    cannot_measure,
     cannot_record,
     no_bake,
     no_bed,
+    no_motion,
     no_recording,
     no_take,
     session_runs,
@@ -303,20 +317,17 @@ class ReplayTake(TimedAction, Operator):
         return {"CANCELLED"}
 
 
-#: Time between two looks at the user's keys, s, and the share of it that is worked.
-TICK, SHARE = 0.05, 0.9
 SOURCES = (
     ("FINGERTIP", "Animated Fingertip", "The fingertip as it moves in the frames of the scene"),
     ("TAKE", "Take", "The fingertip as it was recorded in a session"),
 )
 
 
-class Bake(TimedAction, Operator):
+class Bake(SteppedAction, Operator):
     """Make an ordinary animation of the bed from a session; it plays and renders without simulation"""
 
     bl_idname = "digiclay.bake"
     bl_label = "Bake Session"
-    interval = TICK
     bl_options = {"REGISTER", "UNDO"}
     needs = cannot_form, session_runs.reworded("Stop the session on this bed first")
 
@@ -325,49 +336,13 @@ class Bake(TimedAction, Operator):
     first: integer("First Frame", "First frame of the session", default=1)
     last: integer("Last Frame", "Last frame of the session; a take has its own length", default=250)
 
-    def perform(self, context: Context) -> None:
-        for _ in self.work(context):
-            pass
-
     def prepare(self, context: Context, event: Event) -> None:
         """Take the scene's frames where none are asked for; work goes on while Blender draws."""
         if not self.properties.is_property_set("first"):
             self.first = context.scene.frame_start
         if not self.properties.is_property_set("last"):
             self.last = context.scene.frame_end
-        self._steps = self.work(context)
-
-    def borrow(self, context: Context) -> None:
-        super().borrow(context)
-        context.window_manager.progress_begin(0.0, 100.0)
-
-    def modal(self, context: Context, event: Event) -> Result:
-        """Work for a moment, unless the user has had enough."""
-        if event.type == "ESC" and event.value == "PRESS":
-            self.cancel(context)
-            inform(self, "{}: stopped, nothing was changed", localize(self.bl_label))
-            return {"CANCELLED"}
-        if event.type != "TIMER":
-            return {"RUNNING_MODAL"}
-        until = time.perf_counter() + SHARE * TICK
-        try:
-            share = next(self._steps)
-            while time.perf_counter() < until:
-                share = next(self._steps)
-        except StopIteration:
-            self.cancel(context)
-            return {"FINISHED"}
-        context.window_manager.progress_update(100.0 * share)
-        show_status(
-            context, localize("{}: {:.0f} %     Esc: stop", localize(self.bl_label), 100.0 * share)
-        )
-        return {"RUNNING_MODAL"}
-
-    def cancel(self, context: Context) -> None:
-        """Take back what shows the progress."""
-        self._steps.close()
-        context.window_manager.progress_end()
-        super().cancel(context)
+        super().prepare(context, event)
 
     def work(self, context: Context) -> Generator[float, None, None]:
         """Read the path, simulate it and write the bake, which Esc leaves out; yield the share done."""
@@ -405,3 +380,73 @@ class Bake(TimedAction, Operator):
 def free_bake(operator: Operator, context: Context) -> None:
     """Remove the bake: the bed shows its own state again. Keyframes of the fingertip stay"""
     bake.free(bed_of(context))
+
+
+class ExportAnimation(SteppedAction, Operator):
+    """Write a session as an animated file: the bake, or else the recording so far, or else the last take"""
+
+    bl_idname = "export_anim.digital_clay"
+    bl_label = "Export Animation"
+    bl_options = {"REGISTER"}
+    needs = cannot_measure, no_motion
+
+    take: text("Take", "Number of the take to be written; empty: the bake, recording or last take")
+    filepath: bpy.props.StringProperty(subtype="FILE_PATH", options={"SKIP_SAVE"})
+    check_existing: bpy.props.BoolProperty(default=True, options={"HIDDEN"})
+    file_format: choice(
+        "Format",
+        "Format of the file",
+        items=[(name, name.upper(), "") for name in SUFFIXES],
+        default="usd",
+    )
+    kind: choice(
+        "Mesh",
+        "Kind of mesh that moves",
+        items=[
+            ("pins", "Pins", "Instances of one mesh"),
+            ("surface", "Skin", "Skin over the pins"),
+        ],
+        default="pins",
+    )
+    unit: UNIT
+    #: Whether the file browser is open.
+    browses = False
+
+    def invoke(self, context: Context, event: Event) -> Result:
+        """Open the file browser, with the name of the bed; with a path, begin."""
+        if self.filepath:
+            return super().invoke(context, event)
+        self.browses = True
+        self.filepath = bpy.path.clean_name(bed_of(context).name) + SUFFIXES[self.file_format]
+        context.window_manager.fileselect_add(self)
+        return {"RUNNING_MODAL"}
+
+    def execute(self, context: Context) -> Result:
+        """Write at once; from the file browser, in steps."""
+        if not self.browses:
+            return super().execute(context)
+        result: Result = bpy.ops.export_anim.digital_clay("INVOKE_DEFAULT", **self.as_keywords())
+        return result - {"RUNNING_MODAL"} or {"FINISHED"}
+
+    def work(self, context: Context) -> Generator[float, None, None]:
+        """Find the heights of all frames, which may need a simulation, and write them."""
+        bed = bed_of(context)
+        file = Path(
+            bpy.path.ensure_ext(
+                bpy.path.abspath(self.filepath or "digital_clay"), SUFFIXES[self.file_format]
+            )
+        )
+        rate = bake.read_rate(context.scene)
+        if bake.is_baked(bed) and not self.take:
+            position, height = bake.read_moments(bed)
+        else:
+            session = running.find(bed)
+            recording = session and not self.take and takes.read_recording(session)
+            for part in bake.simulate_frames(recording or takes.read(bed, self.take), rate):
+                if isinstance(part, float):
+                    yield part
+                else:
+                    position, height = part.position, part.height.astype(np.float64)
+        model = formed_bed.model(bed, kind=self.kind)
+        write_animation(file, animate(position, height, rate, model), self.file_format, self.unit)
+        inform(self, "Written: {}", file)

@@ -118,6 +118,7 @@ def takes_panel(sidebar: Sidebar, context: Context) -> None:
         baking = row.operator("digiclay.bake", text="", icon="RENDER_ANIMATION")
         baking.source, baking.take = "TAKE", entry.number
         row.operator("digiclay.take_export", text="", icon="EXPORT").take = entry.number
+        row.operator("export_anim.digital_clay", text="", icon="MESH_GRID").take = entry.number
         row.operator("digiclay.take_remove", text="", icon="X").take = entry.number
         draw_lines(layout, effort_message(entry.effort), "NONE")
     layout.operator("digiclay.play_strokes", icon="CURVE_PATH")

@@ -147,22 +147,12 @@ def apply(
     """Give a bed a bake from a frame on, in place of an older one, and some fingertips keyframes."""
     free(bed)
     count = len(moments.height)
-    modifier = bed.modifiers.new(MODIFIER, "NODES")
     source = _make_source(moments)
-    modifier.node_group = playback_nodes(source, count)
     sources = view.sources_of(bed)
     if sources is not None:
         # As `view.hold_parts` has it: appended, the bed leaves it out of the scene.
         sources.objects.link(source)
-    bed.modifiers.move(len(bed.modifiers) - 1, 0)
-    modifier = bed.modifiers[0]
-    own_curves(bed)
-    for row in (0, count - 1):
-        set_node_setting(modifier, MOMENT, float(row))
-        keyframe_node_setting(modifier, MOMENT, first + row)
-    for _, curve in _curves(bed):
-        for key in curve.keyframe_points:
-            key.interpolation = "LINEAR"
+    play_moments(bed, source, first, count)
     tips = [tip for number, tip in fingertips_of(bed).items() if number in numbers]
     moving = [*dict.fromkeys(filter(None, (owner_of(tip, PALM) for tip in tips))), *tips]
     for thing in moving:
@@ -177,9 +167,32 @@ def apply(
             thing.keyframe_insert("rotation_quaternion", frame=first + row)
 
 
+def play_moments(thing: Object, source: Object, first: int, count: int) -> None:
+    """Have the points of an object move from a frame on as a source, of the role BAKE, has them."""
+    thing.modifiers.new(MODIFIER, "NODES").node_group = playback_nodes(source, count)
+    thing.modifiers.move(len(thing.modifiers) - 1, 0)
+    modifier = thing.modifiers[0]
+    own_curves(thing)
+    for row in (0, count - 1):
+        set_node_setting(modifier, MOMENT, float(row))
+        keyframe_node_setting(modifier, MOMENT, first + row)
+    for _, curve in _curves(thing):
+        for key in curve.keyframe_points:
+            key.interpolation = "LINEAR"
+
+
 def is_baked(bed: Object) -> bool:
     """Return whether a bed plays a bake."""
     return _modifier(bed) is not None
+
+
+def read_moments(bed: Object) -> tuple[Floats, Floats]:
+    """Return the positions (n, 2) and heights (t, n) of a baked bed, m."""
+    modifier, count = _modifier(bed), len(bed.data.vertices)
+    source = modifier and _source(modifier.node_group)
+    assert source is not None  # it is baked
+    cells = bridge.read_cells(source.data)
+    return cells["position"][:count], cells["height"].reshape(-1, count)
 
 
 def free(bed: Object) -> bool:

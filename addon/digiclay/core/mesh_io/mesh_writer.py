@@ -138,65 +138,76 @@ FLOAT, UNSIGNED = 5126, 5125
 VERTICES, INDICES = 34962, 34963
 #: A file's length is a 32-bit number.
 LARGEST = 2**32 - 1
+#: The material.
+CLAY = {"name": "clay", "pbrMetallicRoughness": {"metallicFactor": 0.0}}
+
+
+class GlbArrays:
+    """Arrays of a GLB, each with a view of the buffer and an accessor."""
+
+    def __init__(self) -> None:
+        self._arrays: list[Array] = []
+        self._views: list[Record] = []
+        self._accessors: list[Record] = []
+        self._size = 0
+
+    def add(self, array: Array, kind: str = "SCALAR", **target: int) -> int:
+        """Add an array as floats or unsigned numbers; return the number of its accessor."""
+        component, stored_as = (FLOAT, "<f4") if array.dtype.kind == "f" else (UNSIGNED, "<u4")
+        stored = np.ascontiguousarray(array, stored_as)
+        self._views.append(
+            {"buffer": 0, "byteOffset": self._size, "byteLength": stored.nbytes, **target}
+        )
+        accessor = {"bufferView": len(self._arrays), "componentType": component, "type": kind}
+        # The bounds must be those of the stored numbers.
+        low, high = (np.atleast_1d(bound).tolist() for bound in (stored.min(0), stored.max(0)))
+        self._accessors.append({**accessor, "count": len(stored), "min": low, "max": high})
+        self._arrays.append(stored)
+        self._size += stored.nbytes
+        return len(self._arrays) - 1
+
+    def write(self, file: BinaryIO, tree: Record) -> None:
+        """Write the arrays after a tree that names them; OutputError if they are too large."""
+        described = {
+            "asset": {"version": "2.0", "generator": "digiclay"},
+            "scene": 0,
+            "scenes": [{"nodes": list(range(len(tree["nodes"])))}],
+            **tree,
+            "accessors": self._accessors,
+            "bufferViews": self._views,
+            "buffers": [{"byteLength": self._size}],
+        }
+        text = json.dumps(described, separators=(",", ":")).encode()
+        text = text.ljust(-(-len(text) // 4) * 4)
+        whole = 12 + 8 + len(text) + 8 + self._size
+        if whole > LARGEST:
+            size = f"{whole / 2**30:.3g} GiB"
+            raise OutputError(f"A GLB holds at most 4 GiB (got {size}): choose another format.")
+        file.write(struct.pack("<4sIII4s", b"glTF", 2, whole, len(text), b"JSON") + text)
+        file.write(struct.pack("<I4s", self._size, b"BIN\0"))
+        for array in self._arrays:
+            file.write(array.tobytes())
 
 
 def write_glb(file: BinaryIO, bodies: Sequence[Body], factor: float) -> None:
-    """Write the bodies in meters, whatever the factor; OutputError if they are too large for the format."""
-    tree = _describe(bodies)
-    size = tree["buffers"][0]["byteLength"]
-    text = json.dumps(tree, separators=(",", ":")).encode()
-    text = text.ljust(-(-len(text) // 4) * 4)
-    whole = 12 + 8 + len(text) + 8 + size
-    if whole > LARGEST:
-        raise OutputError(f"A GLB holds at most 4 GiB (got {whole / 2**30:.3g} GiB): choose ply.")
-    file.write(struct.pack("<4sIII4s", b"glTF", 2, whole, len(text), b"JSON") + text)
-    file.write(struct.pack("<I4s", size, b"BIN\0"))
-    for body in bodies:
-        for vertices in split_pieces(body.vertices):
-            file.write(_upright(vertices).astype("<f4").tobytes())
-        for faces in split_pieces(body.faces):
-            file.write(faces.astype("<u4").tobytes())
+    """Write the bodies in meters, whatever the factor."""
+    arrays = GlbArrays()
+    meshes = [
+        {"name": body.name, "primitives": [add_triangles(arrays, body.vertices, body.faces)]}
+        for body in bodies
+    ]
+    nodes = [{"mesh": number, "name": body.name} for number, body in enumerate(bodies)]
+    arrays.write(file, {"nodes": nodes, "meshes": meshes, "materials": [CLAY]})
 
 
-def _describe(bodies: Sequence[Body]) -> Record:
-    """Return the JSON part: the layout of the bodies' vertices and faces in the binary part."""
-    views: list[dict[str, int]] = []
-    accessors: list[Record] = []
-    meshes: list[Record] = []
-    start = 0
-    for number, body in enumerate(bodies):
-        for count, target in ((len(body.vertices), VERTICES), (len(body.faces), INDICES)):
-            views.append(
-                {"buffer": 0, "byteOffset": start, "byteLength": 12 * count, "target": target}
-            )
-            start += 12 * count
-        # The bounds must be those of the stored numbers.
-        low, high = body.vertices.min(axis=0), body.vertices.max(axis=0)
-        low, high = _upright(np.array([[low[0], high[1], low[2]], [high[0], low[1], high[2]]]))
-        bounds = {"min": low.astype("<f4").tolist(), "max": high.astype("<f4").tolist()}
-        vertices = {"bufferView": 2 * number, "componentType": FLOAT, "count": len(body.vertices)}
-        indices = {
-            "bufferView": 2 * number + 1,
-            "componentType": UNSIGNED,
-            "count": 3 * len(body.faces),
-        }
-        accessors += [{**vertices, "type": "VEC3", **bounds}, {**indices, "type": "SCALAR"}]
-        part = {"attributes": {"POSITION": 2 * number}, "indices": 2 * number + 1, "material": 0}
-        meshes.append({"name": body.name, "primitives": [part]})
-    return {
-        "asset": {"version": "2.0", "generator": "digiclay"},
-        "scene": 0,
-        "scenes": [{"nodes": list(range(len(bodies)))}],
-        "nodes": [{"mesh": number, "name": body.name} for number, body in enumerate(bodies)],
-        "meshes": meshes,
-        "materials": [{"name": "clay", "pbrMetallicRoughness": {"metallicFactor": 0.0}}],
-        "accessors": accessors,
-        "bufferViews": views,
-        "buffers": [{"byteLength": start}],
-    }
+def add_triangles(arrays: GlbArrays, vertices: Floats, faces: Array) -> Record:
+    """Add triangles with the material number 0; return them as a part of a mesh."""
+    corners = arrays.add(turn_upright(vertices), "VEC3", target=VERTICES)
+    indices = arrays.add(faces.ravel(), target=INDICES)
+    return {"attributes": {"POSITION": corners}, "indices": indices, "material": 0}
 
 
-def _upright(vertices: Floats) -> Floats:
+def turn_upright(vertices: Floats) -> Floats:
     """Return vertices (v, 3) with y up: x stays, and the bed's y becomes -z."""
     return np.stack([vertices[:, 0], vertices[:, 2], -vertices[:, 1]], axis=1)
 

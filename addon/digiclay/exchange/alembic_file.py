@@ -1,0 +1,58 @@
+"""Alembic files of pins or their skin, written by Blender's exporter beside the user's scene."""
+
+import shutil
+from pathlib import Path
+from typing import BinaryIO
+
+from .. import bridge
+from ..compat import bpy, quiet, scratch
+from ..core.base.errors import OutputError
+from ..core.mesh_io.animation import Animation
+from ..device.node_tree import finish, mesh_of, new_tree, node
+from ..device.parts import marked
+from ..recorded.bake import play_moments
+from ..roles import BAKE
+
+#: Most bytes of a pin in a frame, as measured with all pins moving in all frames.
+SIZE = 170
+
+
+def write_alembic(file: BinaryIO, animation: Animation, factor: float) -> None:
+    """Write a mesh, or pins as instances of one mesh, lengths in 1 / `factor` m, y up."""
+    if not bpy.app.build_options.alembic:
+        raise OutputError("This Blender was built without Alembic: choose usd or glb.")
+    rate, points, faces, pin = animation
+    needed, free = SIZE * points[..., 0].size, shutil.disk_usage(Path(file.name).parent).free
+    if free < needed:  # Blender would crash
+        shown = f"{needed / 1e6:.3g} MB (free: {free / 1e6:.3g} MB)"
+        raise OutputError(f"An Alembic file of this session needs up to {shown}.")
+    points, triangles = points * factor, faces.tolist()
+    with scratch(), quiet():
+        scene = bpy.data.scenes.new("Digital Clay Animation")
+        scene.render.fps = max(1, round(rate))
+        scene.render.fps_base = scene.render.fps / rate
+        name = "skin" if pin is None else "pins"
+        drawn = triangles if pin is None else []
+        thing = bpy.data.objects.new(name, bridge.mesh(name, (points[0], drawn)))
+        scene.collection.objects.link(thing)
+        frames = bridge.mesh("frames", (points.reshape(-1, 3), []))
+        play_moments(thing, marked(frames, "frames", BAKE), 0, len(points))
+        if pin is not None:
+            mesh = bridge.mesh("pin", (pin * factor, triangles))
+            tree = new_tree("Digital Clay Instances")
+            given = {
+                "Points": node(tree, "NodeGroupInput").outputs["Geometry"],
+                "Instance": mesh_of(tree, bpy.data.objects.new("pin", mesh)),
+            }
+            instances = node(tree, "GeometryNodeInstanceOnPoints", given)
+            finish(tree, instances.outputs["Instances"])
+            thing.modifiers.new("Pins", "NODES").node_group = tree
+        with bpy.context.temp_override(scene=scene, view_layer=scene.view_layers[0]):
+            bpy.ops.wm.alembic_export(
+                filepath=file.name,
+                start=0,
+                end=len(points) - 1,
+                as_background_job=False,
+                uvs=False,
+                normals=False,
+            )

@@ -1,0 +1,59 @@
+"""Animated file of a bed: pins as instances of one mesh, or the skin as a mesh, complete or not at all."""
+
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+
+from ..core.base.arrays import Floats
+from ..core.base.errors import OutputError
+from ..core.files.run_folder import open_whole
+from ..core.mesh_io.animation import Animation, write_glb, write_usd
+from ..core.mesh_io.export_model import Model, make_skin_grid
+from ..core.mesh_io.mesh_writer import UNITS
+from ..core.surface.formed import Formed, make_skin
+from ..core.surface.skins import interpolate_skin
+from ..device.primitives import rod
+
+#: Extensions of the formats.
+SUFFIXES = {"usd": ".usda", "abc": ".abc", "glb": ".glb"}
+#: Kinds of `export_model.KINDS` that can be animated.
+ANIMATED = ("pins", "surface")
+#: Sides of a pin, and its length beyond the range of all heights, in its radii: none hangs in the
+#: air.
+SIDES, ROOTED = 12, 20.0
+
+
+def animate(position: Floats, height: Floats, rate: float, model: Model) -> Animation:
+    """Return the animation of pins with heights (t, n), m, or of their skin; OutputError for one frame."""
+    if len(height) < 2:
+        raise OutputError(
+            "An animation must have at least 2 frames (got 1): the session is too short."
+        )
+    plan, pin = position, None
+    if model.kind == "pins":
+        pin, polygons = rod(model.cap, float(np.ptp(height)) + ROOTED * model.cap, SIDES)
+        fans = [(each[0], *edge) for each in polygons for edge in pairwise(each[1:])]
+        faces = np.array(fans, np.int32)
+    else:
+        formed = Formed.of(position, height[0], 0.0, 0.0, 0)
+        grid = make_skin_grid(formed, model)
+        plan = grid.position
+        # The triangles are the same in all frames: those of a level skin.
+        faces = make_skin(plan, 0.0 * grid.height, grid.rows, grid.columns)
+        skin = model.skin, model.parts, model.cap
+        height = np.array([interpolate_skin(formed, pins, *skin) for pins in height])
+    points = np.empty((*height.shape, 3))
+    points[..., :2], points[..., 2] = plan, height
+    return Animation(rate, points, faces, pin)
+
+
+def write_animation(path: Path, animation: Animation, kind: str, unit: str) -> None:
+    """Write an animation in a format of `SUFFIXES`, in a unit of `UNITS`; OutputError on failure."""
+    with open_whole(path) as file:
+        if kind == "abc":
+            from .alembic_file import write_alembic  # which needs Blender
+
+            write_alembic(file, animation, UNITS[unit])
+        else:
+            {"usd": write_usd, "glb": write_glb}[kind](file, animation, UNITS[unit])
