@@ -229,10 +229,13 @@ def _follow_once(
     for image, pose in sorted(at.items()):
         samples = stroke.samples[::-1] if parts[image].backward else stroke.samples
         part = alter(parts[image], samples=samples, held=stroke.held)
-        # A waiting fingertip gives way to all that touch, so that none has to lift off again.
-        others = parts if part.phase == YIELDING else parts[:image]
-        down = [at[other.image] for other in others if other.image in at and other.phase in DOWN]
-        part = _yield(part, parts[:image], down, device, now, pose)
+        if part.phase in (PRESSING, YIELDING):
+            # A waiting fingertip gives way to all that touch, so that none has to lift off again.
+            others = parts if part.phase == YIELDING else parts[:image]
+            down = [
+                at[other.image] for other in others if other.image in at and other.phase in DOWN
+            ]
+            part = _yield(part, parts[:image], down, device, now, pose)
         if part.phase == PRESSING and not _stands(part, pose):
             part = replace(part, standing=None)
         part, path = follow(part, device, now, pose, 1, period, float(forces[image % count]), hard)

@@ -11,7 +11,6 @@ import math
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 
@@ -144,12 +143,17 @@ class Device:
         """Return the heights (n,), m, that a stroke counts from where a surface stands (n,), m."""
         return surface if self.base is None or not stroke.from_base else self.base
 
-    def combine(self, stroke: Stroke, before: Any, formed: Any) -> Any:
-        """Return what a stroke leaves of heights before it where it forms some, m: numbers, or (m,)."""
+    def combine(self, stroke: Stroke, before: Floats, formed: Floats) -> Floats:
+        """Return what a stroke leaves of heights (m,) before it where it forms some, m."""
+        low, high = self.find_limits(stroke)
+        return np.clip(formed, np.minimum(before, low), np.maximum(before, high))
+
+    def find_limits(self, stroke: Stroke) -> tuple[float, float]:
+        """Return the lowest and the highest place to which a stroke brings pins, m."""
         low, high = (self.rest + limit for limit in stroke.limits)
         low = math.inf if stroke.combine is Combine.HIGHEST else max(low, 0.0)
         high = -math.inf if stroke.combine is Combine.LOWEST else min(high, self.highest)
-        return np.clip(formed, np.minimum(before, low), np.maximum(before, high))
+        return low, high
 
     def hold_back(self, before: Floats, height: Floats) -> Floats:
         """Return heights (n,), m, of which each pin makes the share of the way that its lock leaves it."""

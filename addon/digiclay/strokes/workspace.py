@@ -57,7 +57,9 @@ class Workspace:
             stroke, stroke.samples[stroke.reached], (x, y), stroke.ground, level
         )
         # Where the surface is beyond what the stroke forms it goes along on that.
-        top = float(self.device.combine(stroke, self.device.find_surface(stroke.ground, x, y), top))
+        surface = self.device.find_surface(stroke.ground, x, y)
+        low, high = self.device.find_limits(stroke)
+        top = min(max(top, min(surface, low)), max(surface, high))
         if stroke.brush is Brush.RAISE and stroke.standing is not None:
             # It rides over what an image before has raised higher.
             top = max(top, self.find_touch(stroke, x, y))

@@ -266,7 +266,7 @@ class HandInGroups(HandControl):
                 force[entries],
                 seen.target[at],
                 seen.mode[at],
-                flat[rows],
+                flat.take(rows),
                 seen.cells[at],
             )
             self.division.mask(part)

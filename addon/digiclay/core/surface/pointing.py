@@ -1,10 +1,11 @@
 """Intersection of a ray with the pins, and the contact of a fingertip pressed there."""
 
 import math
+from functools import lru_cache
 
 import numpy as np
 
-from ..base.arrays import Floats
+from ..base.arrays import Cells, Floats
 from ..model.fingertip import Fingertip, make_matrices
 from ..model.layout import Grid
 
@@ -78,10 +79,15 @@ def _inside(origin: Floats, direction: Floats, low: Floats, high: Floats) -> tup
 
 def find_ground_height(grid: Grid, height: Floats, x: float, y: float, radius: float) -> float:
     """Return the mean height of the pins within a radius of a point, m; without any, that of the nearest."""
-    cells = grid.disc(x, y, radius)
-    if not cells.size:
-        cells = grid.at(np.array([x]), np.array([y]))
+    cells = _find_ground(grid, x, y, radius)
     return float(np.add.reduce(height.take(cells))) / cells.size
+
+
+@lru_cache(maxsize=1)  # strokes look up several surfaces at a place
+def _find_ground(grid: Grid, x: float, y: float, radius: float) -> Cells:
+    """Return the pins within a radius of a point, m; without any, the nearest one."""
+    cells = grid.disc(x, y, radius)
+    return cells if cells.size else grid.at(np.array([x]), np.array([y]))
 
 
 def find_contact_outline(finger: Fingertip, turn: Floats, depth: float) -> Floats:
