@@ -15,21 +15,22 @@ from .experiment import Prediction, Task
 from .records import Trial
 from .verdicts import Findings
 
-#: Traps that no residual shows, by part.
+#: Traps that residuals may not show, by part.
 UNSEEN = {
     "pulp": (
         "a force some milliseconds late: --free lag",
         "position measured at the motor of a frame that gives: --free compliance",
         "a force that drifts: --free drift",
-        "a wrong size of the fingertip: 10 % changes the stiffness by 12 to 31 %",
-        "the law of a pin (--law pin) for a whole finger: 42 % in the stiffness",
+        "a wrong size of the fingertip: 10 % changes the stiffness by 10 to 12 %",
+        "the law of a pin (--law pin) for a whole finger: 3.8 times the stiffness",
         "noise or steps of the position below some tenths of a micrometer",
+        "more relaxation times than the scene has",
         "a tilted finger, or one that is no ellipsoid; adhesion",
     ),
     "cell": (
-        "a wrong bore or fluid: viscosity times 1.5 changes the orifice by 10 %",
+        "a wrong bore or fluid: viscosity times 1.5 changes the orifice by 11 %",
         "a wrong load: 10 % changes the pressures by 10 %",
-        "two lags in series: the time constant becomes 28 % too short",
+        "a second lag in series: it counts as dead time",
         "gas in the fluid, friction and inertia of the pin, which the model does not have",
     ),
 }
@@ -132,7 +133,7 @@ def write_page(
         f"<p>{escape(facts)}</p>",
         "<h2>Correlations</h2>",
         *make_table(["", *keys], cells),
-        "<h2>What no residual shows</h2>",
+        "<h2>What residuals may not show</h2>",
         f"<ul>{''.join(f'<li>{escape(trap)}</li>' for trap in UNSEEN[part])}</ul>",
     ]
     return wrap(f"Fit of a {part}", lines)
