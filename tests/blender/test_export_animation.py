@@ -5,8 +5,10 @@ import numpy as np
 import pytest
 from digiclay import bridge
 from digiclay.compat import KINDS
+from digiclay.core.base.errors import OutputError
+from digiclay.core.mesh_io.animation import Animation
 from digiclay.core.session.take import play
-from digiclay.exchange.animation_file import SUFFIXES
+from digiclay.exchange.animation_file import SUFFIXES, write_animation
 from digiclay.live import tick
 from digiclay.recorded import takes
 from digiclay.roles import fingertip_of
@@ -68,7 +70,7 @@ def bring_back(path, kind, count):
     else:
         bpy.ops.import_scene.gltf(filepath=str(path))
     if path.suffix != ".glb":
-        assert scene.frame_end == count - 1
+        assert (scene.frame_start, scene.frame_end) == (0, count - 1)
     for frame in range(count):
         scene.frame_set(frame)
         drawn = bpy.context.evaluated_depsgraph_get()
@@ -100,11 +102,12 @@ def test_a_take_comes_back_with_the_heights_of_its_run_in_every_frame(
     bed, tmp_path, file_format, kind
 ):
     heights = find_heights(takes.read(bed))
-    before = {name: len(getattr(bpy.data, name)) for name in KINDS}
+    kinds = (*KINDS, "actions")
+    before = {name: len(getattr(bpy.data, name)) for name in kinds}
     bpy.ops.export_anim.digital_clay(
         filepath=str(tmp_path / "press"), file_format=file_format, kind=kind, unit="m"
     )
-    assert before == {name: len(getattr(bpy.data, name)) for name in KINDS}
+    assert before == {name: len(getattr(bpy.data, name)) for name in kinds}
     (path,) = tmp_path.iterdir()
     assert path.name == f"press{SUFFIXES[file_format]}"
     found = list(bring_back(path, kind, len(heights)))
@@ -126,6 +129,7 @@ def test_a_bake_goes_before_a_recording_and_that_before_the_last_take(bed, tmp_p
     assert written(take="1") == take
     press(bed)
     recording = written()
+    assert written(take="1") == take
     bpy.ops.digiclay.take_keep(name="Another")
     tick.stop(bed.session_uid)
     assert written(take="2") == written() == recording != take
@@ -135,6 +139,22 @@ def test_a_bake_goes_before_a_recording_and_that_before_the_last_take(bed, tmp_p
     written()
     found = list(bring_back(tmp_path / "any.glb", "pins", len(heights)))
     assert np.abs(np.array(found) - heights).max() < NEAR
+
+
+@pytest.mark.parametrize(
+    "name, options, written",
+    [
+        ("clay.glb", {}, "clay.glb"),
+        ("clay 1.5", {}, "clay 1.5.usda"),
+        ("clay.glb", {"file_format": "usd"}, "clay.usda"),
+        ("clay.stl", {"file_format": "glb"}, "clay.stl.glb"),
+    ],
+)
+def test_the_extension_is_that_of_the_format_and_names_it_where_none_is_given(
+    bed, tmp_path, name, options, written
+):
+    bpy.ops.export_anim.digital_clay(filepath=str(tmp_path / name), **options)
+    assert [path.name for path in tmp_path.iterdir()] == [written]
 
 
 def test_what_cannot_be_exported_is_refused_in_a_line_and_nothing_is_left(bed, tmp_path):
@@ -154,3 +174,14 @@ def test_what_cannot_be_exported_is_refused_in_a_line_and_nothing_is_left(bed, t
     bpy.ops.digiclay.take_remove()
     with pytest.raises(RuntimeError, match="record a take or bake a session first"):
         export(filepath=str(tmp_path / "a"))
+
+
+def test_an_alembic_file_that_the_disk_has_no_room_for_is_refused_since_blender_would_crash(
+    tmp_path,
+):
+    # An array without memory of its own; a file of it has 170 PB.
+    points = np.broadcast_to(0.0, (10**9, 10**6, 3))
+    animation = Animation(25.0, points, np.zeros((1, 3), np.int32))
+    with pytest.raises(OutputError, match=r"needs up to 1\.7e\+11 MB \(free: "):
+        write_animation(tmp_path / "a.abc", animation, "abc", "mm")
+    assert list(tmp_path.iterdir()) == []

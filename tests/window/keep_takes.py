@@ -43,6 +43,7 @@ def script(blender):
         note(blender, "stopped")
         yield from blender.open_sidebar(tab)
         yield from replayed(blender)
+        yield from animated(blender)
         yield from baked(blender)
     yield from blender.open_sidebar()
     bpy.ops.wm.open_mainfile(filepath=str(blender.OUT / "recovered.blend"))
@@ -113,6 +114,36 @@ def replayed(blender):
     )
     yield 1.0
     note(blender, "replayed")
+
+
+def animated(blender):
+    """Write the take as an animated file: stop it by Esc, then let it end; choose a file in the browser."""
+    export = bpy.ops.export_anim.digital_clay
+    options = {"file_format": "glb", "take": "1"}
+    stopped, whole, browsed = (
+        blender.OUT / f"{name}.glb" for name in ("stopped", "whole", "browsed")
+    )
+    blender.call(export, "INVOKE_DEFAULT", filepath=str(stopped), **options)
+    blender.key("ESC", blender.middle())
+    yield 1.0
+    blender.SEEN["animation stopped"] = stopped.exists()
+    blender.call(export, "INVOKE_DEFAULT", filepath=str(whole), **options)
+    yield from blender.until(whole.is_file)
+    blender.call(export, "INVOKE_DEFAULT", **options)
+    yield 1.0
+    browser = next(
+        each
+        for each in bpy.context.window_manager.windows
+        if each.screen.areas[0].type == "FILE_BROWSER"
+    )
+    space = browser.screen.areas[0].spaces.active
+    space.params.directory, space.params.filename = os.fsencode(blender.OUT), browsed.name
+    blender.shot("animation_browser")
+    with bpy.context.temp_override(window=browser, area=browser.screen.areas[0]):
+        bpy.ops.file.execute()
+    yield from blender.until(browsed.is_file)
+    blender.SEEN["animations"] = [whole.read_bytes() == browsed.read_bytes(), whole.stat().st_size]
+    note(blender, "animated")
 
 
 def baked(blender):

@@ -49,6 +49,16 @@ def test_esc_in_a_replay_leaves_bed_and_finger_as_they_were_and_a_replay_ends_wh
     assert "bit for bit" in seen["output"]
 
 
+def test_an_animated_file_is_written_in_steps_that_esc_stops_also_from_the_file_browser(seen):
+    assert not seen["animation stopped"]
+    same, size = seen["animations"]
+    assert same
+    # 625 pins, 12 bytes each in a frame.
+    assert size > 625 * 12 * 24
+    assert seen["animated"]["bed"] == seen["replayed"]["bed"]
+    assert (seen["animated"]["sessions"], seen["animated"]["is baked"]) == (0, False)
+
+
 def test_a_baked_take_plays_without_a_session_and_esc_and_free_give_bed_and_frame_back(seen):
     names = ("bake stopped", "baked", "freed")
     assert [seen[name]["is baked"] for name in names] == [False, True, False]

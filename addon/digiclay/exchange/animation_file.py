@@ -11,7 +11,7 @@ from ..core.files.run_folder import open_whole
 from ..core.mesh_io.animation import Animation, write_glb, write_usd
 from ..core.mesh_io.export_model import Model, make_skin_grid
 from ..core.mesh_io.mesh_writer import UNITS
-from ..core.surface.formed import Formed, make_skin
+from ..core.surface.formed import Formed
 from ..core.surface.skins import interpolate_skin
 from ..device.primitives import rod
 
@@ -38,9 +38,8 @@ def animate(position: Floats, height: Floats, rate: float, model: Model) -> Anim
     else:
         formed = Formed.of(position, height[0], 0.0, 0.0, 0)
         grid = make_skin_grid(formed, model)
-        plan = grid.position
-        # The triangles are the same in all frames: those of a level skin.
-        faces = make_skin(plan, 0.0 * grid.height, grid.rows, grid.columns)
+        # All frames have the triangles of the first one.
+        plan, faces = grid.position, grid.faces
         skin = model.skin, model.parts, model.cap
         height = np.array([interpolate_skin(formed, pins, *skin) for pins in height])
     points = np.empty((*height.shape, 3))

@@ -430,12 +430,11 @@ class ExportAnimation(SteppedAction, Operator):
 
     def work(self, context: Context) -> Generator[float, None, None]:
         """Find the heights of all frames, which may need a simulation, and write them."""
-        bed = bed_of(context)
-        file = Path(
-            bpy.path.ensure_ext(
-                bpy.path.abspath(self.filepath or "digital_clay"), SUFFIXES[self.file_format]
-            )
-        )
+        bed, name = bed_of(context), bpy.path.abspath(self.filepath or "digital_clay")
+        current = next((each for each in SUFFIXES if name.endswith(SUFFIXES[each])), "")
+        if current and not self.properties.is_property_set("file_format"):
+            self.file_format = current
+        file = Path(name.removesuffix(SUFFIXES.get(current, "")) + SUFFIXES[self.file_format])
         rate = bake.read_rate(context.scene)
         if bake.is_baked(bed) and not self.take:
             position, height = bake.read_moments(bed)
