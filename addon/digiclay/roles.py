@@ -50,8 +50,8 @@ def bed_of(context: Context) -> Any:
 
 def find_whole(part: Object) -> Object | None:
     """Return what an object is a part of: its parent, or the bed of a fingertip or palm, or of a presser."""
-    if part.get(PRESSES) is not None:
-        pressed: Object = part[PRESSES]
+    pressed: Object | None = part.get(PRESSES)
+    if pressed is not None and is_linked(pressed):
         return pressed
     return owner_of(part) if part.get(ROLE) in (FINGERTIP, PALM) else part.parent
 

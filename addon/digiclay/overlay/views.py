@@ -89,7 +89,7 @@ def read_session(
     """Return the content of the overlay for a bed and its session."""
     trace, scene = session.trace, session.scene
     wanted = float(trace.set_point[-1] if len(trace.rows) else find_set_point(scene.set_point, 0))
-    errors = session.errors
+    errors, forces = session.errors, session.state.finger_forces()[: len(session.poses)]
     return Readings(
         name=bed.name,
         method=scene.method if scene.control else "",
@@ -109,7 +109,7 @@ def read_session(
         colors=tuple(colors[mode] for mode in Mode),
         seconds=bed.digiclay_display.seconds,
         top=view.read_setting(bed, TOP_FORCE, None) if view.shows_force(bed) else None,
-        hardest=float(session.state.finger_forces().max()) if session.system.fingers > 1 else None,
+        hardest=float(forces.max()) if len(forces) > 1 else None,
         beyond=exceeds_law(session.system, session.state, session.pose),
         pressed=_count_pressed(session) if scene.bodies else None,
     )

@@ -340,14 +340,13 @@ def change_scene(
         )
 
     plain = assemble(scene) if images else other.system
-    same = numbers == was and len(scene.bodies) == len(running.scene.bodies)
     # The end of a stroke that was formed with other parameters cannot be restored.
     line = {} if is_resized(running.scene, scene) else {"stroke": ""}
     for name in ("gestures", "undone"):
         some = (replace(gesture, **line) for gesture in getattr(running, name))
-        carried: dict[str, Any] = {name: tuple(some if same else map(change, some))}
+        carried: dict[str, Any] = {name: tuple(some if numbers == was else map(change, some))}
         running = replace(running, **carried)
-    if not same:
+    if numbers != was:
         running = replace(
             running, stroke_start=running.stroke_start and change(running.stroke_start)
         )

@@ -7,7 +7,7 @@ from digiclay import bridge
 from digiclay.compat import curves
 from digiclay.core.base.modes import COLORS
 from digiclay.core.session import snapshot
-from digiclay.core.session.take import play
+from digiclay.core.session.take import from_bytes, play, to_bytes
 from digiclay.device import view
 from digiclay.device.pressers import read_cage
 from digiclay.live import handlers, tick
@@ -15,11 +15,13 @@ from digiclay.overlay import views
 from digiclay.recorded import takes
 from digiclay.roles import PRESSES, bed_of, list_pressers
 from digiclay.sessions import running, sculpting
+from digiclay.strokes.stroke import make_images, start
 from mathutils import Vector
 
 from tests.assemble import assert_near
 from tests.blender.at_hand import delete, done, looked, save_and_open, select
 from tests.blender.session.live import exact, goes_on, only_bed, shown, started, waits
+from tests.hand import let_go
 
 #: A ball of 12 mm, its lowest point 45 mm above the floor: 5 mm above the pins.
 RADIUS, ABOVE = 12e-3, 45e-3
@@ -70,7 +72,7 @@ def test_a_ball_leaves_its_shape_and_is_told_by_force_and_pins(bed, ball, clock)
     told = views.read_session(bed, session, COLORS)
     pressed = sphere(bed) < 39.9e-3
     forces = session.state.finger_forces()
-    assert told.pressed == np.count_nonzero(pressed)
+    assert (told.pressed, told.hardest) == (np.count_nonzero(pressed), None)
     assert (forces[0], told.force[-1]) == (0.0, pytest.approx(forces[1], rel=1e-9))
     assert forces[1] > 0.2
     assert press(ball, clock) == []
@@ -149,6 +151,7 @@ def test_undo_copies_deletion_and_saving_leave_a_session_and_its_pressers_in_ord
     assert press(ball, clock) == []
     done("Press")
     formed = exact(bed)
+    assert len(running.find(bed).gestures) == 1
     select(ball)
     bpy.ops.object.duplicate()
     copy = bpy.context.object
@@ -179,11 +182,21 @@ def test_undo_copies_deletion_and_saving_leave_a_session_and_its_pressers_in_ord
     assert np.abs(exact(bed) - sphere(bed, 6e-3)).max() < 0.25e-3
 
 
+def exclude(ball, excluded):
+    """Put a ball into a collection of its own that the view layer leaves out, or not."""
+    if "Out" not in bpy.data.collections:
+        bpy.context.scene.collection.children.link(bpy.data.collections.new("Out"))
+        bpy.data.collections["Out"].objects.link(ball)
+        bpy.context.collection.objects.unlink(ball)
+    bpy.context.view_layer.layer_collection.children["Out"].exclude = excluded
+
+
 ODD = {
     "is being edited": (
         lambda ball: bpy.ops.object.mode_set(mode="EDIT"),
         lambda ball: bpy.ops.object.mode_set(mode="OBJECT"),
     ),
+    "is hidden: show": (lambda ball: exclude(ball, True), lambda ball: exclude(ball, False)),
     "is hidden": (lambda ball: ball.hide_set(True), lambda ball: ball.hide_set(False)),
     "must have from 1 to 1,000,000 triangles to press the pins (got 0)": (
         lambda ball: setattr(ball, "data", bpy.data.meshes.new("None")),
@@ -269,3 +282,90 @@ def test_an_animated_mesh_is_baked_with_subframes(bed, ball):
     middle = np.abs(bridge.read_cells(bed.data)["position"][:, 1]) < 1e-3
     # Valves let pins down by 1.7 mm or so while it is over them, all alike.
     assert formed[middle].max() < 38.5e-3
+
+
+def test_without_its_bed_a_presser_is_a_mesh_like_any_other_and_may_press_the_next(bed, ball):
+    delete(bed)
+    select(ball)
+    assert bed_of(bpy.context) is None
+    with pytest.raises(RuntimeError, match=r"Select one bed .*\(got 0\)"):
+        bpy.ops.digiclay.add_presser()
+    bpy.ops.mesh.digital_clay_add(rows=5, columns=5)
+    other = bpy.context.object
+    bpy.ops.mesh.digital_clay_add(rows=5, columns=5)
+    select(ball)
+    with pytest.raises(RuntimeError, match=r"Select one bed .*\(got 2\)"):
+        bpy.ops.digiclay.add_presser()
+    select(other, ball)
+    bpy.ops.digiclay.add_presser()
+    assert list_pressers(other) == [ball]
+    select(ball)
+    assert bed_of(bpy.context) == other
+
+
+def test_a_linked_mesh_is_refused(bed, ball, clock, tmp_path):
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "ball.blend"))
+    bpy.ops.wm.read_homefile(use_empty=False, use_factory_startup=True)
+    with bpy.data.libraries.load(str(tmp_path / "ball.blend"), link=True) as (_, here):
+        here.objects = ["Ball"]
+    bpy.context.collection.objects.link(here.objects[0])
+    bpy.ops.mesh.digital_clay_add(rows=13, columns=13)
+    select(here.objects[0])
+    with pytest.raises(RuntimeError, match="Ball is linked: make it local first"):
+        bpy.ops.digiclay.add_presser()
+
+
+@pytest.mark.usefixtures("machine")
+def test_strokes_and_their_images_are_formed_beside_a_mesh_and_kept_in_a_take(bed, ball, clock):
+    started(bed)
+    press(ball, clock, lift=False)
+    pressed = sphere(bed) < 39.9e-3
+    running.put(sculpting.set_recording(running.find(bed), True))
+    stroke = start(0, 14e-3, 8e-3, 3e-3, make_images("RADIAL", 2))
+    session, number = sculpting.queue_stroke(running.find(bed), stroke)
+    running.put(session)
+    clock.until(lambda: (running.find(bed).state.finger_forces() > 0.01).sum() == 3)
+    assert len(running.find(bed).state.finger_forces()) == 3
+    running.put(let_go(running.find(bed), number))
+    clock.until(lambda: not running.find(bed).strokes)
+    session = running.find(bed)
+    formed = session.state.row(0)
+    assert len(session.state.finger_forces()) == 2
+    assert np.abs(formed - sphere(bed))[pressed].max() < 0.1e-3
+    assert np.count_nonzero(formed[~pressed] < 39e-3) > 6
+    take = takes.read_recording(session)
+    *_, (system, state) = play(take)
+    assert snapshot.dump(system, state) == take.end
+
+
+def test_recorded_strokes_are_played_on_a_bed_that_a_mesh_presses(bed, ball, tmp_path):
+    path = tmp_path / "strokes.toml"
+    path.write_text("[[stroke]]\ndepth = 0.003\nmoves = [[0, 0.014, 0.008], [0.1, 0.014, 0]]\n")
+    select(bed)
+    assert bpy.ops.digiclay.play_strokes(filepath=str(path)) == {"FINISHED"}
+    assert exact(bed).min() < 38.5e-3
+
+
+@pytest.mark.parametrize("back", ["a gesture", "undo"])
+def test_what_is_taken_back_while_a_mesh_is_recorded_is_in_no_take(bed, ball, clock, back):
+    started(bed)
+    clock.tick(3)
+    running.put(sculpting.set_recording(running.find(bed), True))
+    press(ball, clock)
+    done("Pressed")
+    first = exact(bed)
+    press(ball, clock, depth=6e-3, lift=False)
+    if back == "undo":
+        done("Deeper")
+        bpy.ops.ed.undo()
+        looked()
+        clock.tick(handlers.STALE - 1)
+        bed, ball = only_bed(), bpy.data.objects["Ball"]
+    else:
+        running.put(sculpting.rewind(running.find(bed)))
+    place(ball, 38e-3, x=6e-3)
+    clock.tick(3)
+    assert (exact(bed) - first).min() < -1e-3
+    take = from_bytes(to_bytes(takes.read_recording(running.find(bed))))
+    *_, (system, state) = play(take)
+    assert snapshot.dump(system, state) == take.end

@@ -1,10 +1,11 @@
-"""Undersides of a take's bodies as arrays of its file: differences from knot to knot, packed."""
+"""Undersides of a take's bodies as arrays of its file: differences from time to time, packed."""
+
+from __future__ import annotations
 
 import json
 import zlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
-from itertools import accumulate
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,40 +17,34 @@ from ..scene.schema import BODY, Presser, Scene
 if TYPE_CHECKING:
     from ..engine.bodies import Knot
 
-#: Arrays: parameters of the bodies, as JSON, periods of the knots, bytes of each, and all bytes.
-UNDERSIDES = BODIES, KNOTS, LENGTHS, PACKED = "bodies", "knots", "lengths", "packed"
+#: Arrays: parameters of the bodies, as JSON, the periods of the knots, and their undersides.
+UNDERSIDES = BODIES, KNOTS, PACKED = "bodies", "knots", "undersides"
 
 
-def pack_bodies(scene: Scene, knots: Sequence["Knot"]) -> dict[str, Array]:
+def pack_bodies(scene: Scene, knots: tuple[Knot, ...]) -> dict[str, Array]:
     """Return the arrays of the bodies of a scene and their undersides; none without bodies."""
     if not scene.bodies:
         return {}
-    parameters = [vars(each.body) for each in scene.bodies]
-    before, parts = np.zeros((), np.int32), []
-    for _, under in knots:
-        parts.append(zlib.compress((under - before).astype("<i4").tobytes(), 1))
-        before = under
+    parameters = json.dumps([vars(each.body) for each in scene.bodies])
+    changes = np.diff([under for _, under in knots], axis=0, prepend=0)
+    # All lowest bytes, then all higher ones: those repeat.
+    packed = zlib.compress(changes.astype("<i4").view(np.uint8).reshape(-1, 4).T.tobytes())
     return {
-        BODIES: np.frombuffer(json.dumps(parameters).encode(), np.uint8),
+        BODIES: np.frombuffer(parameters.encode(), np.uint8),
         KNOTS: np.array([period for period, _ in knots], np.int64),
-        LENGTHS: np.array([len(part) for part in parts], np.int64),
-        PACKED: np.frombuffer(b"".join(parts), np.uint8),
+        PACKED: np.frombuffer(packed, np.uint8),
     }
 
 
-def unpack_bodies(scene: Scene, arrays: Mapping[str, Array]) -> tuple[Scene, tuple["Knot", ...]]:
+def unpack_bodies(scene: Scene, arrays: Mapping[str, Array]) -> tuple[Scene, tuple[Knot, ...]]:
     """Return a scene with its bodies, and their undersides, from `pack_bodies`; ValueError if damaged."""
-    given = json.loads(arrays[BODIES].tobytes())
+    given, periods = json.loads(arrays[BODIES].tobytes()), arrays[KNOTS]
+    if not len(periods) or np.any(np.diff(periods) < 0):
+        raise ValueError("its undersides must have times that do not decrease")
     path = scene.fingers[0].trajectory
     bodies = tuple(Presser(import_part(*BODY)(**parameters), path) for parameters in given)
-    shape: tuple[int, ...] = (len(bodies), scene.cells)
-    under, knots = np.zeros(shape, np.int32), []
-    ends = list(accumulate(arrays[LENGTHS].tolist(), initial=0))
-    for period, start, end in zip(arrays[KNOTS].tolist(), ends[:-1], ends[1:], strict=True):
-        opened = zlib.decompressobj()
-        data = opened.decompress(arrays[PACKED][start:end].tobytes(), 4 * shape[0] * shape[1] + 1)
-        under = np.asarray(under + np.frombuffer(data, "<i4").reshape(shape), np.int32)
-        knots.append((period, under))
-    if not knots or np.any(np.diff(arrays[KNOTS]) < 0):
-        raise ValueError("undersides must have times that do not decrease")
-    return replace(scene, bodies=bodies), tuple(knots)
+    shape = len(periods), len(bodies), scene.cells
+    data = zlib.decompressobj().decompress(arrays[PACKED].tobytes(), 4 * int(np.prod(shape)) + 1)
+    changes = np.frombuffer(data, np.uint8).reshape(4, -1).T.tobytes()
+    under = np.cumsum(np.frombuffer(changes, "<i4").reshape(shape), axis=0, dtype=np.int32)
+    return replace(scene, bodies=bodies), tuple(zip(periods.tolist(), under, strict=True))
