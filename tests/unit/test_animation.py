@@ -136,6 +136,14 @@ def test_one_frame_is_refused(kind):
         animate(position, height[:1], RATE, Model(kind=kind))
 
 
+def test_a_skin_of_many_frames_is_refused_as_glb_whose_weights_grow_with_their_square(tmp_path):
+    position, height = move()
+    animation = animate(position, np.tile(height[0], (4001, 1)), RATE, Model(kind="surface"))
+    with pytest.raises(OutputError, match=r"at most 4000 frames \(got 4001\): choose usd or abc"):
+        write_animation(tmp_path / "skin.glb", animation, "glb", "mm")
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_a_row_of_pins_has_no_skin():
     position, height = move()
     assert animate(position[:5], height[:, :5], RATE, Model(kind="pins")).points.shape == (6, 5, 3)
@@ -167,7 +175,7 @@ MISTAKES = {
     "export my --animated usd --out my.toml": "my.toml cannot be written to: ",
     "export nowhere --animated usd": "nowhere is not the folder of a run",
     "export bare --animated usd": "bare has no history.npz",
-    "export row --animated usd": "--animated of a skin needs at least 2 x 2 cells (got 1 x 4)",
+    "export row --animated usd": "Surface must have at least 2 x 2 pins, in rows along x (got 1 x 4)",
 }
 
 

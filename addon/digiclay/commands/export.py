@@ -211,20 +211,18 @@ def _export_animated(arguments: Namespace) -> int:
         film = Film(rate=arguments.fps, start=arguments.start, stop=arguments.stop)
         run = read_run(arguments.run, "height", "position")
         moments = film.moments(run.history["time"])
-    if "surface" in kinds:
-        require_surface(run.scene, "--animated of a skin")
     time, height, position = (run.history[name] for name in ("time", "height", "position"))
     frames = np.column_stack([np.interp(moments, time, pin) for pin in height.T])
+    models = [model_of(arguments, run.scene, kind) for kind in kinds]
+    animations = [animate(position, frames, film.rate, model) for model in models]
     folder = arguments.out or arguments.run
     targets = [
-        (kind, name, folder / f"animated_{STEMS[kind]}{SUFFIXES[name]}")
-        for kind in kinds
+        (animation, name, folder / f"animated_{STEMS[kind]}{SUFFIXES[name]}")
+        for kind, animation in zip(kinds, animations, strict=True)
         for name in dict.fromkeys(arguments.animated)
     ]
     with claim_files([path for _, _, path in targets]):
-        for kind, name, path in targets:
-            model = model_of(arguments, run.scene, kind)
-            animation = animate(position, frames, film.rate, model)
+        for animation, name, path in targets:
             write_animation(path, animation, name, arguments.unit)
             say(arguments, path)
     return 0

@@ -53,6 +53,5 @@ def write_alembic(file: BinaryIO, animation: Animation, factor: float) -> None:
                 start=0,
                 end=len(points) - 1,
                 as_background_job=False,
-                uvs=False,
                 normals=False,
             )

@@ -5,6 +5,7 @@ from typing import BinaryIO, NamedTuple
 import numpy as np
 
 from ..base.arrays import Faces, Floats
+from ..base.errors import OutputError
 from ..files.tables import Record
 from .mesh_writer import CLAY, GlbArrays, add_triangles, turn_upright
 
@@ -22,6 +23,8 @@ class Animation(NamedTuple):
     """(v, 3): Vertices of one pin about its top, m; None: a skin."""
 
 
+#: Most frames of a skin in a GLB: each has a weight in every frame, together 64 MB.
+MOST_TARGETS = 4000
 USD_HEAD = """#usda 1.0
 (
     defaultPrim = "digiclay"
@@ -76,6 +79,9 @@ def write_glb(file: BinaryIO, animation: Animation, factor: float) -> None:
     """Write nodes that move, one per pin, or a skin with one morph target per frame, in meters, y up."""
     rate, points, faces, pin = animation
     arrays, count = GlbArrays(), len(points)
+    if pin is None and count > MOST_TARGETS:
+        rule = f"must have at most {MOST_TARGETS} frames (got {count}): choose usd or abc"
+        raise OutputError(f"An animated skin in a GLB {rule}.")
     paths = turn_upright(points.reshape(-1, 3)).reshape(points.shape)
     times = arrays.add(np.arange(count) / rate)
     part = add_triangles(arrays, points[0] if pin is None else pin, faces)
