@@ -149,7 +149,7 @@ def measure(arguments: argparse.Namespace, steps: Steps) -> Report:
             *tabulate(some, COLUMNS),
             "",
         ]
-        rows += some
+        rows += [*some, {**some[0], "parameter": "all", "inside": mean, "half": None}]
     refused = 0
     for number, seed in itertools.product(range(len(UNKNOWABLE)), range(repeats)):
         refused += not list_unnamed(number, seed)
