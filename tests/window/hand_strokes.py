@@ -262,8 +262,8 @@ def things(blender):
                 )
                 bpy.context.window_manager.digiclay_finger = size
             choose(blender, one)
-            # They were drawn on the surface as it was, when there was no base.
-            keys = ["key y sleep 0.1"] if number else []
+            # Older ones were drawn on the surface as it was, when there was no base.
+            keys = ["key y sleep 0.1"] if number and one.combine == "usual" else []
             yield from done(blender, hand(follow(blender, one, *keys)))
         yield from blender.until(lambda: not any(session.strokes for session in blender.sessions()))
         yield from blender.settle()
