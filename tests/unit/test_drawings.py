@@ -8,7 +8,7 @@ import pytest
 from digiclay.sessions import sculpting
 from digiclay.sessions.forming_device import find_device
 from digiclay.sessions.sculpting import change_stroke, queue_stroke
-from digiclay.strokes.nominal import find_ghosts
+from digiclay.strokes.queue_ghosts import find_ghosts
 from digiclay.strokes.stroke import ALONE, Brush, Combine, draw, lay_path, make_images, start
 
 from tests.assemble import assert_near

@@ -17,7 +17,8 @@ from digiclay.sessions.forming_device import find_device
 from digiclay.sessions.sculpting import queue_stroke
 from digiclay.strokes import drawn
 from digiclay.strokes.falloff import Falloff, evaluate
-from digiclay.strokes.nominal import Device, extend, find_ghosts, find_nominal
+from digiclay.strokes.nominal import Device, extend, find_nominal
+from digiclay.strokes.queue_ghosts import find_ghosts
 from digiclay.strokes.stroke import Brush, lay_path, make_images, start
 
 from tests.assemble import assert_near, refused_in_a_line, replayed, table

@@ -21,7 +21,8 @@ from digiclay.sessions.sculpting import queue_stroke
 from digiclay.strokes import drawn
 from digiclay.strokes.falloff import Falloff, evaluate
 from digiclay.strokes.locks import find_inside, find_locks, place_images
-from digiclay.strokes.nominal import Device, find_ghosts, find_nominal, find_radius
+from digiclay.strokes.nominal import Device, find_nominal, find_radius
+from digiclay.strokes.queue_ghosts import find_ghosts
 from digiclay.strokes.stamps import load_stamp
 from digiclay.strokes.stroke import Brush, Combine, lay_path, make_images, start
 from numpy.testing import assert_array_equal

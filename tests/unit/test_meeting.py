@@ -17,11 +17,13 @@ from digiclay.sessions.sculpting import queue_stroke, reset, rewind
 from digiclay.settings.devices import BEDS, make_scene
 from digiclay.strokes import drawn
 from digiclay.strokes.falloff import Falloff
-from digiclay.strokes.nominal import Device, extend, find_ghosts, find_nominal
+from digiclay.strokes.nominal import Device, extend, find_nominal
+from digiclay.strokes.queue_ghosts import find_ghosts
 from digiclay.strokes.stroke import (
     DRAGGING,
     SHALLOWEST,
     STAMPS,
+    UNLIMITED,
     Brush,
     Combine,
     lay_path,
@@ -248,8 +250,44 @@ def test_the_ghost_of_a_queue_counts_from_the_base_that_the_queue_sets():
     assert find_ghosts(strokes[:1], same, FLAT, kept)[0].nominal is kept[0].nominal
 
 
+@pytest.mark.parametrize(
+    "look",
+    [
+        pytest.param(
+            lambda crept: ((set_base(), lay(LINE)), device(OTHER), FLAT + crept), id="queued"
+        ),
+        pytest.param(lambda crept: ((lay(LINE),), device(OTHER + crept), FLAT), id="set"),
+    ],
+)
+def test_a_ghost_on_a_new_base_stays_while_pins_creep_but_not_in_small_steps_for_ever(look):
+    first = last = find_ghosts(*look(0.0))
+    for crept, stays in ((0.03e-3, True), (0.04e-3, True), (0.07e-3, False)):
+        last = find_ghosts(*look(crept), last)
+        assert (last[0].nominal is first[0].nominal) == stays
+
+
 def begin(count=31):
     return sculpting.begin_session(7, "Bed", scene(count), ABOVE)[0]
+
+
+@pytest.mark.parametrize(
+    "store, lost, has_base",
+    [
+        pytest.param(lambda session: None, "", True, id="nothing"),
+        pytest.param(lambda session: session.snapshot, "", True, id="the same parts"),
+        pytest.param(
+            lambda session: sculpting.change_scene(session, replace(session.scene, control=None))[0].snapshot,
+            "Only the heights", True, id="another method",
+        ),
+        pytest.param(lambda session: b"broken", "The bed begins at rest", False, id="no session"),
+    ],
+)  # fmt: skip
+def test_a_session_takes_up_a_base_unless_its_snapshot_is_refused(store, lost, has_base):
+    base, session = np.full(81, REST + 1e-3), begin(9)
+    again, words = sculpting.begin_session(7, "Bed", scene(9), ABOVE, store(session), base=base)
+    assert words.startswith(lost)
+    assert (words == "") == (lost == "")
+    np.testing.assert_array_equal(again.base, base if has_base else heights(again))
 
 
 def queue(session, *strokes):
@@ -375,6 +413,7 @@ def test_a_file_of_strokes_sets_a_base_and_limits():
     line = {"brush": "raise", "combine": "highest", "height": 6e-3, "path": "line"}
     moves = ((0.0, -9e-3, 0.0), (0.2, 9e-3, 0.0))
     strokes = [PointerStroke(**line, moves=moves), PointerStroke(**line, moves=moves)]
+    assert strokes[0].limits == UNLIMITED
     *_, once = play_strokes(begin(21), tuple(strokes))
     assert 1e3 * (heights(once).max() - REST) == pytest.approx(6.0, abs=0.01)
     strokes.insert(1, PointerStroke(brush="set_base"))

@@ -8,7 +8,8 @@ import pytest
 from digiclay.core.control.blister import Blister
 from digiclay.core.model.fingertip import Fingertip
 from digiclay.core.model.layout import Layout, make_grid
-from digiclay.strokes.nominal import Device, Ghost, extend, find_ghosts, find_nominal
+from digiclay.strokes.nominal import Device, extend, find_nominal
+from digiclay.strokes.queue_ghosts import Ghost, find_ghosts
 from digiclay.strokes.stroke import Brush, deepen, lay_path, lay_ring, make_images, start
 from numpy.testing import assert_array_equal
 

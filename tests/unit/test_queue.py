@@ -16,7 +16,7 @@ from digiclay.sessions.forming_device import find_device
 from digiclay.sessions.sculpting import change_stroke, queue_stroke, rewind
 from digiclay.settings.devices import BEDS, make_scene, scale_blister
 from digiclay.strokes import drawn
-from digiclay.strokes.nominal import find_ghosts
+from digiclay.strokes.queue_ghosts import find_ghosts
 from digiclay.strokes.stroke import Brush, lay_path, lay_ring, make_images, start
 from digiclay.strokes.sweep import estimate_time
 

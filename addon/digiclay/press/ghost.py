@@ -20,7 +20,7 @@ from ..core.surface.formed import take_corners
 from ..sessions import running
 from ..sessions.forming_device import find_device
 from ..sessions.running import Running
-from ..strokes.nominal import Ghost, find_ghosts
+from ..strokes.queue_ghosts import Ghost, find_ghosts
 from ..strokes.stroke import Stroke
 from .brush import find_bed
 

@@ -31,7 +31,6 @@ from ..strokes.stroke import (
     SHALLOWEST,
     STAMPS,
     SYMMETRIES,
-    UNLIMITED,
     Brush,
     Combine,
     Image,
@@ -51,8 +50,8 @@ RATE = 60.0
 PATIENCE = 300.0
 #: Keys of a file beside its strokes.
 TEXTS = ("name", "description", "bed")
-#: Limits of a stroke that has none, m.
-NO_LIMITS = (-1.0, 1.0)
+#: A limit as far from rest is none, m.
+FARTHEST = 1.0
 Move = tuple[float, float, float]
 #: Paths between two places.
 LAYS = {"line": lay_line, "ring": lay_ring}
@@ -94,10 +93,18 @@ class PointerStroke(Parameters):
         choices=tuple(combine.value.lower() for combine in Combine),
     )
     limit_low: float = quantity(
-        NO_LIMITS[0], "lowest that it forms above rest", unit="m", at_least=-1.0, at_most=1.0
+        -FARTHEST,
+        "lowest that it forms above rest",
+        unit="m",
+        at_least=-FARTHEST,
+        at_most=FARTHEST,
     )
     limit_high: float = quantity(
-        NO_LIMITS[1], "highest that it forms above rest", unit="m", at_least=-1.0, at_most=1.0
+        FARTHEST,
+        "highest that it forms above rest",
+        unit="m",
+        at_least=-FARTHEST,
+        at_most=FARTHEST,
     )
     accumulate: bool = quantity(
         False, "whether a path that comes back counts from what it has left there"
@@ -172,6 +179,12 @@ class PointerStroke(Parameters):
         """The path and its images."""
         center = self.center_x, self.center_y
         return make_images(self.symmetry.upper(), self.radial, center, math.radians(self.axis))
+
+    @property
+    def limits(self) -> tuple[float, float]:
+        """Lowest and highest that the stroke forms above rest, m; infinite: there is no limit."""
+        low = self.limit_low if self.limit_low > -FARTHEST else -math.inf
+        return low, self.limit_high if self.limit_high < FARTHEST else math.inf
 
     def size_finger(self, usual: Fingertip) -> Fingertip:
         """Return the fingertip of the stroke; what it leaves open is that of the bed."""
@@ -259,7 +272,6 @@ def _play(running: Running, stroke: PointerStroke, number: int) -> Iterator[Runn
         lagged.append(pull(lagged[-1], place, string))
     path = LAYS[stroke.path](places[0], places[-1]) if stroke.path in LAYS else lagged
     stamp = load_stamp(stroke.stamp) if stroke.kind in STAMPS else None
-    limits = stroke.limit_low, stroke.limit_high
     begun = start(0, *places[0], stroke.amount, stroke.images, stroke.kind, stroke.strength)
     begun = replace(
         begun,
@@ -267,7 +279,7 @@ def _play(running: Running, stroke: PointerStroke, number: int) -> Iterator[Runn
         stamp=stamp,
         falloff=stroke.shape,
         combine=Combine(stroke.combine.upper()),
-        limits=UNLIMITED if limits == NO_LIMITS else limits,
+        limits=stroke.limits,
         as_left=stroke.finish == "as_left",
     )
     running, queued = queue_stroke(running, lay_path(begun, path))

@@ -1,6 +1,7 @@
 """What sessions take up of snapshots: state, fingertips, base. No Blender."""
 
 from dataclasses import replace
+from typing import NamedTuple
 
 from ..core.base.arrays import Floats
 from ..core.base.errors import ParameterError, StateError
@@ -25,18 +26,26 @@ def fit_base(base: Floats | None, state: State) -> Floats:
     return surface if base is None or base.size != surface.size else base
 
 
-def load_state(system: System, stored: bytes | None) -> tuple[State, str]:
-    """Return the state to continue from, and what could not be taken up."""
+class Restored(NamedTuple):
+    """State to continue from, what of the stored one could not be taken up, and whether nothing could."""
+
+    state: State
+    lost: str = ""
+    refused: bool = False
+
+
+def load_state(system: System, stored: bytes | None) -> Restored:
+    """Return the state of a snapshot; None: at rest."""
     if stored is None:
-        return begin(system), ""
+        return Restored(begin(system))
     # The state of other parts has heights at least; what has none is of no use.
     refused = ""
     for read, words in ((snapshot.load, ""), (snapshot.transfer_heights, CHANGED)):
         try:
-            return read(system, stored), words and localize(words)
+            return Restored(read(system, stored), words and localize(words))
         except StateError as error:
             refused = localize("The bed begins at rest. {}", error)
-    return begin(system), refused
+    return Restored(begin(system), refused, refused=True)
 
 
 def change_fingers(

@@ -24,9 +24,8 @@ from ..strokes.pose import turn_image
 from ..strokes.stroke import FINISHING, RETURNING, Brush, Stroke
 from ..strokes.sweep import SWEEPS, finish, sweep
 from ..strokes.tracking import find_tracking
-from ..ui_text import localize
 from .forming_device import find_device, is_resized, suit_scene
-from .restored_states import CHANGED, Numbers, change_fingers, fit_base, load_state
+from .restored_states import Numbers, change_fingers, fit_base, load_state
 from .running import Gesture, Running, find_stroke, list_pressing, match_poses, name_fingers
 
 #: How many gestures can be taken back, and the most memory their states may take, bytes.
@@ -64,10 +63,11 @@ def begin_session(
     numbers = numbers or tuple(range(1, fingers + 1))
     whole = scene.with_fingers(len(numbers))
     system = assemble(whole)
-    state, lost = load_state(system, change_fingers(scene, system, stored, was or numbers, numbers))
+    stored = change_fingers(scene, system, stored, was or numbers, numbers)
+    state, lost, refused = load_state(system, stored)
     poses = live_session.clamp_pose(pose.reshape(-1, 7), system.cell.actuator.stroke)
     now = snapshot.dump(system, state)
-    base = fit_base(None if lost not in ("", localize(CHANGED)) else base, state)
+    base = fit_base(None if refused else base, state)
     running = Running(
         scene=scene,
         system=system,
@@ -279,7 +279,7 @@ def restore(
     stored = change_fingers(running.scene, running.system, stored, was, running.numbers)
     if was != running.numbers:
         poses = match_poses(poses, was, running.poses, running.numbers)
-    state, _ = load_state(running.system, stored)
+    state = load_state(running.system, stored).state
     now = snapshot.dump(running.system, state)
     base = fit_base(base, state)
     keep = running.recording

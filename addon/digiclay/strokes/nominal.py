@@ -11,6 +11,7 @@ import math
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
@@ -256,55 +257,75 @@ def returns(stroke: Stroke, first: int, index: int, width: float) -> bool:
     return bool((np.hypot(*(path - path[-1]).T)[far] < width - TIE).any())
 
 
+class End(NamedTuple):
+    """End of a short piece of a path: its sample, its place on an image, m, and the pins' height, m."""
+
+    sample: Sample
+    place: Place
+    top: float
+
+
 def _mark(nominal: Nominal, stroke: Stroke, device: Device, image: Image, index: int) -> None:
     """Bring pins about the path from a sample to the next one, `index`, to their heights, in place."""
+    level = device.find_level(stroke, image, nominal.before)
+    for start, end in pairwise(_divide_path(nominal, stroke, device, image, index, level)):
+        cells = _find_beside(device, start.place, end.place)
+        counted = device.find_start(stroke, nominal.ground)[cells]
+        ground = counted if level is None else nominal.ground[cells]
+        if device.blister is None:
+            under = find_undersides(device, stroke, image, end.sample.lean, end.place, cells)
+            change = end.top + under - ground
+            reached = change < 0.0
+        else:
+            distance, share = _measure(device.grid, cells, start.place, end.place)
+            reached = distance <= device.reach
+            if level is None:
+                full = start.top + share * (end.top - start.top) - ground
+            else:
+                first, last = start.sample.share, end.sample.share
+                full = (first + share * (last - first)) * (level - counted)
+            change = device.find_section(stroke.falloff, distance) * full
+        now = nominal.full[cells]
+        change, farther = _limit_change(stroke, change, now - ground)
+        formed = device.combine(stroke, nominal.before[cells], ground + change)
+        nominal.near[cells] = True
+        nominal.full[cells] = np.where(farther & reached, formed, now)
+
+
+def _divide_path(
+    nominal: Nominal, stroke: Stroke, device: Device, image: Image, index: int, level: float | None
+) -> list[End]:
+    """Return the ends of the pieces, at most a pitch long, from a sample to the next one, `index`."""
     last, sample = stroke.samples[max(index - 1, 0)], stroke.samples[index]
     length = math.hypot(sample.x - last.x, sample.y - last.y)
     parts = max(1, math.ceil(length / device.grid.layout.pitch - TIE))
-    row = [_between(last, sample, part / parts) for part in range(parts + 1)]
-    places = [image.place(point.x, point.y) for point in row]
-    level = device.find_level(stroke, image, nominal.before)
-    tops = [
-        device.find_top(stroke, point, at, nominal.ground, level)
-        for point, at in zip(row, places, strict=True)
-    ]
-    half = 0.5 * length / parts
+    ends = []
+    for part in range(parts + 1):
+        point = _between(last, sample, part / parts)
+        place = image.place(point.x, point.y)
+        top = device.find_top(stroke, point, place, nominal.ground, level)
+        ends.append(End(point, place, top))
+    return ends
+
+
+def _find_beside(device: Device, start: Place, end: Place) -> Cells:
+    """Return the pins about a piece of a path, m, but for those that nothing moves."""
+    middle = 0.5 * (start[0] + end[0]), 0.5 * (start[1] + end[1])
+    cells = device.grid.disc(*middle, device.reach + 0.5 * math.dist(start, end))
+    return cells if device.locked is None else cells[~device.locked[cells]]
+
+
+def _limit_change(stroke: Stroke, change: Floats, gone: Floats) -> tuple[Floats, Flags]:
+    """Return changes (m,), m, in the directions of a brush, and which are farther than pins have gone."""
     low, high = LIMITS[stroke.brush]
     low = 0.0 if stroke.combine is Combine.HIGHEST else low
     high = 0.0 if stroke.combine is Combine.LOWEST else high
-    for part, (start, end) in enumerate(pairwise(places)):
-        middle = 0.5 * (start[0] + end[0]), 0.5 * (start[1] + end[1])
-        cells = device.grid.disc(*middle, device.reach + half)
-        if device.locked is not None:
-            cells = cells[~device.locked[cells]]
-        counted = device.find_start(stroke, nominal.ground)[cells]
-        ground = counted if level is None else nominal.ground[cells]
-        now = nominal.full[cells]
-        if device.blister is None:
-            under = find_undersides(device, stroke, image, row[part + 1].lean, end, cells)
-            change = tops[part + 1] + under - ground
-            reached = change < 0.0
-        else:
-            distance, share = _measure(device.grid, cells, start, end)
-            reached = distance <= device.reach
-            section = device.find_section(stroke.falloff, distance)
-            if level is None:
-                full = tops[part] + share * (tops[part + 1] - tops[part]) - ground
-            else:
-                before, after = row[part].share, row[part + 1].share
-                full = (before + share * (after - before)) * (level - counted)
-            change = section * full
-        change = change.clip(low, high)
-        nominal.near[cells] = True
-        gone = now - ground
-        if low == 0.0:
-            farther = change > gone + TIE
-        elif high == 0.0:
-            farther = change < gone - TIE
-        else:
-            farther = np.abs(change) > np.abs(gone) + TIE
-        formed = device.combine(stroke, nominal.before[cells], ground + change)
-        nominal.full[cells] = np.where(farther & reached, formed, now)
+    change = change.clip(low, high)
+    if low == 0.0:
+        return change, change > gone + TIE
+    if high == 0.0:
+        return change, change < gone - TIE
+    return change, np.abs(change) > np.abs(gone) + TIE
 
 
 def weigh_path(stroke: Stroke, device: Device) -> Floats:
@@ -432,52 +453,3 @@ def find_undersides(
     pose = np.array([[*at, 0.0, *turn_image(lean_finger(turn, lean), image)]])
     forms = compute_forms(device.finger.outline(pose))
     return compute_underside(*forms, device.grid.compute_basis(cells))[0]
-
-
-#: Pins come so near to what was expected of the stroke before, m, that the ghosts of those after it
-#: stay.
-SAME = 0.05e-3
-
-
-@dataclass(frozen=True, eq=False)
-class Ghost:
-    """Stroke of a queue, and the nominal surface of it as far as it was drawn."""
-
-    stroke: Stroke
-    nominal: Nominal
-    #: What it was found with.
-    device: Device
-
-    def has_grown(self, stroke: Stroke, before: Floats, device: Device) -> bool:
-        """Tell whether the stroke of its number, on pins at heights (n,), m, is this one drawn on."""
-        if stroke.from_base and self.device.base is not device.base:
-            return False
-        if not np.array_equal(self.device.shares, device.shares):
-            return False
-        former, count = self.stroke, self.nominal.count
-        same = former.images == stroke.images and former.turn is stroke.turn
-        same = same and former.samples[count - 1 :][:1] == stroke.samples[count - 1 :][:1]
-        return same and float(np.abs(self.nominal.before - before).max()) < SAME
-
-
-def find_ghosts(
-    strokes: tuple[Stroke, ...], device: Device, height: Floats, former: tuple[Ghost, ...] = ()
-) -> tuple[Ghost, ...]:
-    """Return the ghosts of a queue's strokes that have one, on pins at heights (n,), m.
-
-    The `former` ones, of an earlier look, are drawn on: that takes less time than a whole path.
-    """
-    ghosts, numbered = list[Ghost](), {ghost.stroke.number: ghost for ghost in former}
-    for stroke in strokes:
-        if stroke.brush is Brush.SET_BASE:
-            device = replace(device, base=height)
-        if stroke.brush in LIMITS or stroke.placed:
-            before = height if stroke.height is None else stroke.height
-            suited, ghost = device.suit(stroke), numbered.get(stroke.number)
-            same = ghost is not None and ghost.has_grown(stroke, before, device)
-            nominal = ghost.nominal if ghost and same else find_nominal(stroke, suited, before)
-            if nominal.count < len(stroke.samples):
-                nominal = extend(nominal, stroke, suited)
-            ghosts.append(Ghost(stroke, nominal, device))
-            height = nominal.height
-    return tuple(ghosts)
