@@ -71,7 +71,17 @@ PICTURE = "pins.png"
 #: How a picture looks by default.
 STILL = Still(width=1600, height=1000, engine="cycles")
 #: What drawing needs of a history.
-ARRAYS = ("height", "force", "mode", "fingertip", "position", "total_force", "finger_force")
+ARRAYS = (
+    "height",
+    "force",
+    "mode",
+    "fingertip",
+    "position",
+    "total_force",
+    "finger_force",
+    "body",
+    "body_force",
+)
 #: Options of one kind of picture only; --rate is of both.
 OF_FILMS, OF_TURNTABLES = ("rate", "speed", "start", "stop", "strip"), ("rate", "frames")
 
@@ -136,12 +146,17 @@ def _looks(arguments: Namespace) -> Still | Turntable | Film:
 
 def sizes(scene: Scene) -> Record:
     """Return the sizes of the device for drawing."""
+    from ..core.shapes.body import read_body
     from ..device.instant import find_ellipsoids
 
+    absent = scene.bodies and not any(finger.fingertip for finger in scene.fingers)
     return {
         "pitch": scene.layout.pitch,
         "actuator": scene.actuator,
-        "finger": find_ellipsoids(scene),
+        "finger": () if absent else find_ellipsoids(scene),
+        "bodies": tuple(
+            read_body(each.body, f"body #{number}") for number, each in enumerate(scene.bodies, 1)
+        ),
     }
 
 

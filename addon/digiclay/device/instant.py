@@ -15,6 +15,7 @@ from ..core.base.modes import Mode
 from ..core.model.actuator import Actuator
 from ..core.model.fingertip import LEVEL, Fingertip
 from ..core.model.layout import Layout, make_grid
+from ..core.model.underside import Mesh
 from ..core.scene.schema import Scene
 from ..core.session import finished_run
 
@@ -47,6 +48,9 @@ class Instant:
     actuator: Actuator = field(default_factory=Actuator)
     #: Gives the semi-axes of the fingertip, or of each.
     finger: Fingertip | tuple[Fingertip, ...] = field(default_factory=Fingertip)
+    #: Meshes that press the pins, and their poses (b, 7).
+    bodies: tuple[Mesh, ...] = ()
+    body: Floats | None = None
 
     def __post_init__(self) -> None:
         for name in ARRAYS:
@@ -60,7 +64,8 @@ class Instant:
         rows = len(history["height"])
         if not -rows <= index < rows:
             raise OutputError(f"The history has {rows} rows, 0 to {rows - 1} (got {index}).")
-        taken = {name: np.asarray(history[name])[index] for name in ARRAYS if name != "position"}
+        names = [name for name in (*ARRAYS[1:], "body") if name in history]
+        taken = {name: np.asarray(history[name])[index] for name in names}
         return cls(position=np.asarray(history["position"]), **taken, **sizes)
 
     @classmethod

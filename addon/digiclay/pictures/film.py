@@ -24,7 +24,6 @@ from ..core.base.modes import Mode
 from ..core.files.run_folder import name_unfinished
 from ..core.files.tables import Table
 from ..core.session.render_settings import Film, Moving, Turntable, name_frame
-from ..device import view
 from ..device.instant import Instant
 from ..roles import fingertips_of
 from . import stage
@@ -147,7 +146,7 @@ def stage_film(
 
         def show(frame: int) -> None:
             row = int(rows[frame])
-            view.show(bed, Instant.of(history, row, **sizes))
+            stage.show(bed, Instant.of(history, row, **sizes))
             if chart is not None:
                 chart.show(float(time[row]), force[row])
 
@@ -189,9 +188,9 @@ def _visible_points(bed: Object, history: Mapping[str, Array], rows: Cells, size
         for level in (height.min(axis=0), height.max(axis=0))
     ]
     for at in extremes:
-        view.show(bed, Instant(**{**vars(instant), "fingertip": poses[at]}))
+        stage.show(bed, Instant.of(history, int(rows[at]), **sizes))
         clouds.append(stage.outline(bed))
-    view.show(bed, instant)
+    stage.show(bed, instant)
     return np.concatenate(clouds)
 
 

@@ -9,6 +9,7 @@ from .. import bridge
 from ..compat import Object, Scene, bpy, shader_nodes
 from ..core.base.arrays import Floats
 from ..core.base.modes import Mode
+from ..core.model.fingertip import make_matrices
 from ..device import parts, view
 from ..device.instant import Instant
 from .legend import Front, write_force_legend, write_mode_legend
@@ -20,6 +21,8 @@ Margins = tuple[float, float, float, float]
 #: Parts of the picture's width or height kept free: left, right, below, above; beside a legend,
 #: and without one.
 MARGINS, BARE = (0.25, 0.03, 0.05, 0.05), (0.05, 0.05, 0.05, 0.05)
+#: Property with the number of a body.
+BODY = "digiclay_body"
 #: sRGB of the floor.
 FLOOR = (0.80, 0.81, 0.82)
 
@@ -50,6 +53,36 @@ def set_up(
     elif view.read_coloring(bed) == "mode":
         write_mode_legend(front, instant.modes if modes is None else modes)
     return front
+
+
+def add_bodies(scene: Scene, bed: Object, instant: Instant) -> None:
+    """Add the bodies of an instant, at their poses over a bed."""
+    for number, body in enumerate(instant.bodies):
+        faces = list(map(tuple, body.triangles.tolist()))
+        mesh = bridge.mesh("Digital Clay Body", (body.vertices * bridge.SCALE, faces))
+        mesh.materials.append(parts.material("body", parts.SKIN, roughness=0.6))
+        made = bpy.data.objects.new(mesh.name, mesh)
+        made.parent, made[BODY] = bed, number
+        scene.collection.objects.link(made)
+    _place_bodies(bed, instant)
+
+
+def show(bed: Object, instant: Instant) -> None:
+    """Show another instant of the same bed, with its bodies."""
+    view.show(bed, instant)
+    _place_bodies(bed, instant)
+
+
+def _place_bodies(bed: Object, instant: Instant) -> None:
+    """Put the bodies over a bed to the poses of an instant."""
+    for part in bed.children:
+        if instant.body is not None and BODY in part:
+            pose, matrix = instant.body[part[BODY]], np.eye(4)
+            matrix[:3, :3], matrix[:3, 3] = (
+                make_matrices(pose[None, 3:])[0],
+                pose[:3] * bridge.SCALE,
+            )
+            part.matrix_basis = matrix.T.tolist()
 
 
 def choose_margins(bed: Object) -> Margins:

@@ -39,6 +39,7 @@ def stage_bed(
         bed = view.build(instant, scene.collection, lowest)
         view.color_by(bed, looks.color)
         view.show_arrows(bed, looks.arrows)
+        stage.add_bodies(scene, bed, instant)
         yield scene, bed
 
 
