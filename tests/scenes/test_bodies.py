@@ -17,7 +17,7 @@ from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.scene_source import Setting, load
 from digiclay.core.scene.toml_table import format_scene, resolve, tabulate
 from digiclay.core.session import snapshot
-from digiclay.core.session.accuracy import Replay, estimate_errors, make_reference
+from digiclay.core.session.accuracy import Replay, estimate_errors
 from digiclay.core.session.finished_run import HISTORY_ARRAYS, read_run
 from digiclay.core.session.run_scene import run, save
 from digiclay.core.shapes.body import pack_mesh
@@ -93,7 +93,8 @@ def test_a_mesh_of_a_ball_is_a_fingertip_of_its_size():
         0.0,
         1e-3,
     )
-    under = PathUndersides((moved,), grid, np.array([0.0, 5e-3]), 0.1).find(0).start[0]
+    under = PathUndersides((moved,), grid, np.array([0.0, 5e-3]), 0.1)
+    under = under.find(0).at(0, np.arange(grid.count))[0]
     tip = Fingertip(12e-3, 12e-3, 12e-3)
     pose = np.array([[1e-3, 2e-3, 35e-3, 1.0, 0.0, 0.0, 0.0]])
     exact = compute_underside(
@@ -237,6 +238,30 @@ def test_a_fingertip_on_a_pin_that_a_body_presses_is_capped_too():
     assert both.history["force"][:, middle].max() < 1.7
 
 
+def test_a_fingertip_relaxes_while_a_body_hovers_over_its_pins():
+    places = ((0, 42), (0.1, 39), (0.2, 60), (0.6, 60), (0.7, 39), (0.9, 39))
+    twice = {"trajectory": path(*((time, 0, 0, height * 1e-3) for time, height in places))}
+    away = path(
+        (0, 0, 0, 0.07),
+        (0.25, 0, 0, 0.07),
+        (0.3, 0, 0, 0.05005),
+        (0.6, 0, 0, 0.05005),
+        (0.62, 0, 0, 0.07),
+    )
+    alone = run(replace(resolve(table(**twice)), control=None))
+    both = run(replace(resolve(table(body(BOX, away), **twice)), control=None))
+    assert both.metrics["bodies"][0]["max_total_force"] == 0.0
+    assert both.history["finger_force"] == pytest.approx(alone.history["total_force"], abs=1e-9)
+
+
+def test_pins_beside_a_body_that_stops_suddenly_are_not_touched():
+    # Within 0.1 s, the longest time between two undersides, the path bends by 40 mm.
+    way = path((0, 0, 0, 0.23), (0.05, 0, 0, 0.111), (0.3, 0, 0, 0.111))
+    full = {"actuator": {"rest_height": 0.1}, "simulation": {"duration": 0.3}}
+    done = run(replace(resolve(table(body(BOX, way), **full)), control=None))
+    assert done.history["force"].max() == 0.0
+
+
 def press_on(scene, state, system, count):
     """Return the state after more control periods."""
     *_, last = periods(system, scene.trajectories(), state, count)
@@ -259,14 +284,15 @@ def test_a_stored_state_in_mid_press_goes_on_to_the_last_bit(others):
 
 def test_the_error_estimate_covers_the_error():
     way = path((0, -20e-3, 0, 44e-3), (0.15, 10e-3, 5e-3, 43e-3))
-    scene = resolve(table(body(hand(), way)))
+    scene = resolve(table(body(hand(), way, travel=8e-3)))
     done = run(scene)
-    fine = make_reference(replace(scene, simulation=scene.simulation.refined(5)))
+    bodies = tuple(replace(each, body=replace(each.body, travel=0.0)) for each in scene.bodies)
+    fine = replace(scene, simulation=scene.simulation.refined(20), bodies=bodies, control=None)
     system = assemble(fine)
     system = replace(system, controller=Replay(system.grid, done.history["command"]))
     exact = [state.row(0) for state in periods(system, scene.trajectories(), begin(system), 30)]
     error = np.abs(exact - done.history["height"][1:]).max()
-    assert 1e-6 < error < estimate_errors(scene, done.history).height < 1e-4
+    assert 1e-6 < error < estimate_errors(scene, done.history).height < 1e-3
 
 
 @pytest.mark.parametrize("stepper", ["richardson", "runge_kutta_4"])

@@ -38,21 +38,22 @@ FAR = (0.0, 0.0, 0.0, 1e9, 0.0, 1.0)
 
 
 class Stretch(NamedTuple):
-    """Undersides of bodies over all cells in a control period: lines in time, and deviations from them."""
+    """Undersides of bodies over all cells in a control period: lines in time, on bodies that rise."""
 
     start: Floats
     end: Floats
     low: Floats
-    """(b, n): At the ends of the lines, m, and the lower ends; inf where nothing is above a pin."""
+    """(b, n): At the ends of the lines, m, and the lower ends."""
     parts: Floats
-    bend: Floats
-    """(b, p): Of the period's instants on these lines, 0 to 1; rise of the bodies beyond the lines, m."""
+    rise: Floats
+    """(b, p): Of the period's instants on these lines, 0 to 1; height of the bodies then, m."""
 
     def at(self, bodies: Cells | int, cells: Cells) -> Floats:
         """Return the undersides of bodies over cells (k,), (p, k), m."""
-        start, end, low = (rows[bodies, cells] for rows in self[:3])
-        parts, bend = (rows[bodies].T.reshape(rows.shape[1], -1) for rows in self[3:])
-        return np.where(low < np.inf, start + parts * (end - start) + bend, start)
+        start, end = self.start[bodies, cells], self.end[bodies, cells]
+        parts, rise = (rows[bodies].T.reshape(rows.shape[1], -1) for rows in self[3:])
+        under: Floats = start + parts * (end - start) + rise
+        return under
 
 
 class Undersides(Protocol):
@@ -93,9 +94,11 @@ class PathUndersides:
     def __init__(
         self, bodies: tuple[MovedMesh, ...], grid: Grid, instants: Floats, ceiling: float
     ) -> None:
-        self._bodies, self._grid, self._ceiling = bodies, grid, ceiling
+        self._bodies, self._grid = bodies, grid
         self._period, self._instants = float(instants[-1]), instants
         self._strides = [body.count_periods(self._period) for body in bodies]
+        # Above its origin, what is no part of a body and stays above the ceiling.
+        self._beyond = [ceiling - float(body.trajectory.positions[:, 2].min()) for body in bodies]
         self._known: list[dict[bytes, Floats]] = [{} for _ in bodies]
         self._lines: tuple[list[int], tuple[Floats, Floats, Floats]] | None = None
 
@@ -104,23 +107,15 @@ class PathUndersides:
         numbers = [period // stride for stride in self._strides]
         if self._lines is None or self._lines[0] != numbers:
             start, end = (
-                np.stack([self._compute(body, at + more) for body, at in enumerate(numbers)])
+                np.stack([self._compute(body, at + more)[0] for body, at in enumerate(numbers)])
                 for more in (0, 1)
             )
-            low = np.minimum(start, end)
-            low[low >= self._ceiling] = np.inf
-            self._lines = numbers, (start, end, low)
+            self._lines = numbers, (start, end, np.minimum(start, end))
         strides = np.array(self._strides)[:, None]
         parts = (period % strides + self._instants / self._period) / strides
         moments = period * self._period + self._instants
-        bend = []
-        for body, number, stride, part in zip(
-            self._bodies, numbers, self._strides, parts, strict=True
-        ):
-            ends = np.array([number, number + 1]) * stride * self._period
-            start, end, *heights = body.trajectory.poses(np.append(ends, moments))[:, 2]
-            bend.append(heights - (start + part * (end - start)))
-        return Stretch(*self._lines[1], parts, np.array(bend))
+        rise = [body.trajectory.poses(moments)[:, 2] for body in self._bodies]
+        return Stretch(*self._lines[1], parts, np.array(rise))
 
     def find_lowest(self, period: int) -> Floats:
         """Return the lowest undersides from a period on for the time `AHEAD`, (b, n), m."""
@@ -128,33 +123,25 @@ class PathUndersides:
         for body, stride in enumerate(self._strides):
             last = math.ceil((period + AHEAD / self._period) / stride)
             each = [self._compute(body, at) for at in range(period // stride, last + 1)]
-            lowest.append(np.minimum.reduce(each))
+            lowest.append(np.minimum.reduce([under + height for under, height in each]))
         return np.stack(lowest)
 
-    def _compute(self, number: int, at: int) -> Floats:
-        """Return the underside of a body at a multiple of its periods, (n,), m, at most the ceiling."""
-        body, known, time = (
-            self._bodies[number],
-            self._known[number],
-            self._strides[number] * self._period,
-        )
+    def _compute(self, number: int, at: int) -> tuple[Floats, float]:
+        """Return the underside of a body at a multiple of its periods over its origin, (n,), and that, m."""
+        body, time = self._bodies[number], self._strides[number] * self._period
+        known, beyond = self._known[number], self._beyond[number]
         (pose,) = body.trajectory.poses(np.array([at * time]))
+        height, pose[2] = float(pose[2]), 0.0
         under = known.pop(pose.tobytes(), None)
         if under is None:
             vertices = body.mesh.vertices @ make_matrices(pose[None, 3:])[0].T + pose[:3]
-            under = rasterize(
-                vertices,
-                body.mesh.triangles,
-                self._grid,
-                body.samples,
-                body.tip_radius,
-                self._ceiling,
-            )
-            np.minimum(under, self._ceiling, out=under)
+            triangles, tip = body.mesh.triangles, body.tip_radius
+            under = rasterize(vertices, triangles, self._grid, body.samples, tip, beyond)
+            np.minimum(under, beyond, out=under)
         known[pose.tobytes()] = under  # the last one used is the last one to go
         if len(known) > 4 + AHEAD / time:
             del known[next(iter(known))]
-        return under
+        return under, height
 
 
 #: Unit of given undersides, m: whole numbers of it are packed well, and all are exact.
@@ -211,7 +198,7 @@ class BodyPeriod:
     def near(self, height: Floats) -> Flags:
         """Return which of all pins with heights (n,), m, the bodies touch, (b, n)."""
         stretch = self.undersides.find(self.number)
-        return stretch.low + stretch.bend.min(axis=1, keepdims=True) <= height
+        return stretch.low + stretch.rise.min(axis=1, keepdims=True) <= height
 
 
 @dataclass(frozen=True, eq=False)
