@@ -8,7 +8,9 @@ from pathlib import Path
 import bpy
 import numpy as np
 import pytest
+import trimesh
 from bpy_extras.object_utils import world_to_camera_view
+from digiclay.bridge import SCALE
 from digiclay.cli import main
 from digiclay.commands.gallery import WIDTH as THUMBNAIL
 from digiclay.commands.job_steps import Work, find_frames, is_done
@@ -24,11 +26,13 @@ from digiclay.core.scene.toml_table import resolve
 from digiclay.core.session.finished_run import read_run
 from digiclay.core.session.render_settings import Film, Still, Turntable, list_missing, name_frame
 from digiclay.core.session.run_scene import run as simulate
+from digiclay.core.shapes.body import pack_mesh
 from digiclay.core.studies.job_table import read_outputs
 from digiclay.device.instant import Instant
 from digiclay.pictures import film, still
 from digiclay.pictures.film import draw_frames, stage_film
-from digiclay.roles import BED, ROLE, ellipsoid, fingertips_of
+from digiclay.pictures.stage import BODY
+from digiclay.roles import BED, FINGERTIP, ROLE, ellipsoid, fingertips_of
 
 from tests.blender.at_hand import film_strip, inventory, read_picture
 
@@ -414,3 +418,24 @@ def test_frames_drawn_in_ranges_are_those_of_the_film(here, capsys):
         assert main(["job", str(JOB), *part]) == 0
         assert " already" in capsys.readouterr().out
     assert (RUN / "film.mp4").stat().st_mtime_ns == made
+
+
+def test_a_body_is_drawn_at_its_pose_and_a_fingertip_that_is_absent_is_not():
+    ball = trimesh.creation.icosphere(1, radius=4e-3)
+    points = [
+        {"time": 0.0, "position": [0.0, 0.0, 0.045]},
+        {"time": 0.5, "position": [3e-3, 0.0, 0.042], "orientation": [0.0, 0.0, 0.0, 1.0]},
+    ]
+    body = {"mesh": pack_mesh(ball.vertices, ball.faces), "trajectory": {"waypoints": points}}
+    bed = {"layout": {"rows": 5, "columns": 5}, "control": {"method": "plastic"}}
+    done = simulate(resolve({**bed, "body": [body]}))
+    looks = Film(**SMALL, strip=False)
+    with stage_moving(done.scene, done.history, looks) as shots:
+        shots.show(shots.count - 1)
+        shots.scene.view_layers[0].update()
+        (drawn,) = [part for part in shots.scene.objects if BODY in part]
+        pose = done.history["body"][looks.rows(done.history["time"])[-1], 0]
+        assert np.allclose(drawn.matrix_world.translation, pose[:3] * SCALE, atol=1e-6)
+        assert np.allclose(np.abs(drawn.matrix_world.to_quaternion()), pose[3:], atol=1e-6)
+        assert len(drawn.data.polygons) == len(ball.faces)
+        assert not [part for part in shots.scene.objects if part.get(ROLE) == FINGERTIP]
