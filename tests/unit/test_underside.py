@@ -167,21 +167,6 @@ def test_what_is_no_body_is_refused(vertices, triangles, rule):
     assert str(caught.value).startswith("body 2.mesh must")
 
 
-@pytest.mark.parametrize(
-    "samples, radius, rule",
-    [
-        (2, 1e-3, "odd"),
-        (0, 1e-3, "odd"),
-        (-1, 1e-3, "odd"),
-        (101, 1e-3, "99"),
-        (3, -1e-3, "at least 0"),
-        (3, np.nan, "finite"),
-        (3, np.inf, "finite"),
-    ],
-)
-def test_odd_samples_and_radii_are_refused(samples, radius, rule):
-    bed = make_grid(Layout(3, 3))
-    with pytest.raises(ParameterError, match=rule):
-        rasterize(TRIANGLE, np.array([[0, 1, 2]]), bed, samples, radius)
+def test_vertices_that_are_no_numbers_are_refused_at_each_instant():
     with pytest.raises(ParameterError, match="vertex 2 at nan"):
-        rasterize(TRIANGLE * [[1], [1], [np.nan]], np.array([[0, 1, 2]]), bed)
+        rasterize(TRIANGLE * [[1], [1], [np.nan]], np.array([[0, 1, 2]]), make_grid(Layout(3, 3)))

@@ -206,6 +206,10 @@ ODD = {
         lambda ball: setattr(ball.data.vertices[7], "co", (np.nan, 0.0, 0.0)),
         lambda ball: setattr(ball.data.vertices[7], "co", (0.0, 0.0, 0.0)),
     ),
+    "samples must be odd (got 4)": (
+        lambda ball: setattr(ball.digiclay.presser, "samples", 4),
+        lambda ball: setattr(ball.digiclay.presser, "samples", 3),
+    ),
     "follows a fingertip": (
         lambda ball: setattr(ball[PRESSES].digiclay, "method", "virtual_master"),
         lambda ball: setattr(ball[PRESSES].digiclay, "method", "elastic"),

@@ -108,16 +108,9 @@ def rasterize(
     Raises
     ------
     ParameterError
-        For vertices that are not finite, or samples or a radius out of range.
+        For vertices that are not finite.
     """
     points = check_vertices(vertices)
-    if samples % 2 == 0 or not 0 < samples <= MOST_SAMPLES:
-        rule = f"must be an odd number from 1 to {MOST_SAMPLES}, one of which is on the axis"
-        raise ParameterError("body", "samples", rule, f"{samples}")
-    if not 0.0 <= tip_radius < np.inf:
-        raise ParameterError(
-            "body", "tip_radius", "must be finite and at least 0 m", f"{tip_radius} m"
-        )
     count = samples if tip_radius > 0.0 else 1
     middle, plan, (left, bottom) = count // 2, grid.layout, grid.corner
     rows, columns = plan.rows * count, plan.columns * count
