@@ -148,6 +148,9 @@ BENCHMARKS = {
     "several_fingers": Benchmark(
         "several_fingers.measure", "what several fingertips cost, and two near each other feel"
     ),
+    "hand": Benchmark(
+        "yielding_hands.measure", "the methods under prescribed paths and under yielding hands"
+    ),
     "kernels": Benchmark(
         "kernels.measure",
         "sessions on other kernels of numpy's library: what the last bit changes",
