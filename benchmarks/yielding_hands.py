@@ -11,13 +11,8 @@ from digiclay_study.method_trials import place_trial
 
 from .report import Report, Row, Steps, tabulate
 
-#: Prescribed paths, and hands within the range of the literature and at its ends.
-HANDS = {
-    "none": None,
-    "soft": Hand(mass=6e-3, damping=2.0, stiffness=200.0),
-    "default": Hand(),
-    "stiff": Hand(mass=3e-3, damping=5.0, stiffness=800.0),
-}
+#: Prescribed paths, and a hand of the default values.
+HANDS = {"none": None, "default": Hand()}
 TRAJECTORIES = ("session", "ridge-15", "surface", "valley", "lift")
 METHODS = {"I": "virtual_master", "II": "cell_states", "III": "hybrid"}
 #: Columns of the table.
@@ -38,11 +33,9 @@ def measure(arguments: argparse.Namespace, steps: Steps) -> list[Report]:
         row: dict[str, object] = {"trajectory": trajectory, "hand": name}
         rfd = {}
         for number, method in METHODS.items():
-            scene = load(
-                find("ridge_mound_valley"), [Setting("control.method", method, "benchmark")]
-            )
+            scene = load(find("ridge_mound_valley"), [Setting("control.method", method)])
             placed, judge = place_trial(scene.with_sections(hand=HANDS[name]), trajectory)
-            figures = (judge(placed) or {})["figures"]
+            figures = (judge(placed, None) or {})["figures"]
             rfd[number] = math.inf if figures["rfd"] is None else figures["rfd"]
             row |= {f"{method}_N": figures["rfd"], f"{method}_losses": figures["losses"]}
         rows.append({**row, "ranking": ", ".join(sorted(rfd, key=lambda each: rfd[each]))})

@@ -30,7 +30,7 @@ from digiclay.core.scene.scene_source import Setting
 from .doors import Doors
 from .protocol import LIMITS, MOST_FINGERS, VARIABLE, Limits, choose_token, describe_bed, pack_frame
 from .real_time_loop import run_session
-from .served_session import PartWriter, begin_session, make_frame
+from .served_session import PartWriter, begin_session, hold_softly, make_frame
 from .tracked_fingers import Tracking
 
 EXAMPLES = f"""\
@@ -95,7 +95,7 @@ def add(commands: Any) -> None:
         ),
         "--coupling N/MM": (
             _within(0.0, 1e3, "N/mm"),
-            "spring between tracked and simulated fingertip",
+            "stiffness of the hand: fingertips yield; default: the scene's",
             0.0,
         ),
         "--out DIR": (Path, "record a take into this folder"),
@@ -131,12 +131,13 @@ def carry_out(arguments: argparse.Namespace) -> int:
     scene, _ = scene_of(arguments)
     if arguments.fingers is not None:
         scene = replace(scene, fingers=scene.fingers[:1] * arguments.fingers)
+    if arguments.coupling:
+        scene = hold_softly(scene, 1e3 * arguments.coupling)
     limits = Limits(arguments.most_force, 1e-3 * arguments.most_speed, arguments.silence)
     by_hand = (
         1e-3 * arguments.lift,
         1e-3 * arguments.clutch,
         arguments.filter,
-        1e3 * arguments.coupling,
     )
     session = begin_session(scene, limits, Tracking(*by_hand))
     bed, host = describe_bed(scene, session.system, session.limits), arguments.host

@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 from functools import cache
 from itertools import groupby, pairwise
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from digiclay.core.base.arrays import Floats
@@ -26,9 +25,8 @@ from digiclay.core.engine.simulation import begin
 from digiclay.core.engine.system import System
 from digiclay.core.files.run_folder import Content, claim_folder, make_folder, write_whole
 from digiclay.core.files.tables import Record
-from digiclay.core.model.contact import Contact
-from digiclay.core.model.fingertip import Fingertip, compute_forms, compute_underside
 from digiclay.core.model.trajectory import interpolate_poses, sample_poses
+from digiclay.core.model.yielding_hand import Hand
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.schema import Scene
 from digiclay.core.session import accuracy, live_session, snapshot
@@ -41,7 +39,6 @@ from .tracked_fingers import (
     CLEAR,
     PARKED,
     TRACKING,
-    Around,
     Felt,
     Tracking,
     Tracks,
@@ -79,8 +76,6 @@ class Session(live_session.LiveSession):
     #: Of fingers with identities, after so many messages with them.
     tracks: Tracks
     named: int = 0
-    #: (f, k): filters of what has relaxed of their forces, N.
-    relaxed: Floats
 
 
 def begin_session(scene: Scene, limits: Limits = LIMITS, tracking: Tracking = TRACKING) -> Session:
@@ -116,8 +111,12 @@ def _begin_at_rest(
         tracking=tracking,
         monitor=monitor,
         tracks=begin_tracks(poses),
-        relaxed=np.zeros((len(poses), _read_pulp(scene)[1].size)),
     )
+
+
+def hold_softly(scene: Scene, stiffness: float) -> Scene:
+    """Return the scene with hands that are springs of a stiffness, N/m: a virtual coupling."""
+    return scene.with_sections(hand=Hand(mass=1e-9, damping=0.0, stiffness=stiffness))
 
 
 def lacks_pose(session: Session, order: Order, silence: float) -> bool:
@@ -137,15 +136,11 @@ def aim(
     targets, clear = session.poses.copy(), math.inf
     if order.named:
         tracks, time = session.tracks, count * session.system.period
-        felt = feel(session, time)
+        felt = feel(session)
         if order.named != session.named:
             tracks = name_fingers(tracks, order.fingers)
         tracks, targets = advance(tracks, session.tracking, felt, time)
-        _, rates = _read_pulp(session.scene)
-        relaxed = session.relaxed - np.expm1(-time * rates) * (
-            felt.tension[:, None] - session.relaxed
-        )
-        session = replace(session, tracks=tracks, named=order.named, relaxed=relaxed)
+        session = replace(session, tracks=tracks, named=order.named)
         clear = felt.peak + CLEAR
     if order.pose is not None:
         targets[0] = order.pose
@@ -154,41 +149,18 @@ def aim(
     return session, targets, clear
 
 
-def feel(session: Session, time: float) -> Felt:
-    """Return what the fingertips feel, by the laws of the first, before a time, s."""
-    state, system, poses = session.state, session.system, session.poses
-    first, heights, force = session.scene.fingers[0], state.row(0), state.finger_forces()
-    law = first.contact or Contact()
-    tip = first.fingertip or Fingertip()
+def feel(session: Session) -> Felt:
+    """Return what the fingertips are near to."""
+    system, poses, heights = session.system, session.poses, session.state.row(0)
     peak = float(heights.max())
-    # What grows is the tension: the force and what has relaxed of it meanwhile; none over the clay.
-    tension = np.where(force > 0.0, force + session.relaxed @ _read_pulp(session.scene)[0], 0.0)
 
-    def look() -> Around:
+    def look() -> Floats:
         basis = system.grid.compute_basis(np.arange(system.grid.count))
         near = measure_square(poses[:, 0], poses[:, 1], basis) < AROUND**2
-        (cells,) = np.logical_or.reduce(near).nonzero()
-        near, basis, tops = near[:, cells], basis[:, cells], heights[cells]
-        pressed = near @ (1.0 * (state.row(system.rows.force)[cells] > 0.0))
-        highest = np.where(near.any(1), np.where(near, tops, 0.0).max(1, initial=0.0), peak)
+        tops = np.where(near, heights, 0.0).max(1)
+        return np.where(near.any(1), tops, peak)
 
-        def meet(there: Floats) -> Any:
-            under = compute_underside(*compute_forms(tip.outline(there)), basis)
-            return there[:, 2] + (tops - under).max(1, initial=-math.inf)
-
-        # Twice what the tension grows by never swings.
-        stiffness = 2.0 * (law.exponent * tension + law.stiffness * law.share * pressed)
-        return Around(stiffness, highest, meet)
-
-    return Felt(
-        poses, force, tension, 1.0 / law.exponent, peak, cache(look), session.limits.speed * time
-    )
-
-
-def _read_pulp(scene: Scene) -> tuple[Floats, Floats]:
-    """Return shares and rates, 1/s, of the filters of the first finger's relaxation, (k,)."""
-    pulp = scene.fingers[0].relaxation
-    return (pulp.shares, pulp.rates[:, 0]) if pulp else (np.zeros(0), np.zeros(0))
+    return Felt(poses, peak, cache(look))
 
 
 def follow(
@@ -275,7 +247,8 @@ def make_frame(session: Session, flags: int = 0) -> Frame:
     each = state.finger_forces() if system.fingers > 1 else np.array([total])
     if session.behind:
         flags |= Flag.POSE_LIMITED
-    if exceeds_law(system, state, session.pose):
+    tips = session.tips
+    if exceeds_law(system, state, tips[0]):
         flags |= Flag.BEYOND_A_FINGER
     if (largest := float(each.max())) > most:
         flags |= Flag.FORCE_LIMITED
@@ -285,12 +258,10 @@ def make_frame(session: Session, flags: int = 0) -> Frame:
         total = total * share if system.fingers > 1 else most
     pins = state.row(0).astype(np.float32), forces.astype(np.float32)
     time = state.period * system.period
-    rows = session.tracks.identities.tolist(), each.tolist(), map(tuple, session.poses.tolist())
+    rows = session.tracks.identities.tolist(), each.tolist(), map(tuple, tips.tolist())
     fingers = tuple(zip(*rows, strict=True)) if system.fingers > 1 else ()
     errors = session.errors and (session.errors.height, session.errors.force)
-    return Frame(
-        state.period, session.number, time, total, session.poses[0], *pins, flags, fingers, errors
-    )
+    return Frame(state.period, session.number, time, total, tips[0], *pins, flags, fingers, errors)
 
 
 #: Most parts that wait for the disk.

@@ -1,7 +1,7 @@
 """Tracked fingers: poses with identities, which are off, late and trembling, to aims of fingertips.
 
-A tracked pose goes through a clutch, a filter and a virtual coupling; each is a pure function of
-arrays with one row per finger. No clock, no bed: `served_session` has both.
+A tracked pose goes through a clutch and a filter; each is a pure function of arrays with one row
+per finger. No clock, no bed: `served_session` has both. A finger yields as its hand does.
 """
 
 import math
@@ -14,9 +14,8 @@ from digiclay.core.base.arrays import Flags, Floats, Indices
 
 #: Height of a fingertip that is not there, m; whatever is as high is simulated at next to no cost.
 PARKED = 1.0
-#: Height over the highest pin from which on a fingertip goes anywhere without touching, m; how
-#: often a second a pin that is felt comes in by `growth`.
-CLEAR, CREEP = 5e-3, 20.0
+#: Height over the highest pin from which on a fingertip goes anywhere without touching, m.
+CLEAR = 5e-3
 #: A finger is no farther aside from where it was named last, m, and m per s since, and no finger is
 #: nearer to another, m: what is farther has another one's name, or is none. Nothing tracked is
 #: farther from the bed, m.
@@ -35,40 +34,20 @@ class Tracking:
     clutch: float = 0.0
     #: Least cutoff of the 1-euro filter (Casiez, Roussel, Vogel 2012), Hz.
     cutoff: float = 0.0
-    #: Spring between tracked and simulated fingertip, N/m.
-    coupling: float = 0.0
 
 
 TRACKING = Tracking()
 
 
-class Around(NamedTuple):
-    """Pins around the fingertips: one row per finger."""
-
-    #: (f,): how much the force grows with depth at once, N/m; highest pin, m, of the bed where
-    #: there is none.
-    stiffness: Floats
-    top: Floats
-    #: Heights (k,), m, at which fingertips at poses (k, 7) touch a pin first.
-    meet: Callable[[Floats], Floats]
-
-
 class Felt(NamedTuple):
-    """What the fingertips feel: one row per finger."""
+    """What the fingertips are near to: one row per finger."""
 
-    #: (f, 7), simulated.
+    #: (f, 7), intended by the simulated hand.
     poses: Floats
-    #: (f,), N; and with what has relaxed of it.
-    force: Floats
-    tension: Floats
-    #: Depth in which the force of a pin grows e times, m.
-    growth: float
     #: Highest pin of the bed, m.
     peak: float
-    #: Looks at the pins around, which clutch and coupling need.
-    look: Callable[[], Around]
-    #: Way that a fingertip can go, m.
-    way: float
+    #: Looks for the highest pins around, (f,), m, which the clutch needs.
+    look: Callable[[], Floats]
 
 
 @dataclass(frozen=True, eq=False)
@@ -209,12 +188,10 @@ def advance(tracks: Tracks, tracking: Tracking, felt: Felt, time: float) -> tupl
     slip = np.zeros(len(ids))
     if tracking.clutch:
         # What is not there yet feels other pins than it will.
-        most = np.where(tracks.there, felt.look().top + tracking.clutch - goal[:, 2], math.inf)
+        most = np.where(tracks.there, felt.look() + tracking.clutch - goal[:, 2], math.inf)
         slip = np.minimum(tracks.slip, most)
         goal[:, 2] += slip
     goal[~tracks.there, 2] = PARKED
-    if tracking.coupling:
-        goal = give_way(goal, felt, tracking.coupling, time)
     there = held & (tracks.there | (felt.poses[:, 2] >= felt.peak + CLEAR))
     away = felt.poses.copy()
     away[:, 2] = PARKED
@@ -249,25 +226,3 @@ def smooth(tracks: Tracks, cutoff: float, time: float) -> tuple[Floats, Floats]:
 def _share(cutoff: float | Floats, time: float) -> float | Floats:
     """Return the share of the way to its input that a low-pass filter goes in a time, s. `cutoff`: Hz."""
     return 1.0 / (1.0 + 1.0 / (2.0 * math.pi * time * cutoff))
-
-
-def give_way(goal: Floats, felt: Felt, coupling: float, time: float) -> Floats:
-    """Return the poses (f, 7) of fingertips on springs, N/m, from tracked ones, after a time, s.
-
-    In balance with the force at the new height, which its stiffness foretells: no step is too long,
-    and no force too large. A pin comes in by `growth`, then slowly: a fingertip goes over what
-    stands in its way.
-    """
-    here, height, after = felt.poses[:, 2], goal[:, 2], goal.copy()
-    around = felt.look()
-    meets, now = around.meet(np.concatenate([goal, felt.poses])).reshape(2, -1)
-    deep = np.maximum(now - here, 0.0)
-    balanced = (coupling * height + felt.force + around.stiffness * here) / (
-        coupling + around.stiffness
-    )
-    lowest = meets - np.maximum(deep + CREEP * time * felt.growth, felt.growth)
-    # The spring never pulls: clay does not stick to a fingertip.
-    after[:, 2] = np.maximum(np.maximum(balanced, height), lowest)
-    up = (lowest > here) & (np.linalg.norm(after[:, :3] - felt.poses[:, :3], axis=1) > felt.way)
-    after[up, :2] = felt.poses[up, :2]
-    return after

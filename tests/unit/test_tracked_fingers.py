@@ -1,4 +1,4 @@
-"""From tracked fingers to fingertips: whose is which, clutch, filter, coupling."""
+"""From tracked fingers to fingertips: whose is which, clutch, filter."""
 
 import math
 from dataclasses import replace
@@ -8,12 +8,10 @@ import pytest
 
 from digiclay_serve.tracked_fingers import (
     PARKED,
-    Around,
     Felt,
     Tracking,
     advance,
     begin_tracks,
-    give_way,
     name_fingers,
 )
 from tests.assemble import table
@@ -22,13 +20,9 @@ LEVEL = (1.0, 0.0, 0.0, 0.0)
 PLACE = (0.01, -0.02, 0.05)
 
 
-def felt(poses, force=0.0, stiffness=0.0, top=0.04):
-    """Return what fingertips feel, all the same."""
-    each = np.ones(len(poses))
-    around = Around(stiffness * each, top * each, lambda there: np.full(len(there), top))
-    return Felt(
-        np.array(poses, float), force * each, force * each, 5e-4, top, lambda: around, 1.25e-3
-    )
+def felt(poses, top=0.04):
+    """Return what fingertips are near to."""
+    return Felt(np.array(poses, float), top, lambda: np.full(len(poses), top))
 
 
 def at(*places):
@@ -179,40 +173,3 @@ def test_a_turn_and_its_negative_are_one_to_the_filter():
     _, targets = advance(tracks, Tracking(cutoff=1.0), felt([[0, 0, 1.0, *LEVEL]]), 5e-3)
     assert 0.6 < targets[0, 3] < 0.8
     assert 0.6 < targets[0, 6] < 0.8
-
-
-@pytest.mark.parametrize("deep", [1e-4, 1e-3, 5e-3, 20e-3])
-@pytest.mark.parametrize("far", [1.0, 4.0])
-def test_the_coupling_comes_to_its_balance_from_any_force(deep, far):
-    exponent, unit, spring = 2000.0, 0.5, 100.0  # of the whole fingertip's force, N; N/m
-
-    def press(height):
-        return unit * math.expm1(exponent * max(0.04 - height, 0.0))
-
-    height, forces = 0.04 - deep, []
-    for _ in range(200):
-        force = press(height)
-        forces.append(force)
-        # The stiffness that is foretold is up to four times too large: relaxed pulp.
-        contact = felt([[0, 0, height, *LEVEL]], force, far * exponent * (force + unit))
-        height = float(give_way(np.array([[0, 0, 0.03, *LEVEL]]), contact, spring, 5e-3)[0, 2])
-    balance = press(height)
-    assert max(forces[1:]) <= max(forces[0], 1.3 * balance)  # what it swings over when it lands
-    assert spring * (height - 0.03) == pytest.approx(balance, rel=1e-3)
-
-
-def test_a_coupled_fingertip_lands_deep_rises_over_what_is_in_its_way_and_sticks_to_nothing():
-    contact = felt([[0, 0, 0.041, *LEVEL], [0, 0, 0.0385, *LEVEL]])
-    for time, then in ((5e-3, 0.03845), (1e-3, 0.03849)):
-        after = give_way(np.tile([0, 0, 0.03, *LEVEL], (2, 1)), contact, 100.0, time)
-        assert after[:, 2] == pytest.approx([0.0395, then], abs=1e-12)
-    around = Around(np.zeros(1), np.full(1, 0.04), lambda at: np.where(at[:, 0] > 1e-3, 0.06, 0.04))
-    contact = felt([[0, 0, 0.04, *LEVEL]])._replace(look=lambda: around)
-    goal = np.array([[0.02, 0, 0.03, *LEVEL]])
-    assert give_way(goal, contact, 100.0, 5e-3)[0, :3].tolist() == [0.0, 0.0, 0.0595]
-    over = give_way(goal, contact._replace(poses=np.array([[0, 0, 0.0595, *LEVEL]])), 100.0, 5e-3)
-    assert over[0, :3].tolist() == [0.02, 0.0, 0.0595]
-    contact = felt([[0, 0, 0.04, *LEVEL]], 0.4, 4000.0)
-    assert give_way(np.array([[0, 0, 0.045, *LEVEL]]), contact, 50.0, 5e-3)[:, 2].tolist() == [
-        0.045
-    ]

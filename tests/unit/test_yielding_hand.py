@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from digiclay.commands.describe import description
 from digiclay.core.base.errors import ParameterError
 from digiclay.core.batch.run_together import measure_together, run_together
 from digiclay.core.control.methods import METHODS
@@ -171,6 +172,22 @@ def test_a_hand_that_cannot_be_is_refused(hand, words):
     with refused_in_a_line(ParameterError, words) as caught:
         scene(hand)
     assert "hand" in str(caught.value)
+
+
+def test_a_hand_is_named_where_a_scene_is_described():
+    made = scene({"mass": 3e-3})
+    assert "3 g" in made.describe()["fingers"]
+    lines = [line for line in description(made, assemble(made)) if "hand" in line]
+    assert len(lines) == 1
+    assert "stiffness 300 N/m" in lines[0]
+    assert not any("hand" in line for line in description(scene(), assemble(scene())))
+
+
+def test_a_hand_that_begins_elsewhere_begins_at_rest():
+    # From 1 m above it comes down within a control period: as a fingertip that a server lets in.
+    way = over_middle((0, 1.0), (0.1, 1.0), (0.1025, 39.5e-3), (0.3, 39.5e-3))
+    history = run(scene({}, trajectory={"interpolation": "linear", "waypoints": way})).history
+    assert 0.0 < history["total_force"].max() < 0.3
 
 
 @table(

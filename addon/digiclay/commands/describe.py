@@ -10,7 +10,7 @@ from ..core.base.quantity import Parameters, Quantity, list_quantities
 from ..core.control.virtual_master import make_master_cell
 from ..core.engine.system import System
 from ..core.scene.assembly import assemble
-from ..core.scene.schema import SECTIONS, Scene
+from ..core.scene.schema import LATER, SECTIONS, Scene
 from ..core.session.memory_limit import (
     count_busy_cells,
     count_bytes_needed,
@@ -28,6 +28,7 @@ examples:
 """
 #: The places on the line from finger to pins, and the sections of the scene that fill them.
 PLACES = (
+    ("hand", "hand"),
     ("finger", "fingertip"),
     ("contact", "contact"),
     ("relaxation", "relaxation"),
@@ -50,6 +51,7 @@ READ = {
     "Pa": (1e-5, "bar"),
     "m2/s": (1e6, "mm2/s"),
     "m/s": (1e3, "mm/s"),
+    "kg": (1e3, "g"),
 }
 
 
@@ -115,6 +117,8 @@ def description(scene: Scene, system: System) -> Iterator[str]:
     yield f"\nThe line from finger to pins (preset {scene.preset})"
     for place, section in PLACES:
         for fingers, part in _list_parts(scene, section):
+            if part is None and section in LATER:
+                continue
             method = f"{scene.method}: " if section == "control" else ""
             parameters = "left out" if part is None else method + _parameters(part)
             yield _filled(place, f"of {fingers}: {parameters}" if fingers else parameters)

@@ -110,7 +110,7 @@ def read_session(
         seconds=bed.digiclay_display.seconds,
         top=view.read_setting(bed, TOP_FORCE, None) if view.shows_force(bed) else None,
         hardest=float(forces.max()) if len(forces) > 1 else None,
-        beyond=exceeds_law(session.system, session.state, session.pose),
+        beyond=exceeds_law(session.system, session.state, session.tips[0]),
         pressed=_count_pressed(session) if scene.bodies else None,
     )
 

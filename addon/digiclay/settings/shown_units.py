@@ -15,6 +15,7 @@ SHOWN: dict[str, tuple[str, int]] = {
     "m2/s": ("mm²/s", 6),
     "kg/m3": ("kg/m³", 0),
     "N s/m": ("N·s/m", 0),
+    "kg": ("g", 3),
 }
 #: A time whose default is as long as this is shown in s, s.
 LONG = 1.0

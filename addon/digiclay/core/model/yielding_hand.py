@@ -11,8 +11,9 @@ import numpy as np
 from ..base.arrays import Floats
 from ..base.quantity import Parameters, quantity
 
-#: Deflections, m, and speeds, m/s, below which a hand is at rest.
-AT_REST = 1e-15
+#: Deflections, m, and speeds, m/s, below which a hand is at rest; speed of an intended path, m/s,
+#: above which it is not a hand that moves, but one that begins elsewhere, at rest.
+AT_REST, JUMP = 1e-15, 10.0
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -100,7 +101,8 @@ class Swing(NamedTuple):
         climbed = going + self.lasting * speed
         gained, rise = speed - before.speed, before.rise + climbed - chord
         after = Deflection(rise, speed, climbed, gained, force)
-        after = Deflection(*np.where(np.abs(after) < AT_REST, 0.0, after))
+        still = (np.abs(after) < AT_REST) | (np.abs(chord) > JUMP * self.time)
+        after = Deflection(*np.where(still, 0.0, after))
         bend = np.where(self.push > 0.0, 0.5 * self.time * gained - (slope - chord), 0.0)
         at = np.linspace(0.0, 1.0, len(path))[:, None]
         return after, before.rise + at * (after.rise - before.rise) + at * (at - 1.0) * bend

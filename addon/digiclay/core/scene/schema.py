@@ -287,7 +287,7 @@ class Scene(Described):
         return {
             "bed": f"{bed.rows} x {bed.columns} pins, {bed.pitch * 1e3:g} mm apart, {bed.arrangement}",
             "method": control,
-            "fingers": str(len(self.fingers)),
+            "fingers": ", ".join([str(len(self.fingers)), *self._describe_hands()]),
             **({"bodies": str(len(self.bodies))} if self.bodies else {}),
             "time": f"{time.duration:g} s, {self.periods} periods of {time.control_period * 1e3:g} ms",
             "absent": ", ".join(absent) or "nothing",
@@ -303,6 +303,14 @@ class Scene(Described):
     def ceiling(self) -> float:
         """Height above which bodies meet no pin, m."""
         return self.actuator.stroke + max((each.body.cap for each in self.bodies), default=0.0)
+
+    def _describe_hands(self) -> list[str]:
+        """Return the hands of the fingers, each once."""
+        hands = dict.fromkeys(filter(None, self.list_parts("hand")))
+        return [
+            f"on a hand of {hand.mass * 1e3:g} g, {hand.damping:g} N s/m and {hand.stiffness:g} N/m"
+            for hand in hands
+        ]
 
     @property
     def periods(self) -> int:

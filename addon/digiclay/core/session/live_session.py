@@ -324,7 +324,7 @@ class LiveSession:
     state: State
     """The next control period overwrites it: it may not be stored."""
     poses: Floats
-    """(f, 7): Poses of the fingertips that the session has reached."""
+    """(f, 7): Poses of the fingertips that the session has reached; of those on hands the intended ones."""
     recording: Recording | None = None
     monitor: accuracy.ErrorMonitor | None = None
     errors: accuracy.Errors | None = None
@@ -333,6 +333,14 @@ class LiveSession:
     """(b, n): Undersides of bodies that the session has reached, in `bodies.UNIT`; None: no path yet."""
     aim: NDArray[np.int32] | None = None
     """Those to which the next path leads; None: there are none."""
+
+    @property
+    def tips(self) -> Floats:
+        """Poses of the fingertips, (f, 7), which hands that give way have raised."""
+        tips = self.poses.copy()
+        if self.state.deflection:
+            tips[:, 2] += self.state.deflection.rise
+        return tips
 
     @property
     def pose(self) -> Floats:
