@@ -3,21 +3,25 @@
 import sys
 from argparse import ArgumentTypeError, Namespace
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
 from digiclay import __version__
-from digiclay.commands.arguments import add_command, add_options
+from digiclay.commands.arguments import add_command, add_options, whole_number
 from digiclay.commands.evaluation_pool import Evaluation, run_series
 from digiclay.commands.progress import Counted, format_command
 from digiclay.commands.refusals import refuse_without
+from digiclay.commands.uncertain import UNCERTAIN
 from digiclay.core.base.arrays import Floats
 from digiclay.core.base.errors import OutputError
 from digiclay.core.files.run_folder import write_whole
 from digiclay.core.files.tables import Record
-from digiclay.core.studies.axes import Point, find_ends
+from digiclay.core.scene.scene_source import Setting
+from digiclay.core.studies.axes import Point, find_ends, place_points, refuse_twice
 from digiclay.core.studies.evaluation import FIGURES, describe_effort, make_bundles
-from digiclay.core.studies.sweep_plan import format_csv
+from digiclay.core.studies.sweep_plan import format_csv, hash_points
+from digiclay.core.studies.uncertainty import LEAST, MOST, Members, draw_members, find_band
 from digiclay.plots.sweep import read_unit
 
 from .indices import (
@@ -42,7 +46,7 @@ examples:
 
 A design of N x (parameters + 2) runs, with --second N x (2 parameters + 2). The folder holds study.md
 (start there), indices.csv, indices.png, points.csv with every run, and points/, a small file for each
-finished run. After Ctrl-C the same command continues.
+finished run; with --uncertain bands.csv, 95 % bands of each point. After Ctrl-C the same command continues.
 """
 METRICS = "rfd,lag,oscillation,relief"
 PICTURE = "indices.png"
@@ -63,6 +67,8 @@ def add(commands: Any) -> None:
         {
             "--samples N": (_read_samples, "a power of two; default: 64", 64),
             "--second": "indices of pairs of parameters, too",
+            "--uncertain FILE": UNCERTAIN["--uncertain FILE"],
+            "--members N": (whole_number(LEAST, MOST), f"runs per band; default: {LEAST}", LEAST),
         },
     )
 
@@ -79,6 +85,8 @@ def _read_samples(text: str) -> int:
 def carry_out(arguments: Namespace) -> int:
     """Run what is not done yet, and write tables, page and plot."""
     refuse_without("digiclay study", "study", "SALib", "matplotlib")
+    files = arguments.uncertain
+    arguments.parts = [*arguments.parts, *files]
     subject = read_subject(arguments)
     count, second = len(subject.ranges), arguments.second
     if count < 2:
@@ -86,28 +94,63 @@ def carry_out(arguments: Namespace) -> int:
             "A study needs at least two --vary: with one parameter all indices are 1. Use digiclay sweep."
         )
     total = count_points(arguments.samples, count, second=second)
+    members = Members([], [], "")
+    if files:
+        sizes = arguments.members, arguments.seed
+        members = draw_members(files, subject.path, subject.settings, *sizes)
+        refuse_twice(subject.keys, [Setting(key, "", "--uncertain") for key in members.keys])
+        total *= 1 + arguments.members
     refuse_too_many("--samples", total)
     orders = "first, second" if second else "first"
     plan = {"samples": arguments.samples, "seed": arguments.seed, "orders": orders}
+    if files:
+        plan["uncertainty"] = [hash_points(members.points)]
     with Counted(sys.stderr, "study", "points read", quiet=arguments.quiet) as bar:
         shares = sample_shares(arguments.samples, count, arguments.seed, second=second)
         points = subject.make_points(shares, 1, bar)
         bundles = make_bundles(points)
+        rows = [(*point.words, *each.words) for point in points for each in members.points]
+        keys = (*subject.keys, *members.keys)
+        first = len(points) + 1
+        repeats = make_bundles(
+            place_points(subject.path, subject.settings, keys, rows, first=first)
+        )
 
     def evaluate(evaluation: Evaluation) -> None:
         if subject.evaluate_unchanged(evaluation, quiet=arguments.quiet):
             evaluation.finish(bundles.every, subject.keys)
+            evaluation.finish(repeats.every, keys)
             if len(evaluation.records) == evaluation.total:
                 evaluation.judge(find_ends(points, subject.keys), subject.keys)
 
     def write(records: dict[int, Record]) -> list[str]:
         lines = _write(arguments, subject, points, records)
+        if files:
+            table = list_bands(subject.names, len(points), len(members.points), records)
+            write_whole(arguments.out / "bands.csv", format_csv(table).encode())
+            lines += [f"bands.csv: {members.note}", *repeats.describe()]
         return [*lines, *bundles.describe(), f"written to {arguments.out}: start with study.md"]
 
     opened = subject.open_folder(arguments.out, "study", plan)
     return run_series(
         arguments, "study", total + 1, opened, evaluate, write, pieces=len(bundles.every)
     )
+
+
+def list_bands(
+    names: Sequence[str], points: int, members: int, records: Mapping[int, Record]
+) -> Iterator[list[Any]]:
+    """Give the rows of a table: both ends of the 95 % band of each output at each point, in SI units."""
+    ends = product(names, ("low", "high"))
+    yield ["point", *(f"{name} {end} ({FIGURES[name].unit})" for name, end in ends)]
+    for point in range(1, points + 1):
+        first = points + 1 + (point - 1) * members
+        figures = [records[first + number].get("figures", {}) for number in range(members)]
+        row: list[Any] = [point]
+        for name in names:
+            values = [each[name] for each in figures if each.get(name) is not None]
+            row += find_band(values) or ["", ""]
+        yield row
 
 
 def _write(
@@ -152,6 +195,8 @@ def _format_call(arguments: Namespace, subject: Subject) -> str:
     words += [word for key, value, _ in subject.settings for word in ("--set", f"{key}={value}")]
     words += ["--samples", str(arguments.samples), "--seed", str(arguments.seed)]
     words += ["--metric", ",".join(subject.names), *(["--second"] if arguments.second else [])]
+    for file in arguments.uncertain:
+        words += ["--uncertain", str(file), "--members", str(arguments.members)]
     return format_command([*words, "--out", str(arguments.out)])
 
 

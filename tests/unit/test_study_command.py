@@ -7,11 +7,24 @@ from pathlib import Path
 import pytest
 from digiclay.cli import main
 from digiclay.core.base.errors import DigiclayError, ParameterError
-from digiclay.core.scene.scene_source import Setting, find, load
+from digiclay.core.scene.scene_source import Setting, find, load, read_parts
 from digiclay.core.session.run_scene import run
+from digiclay.core.studies.uncertainty import find_band
 
 from digiclay_study.point_series import Range, fit_ranges, read_range
-from tests.scene_files import SCENE, command, read_text, rows, timeless, write_text
+from tests.scene_files import (
+    SCENE,
+    SMALL_BLISTER,
+    command,
+    interrupt_after,
+    read_json,
+    read_text,
+    rows,
+    scene_text,
+    timeless,
+    write_text,
+)
+from tests.unit.test_uncertainty import fitted
 
 pytest.importorskip("SALib", reason="digiclay[study] is not installed")
 
@@ -265,3 +278,57 @@ def test_a_file_that_is_wrong_by_itself_is_told_first(tmp_path):
     write_text(tmp_path / "my.toml", "[layout]\nrows = 0\n")
     with pytest.raises(DigiclayError, match="rows"):
         fit_ranges([read_range("a.b=1:2")], tmp_path / "my.toml", ())
+
+
+def test_a_study_has_bands_of_each_point_over_a_fitted_file_and_goes_on_after_a_stop(
+    here, capsys, monkeypatch
+):
+    fitted(here, (1, 0))
+    write_text(
+        here / "my.toml", scene_text(3, 4, (0.0, 0.0405), (0.03, 0.038), parts=SMALL_BLISTER)
+    )
+    study = ["study", "my.toml", *GAINS, "--samples", "4", "--workers", "1", "--out", "out"]
+    study += ["--uncertain", "fitted.toml", "--metric", "max_cell_force"]
+    with monkeypatch.context() as patched:
+        interrupt_after(20, patched)
+        assert main([*study, "--quiet"]) == 130
+    assert main(study) == 0
+    said = capsys.readouterr().out
+    assert "bands.csv: 40 members, seed 1" in said
+    table, points = rows(here / "out/bands.csv"), rows(here / "out/points.csv")[1:]
+    assert [row["point"] for row in table] == [row["point"] for row in points]
+    assert len(points) == 4 * (2 + 2)
+    inside = 0
+    for row, point in zip(table, points, strict=True):
+        low, high = (float(row[f"max_cell_force {end} (N)"]) for end in ("low", "high"))
+        inside += low < float(point["max_cell_force (N)"]) < high
+    assert inside == 16
+    # Behind the 16 points are 40 members of each: those of the last one.
+    last = [read_json(here / f"out/points/{16 + 15 * 40 + n:06d}.json") for n in range(1, 41)]
+    settings = {f"{key} ({unit})": points[-1][f"{key} ({unit})"] for key, unit in KEYS}
+    forces = []
+    for record in last:
+        values = record["values"]
+        assert [float(values[key]) for key, _ in KEYS] == pytest.approx(
+            [float(value) for value in settings.values()]
+        )
+        forces.append(record["figures"]["max_cell_force"])
+    assert table[-1]["max_cell_force low (N)"] == repr(find_band(forces)[0])
+    given = [Setting(key, str(value)) for key, value in last[-1]["values"].items()]
+    parts = read_parts(here / "fitted.toml")
+    alone = run(load(find("my.toml"), [*parts, *given])).metrics["max_cell_force"]
+    assert forces[-1] == pytest.approx(alone, rel=1e-9)
+    assert "--uncertain fitted.toml --members 40" in read_text(here / "out/study.md")
+    fitted(here, (1, 0), covariance=[[1e-4, 0.0], [0.0, 1e-4]])
+    assert main(study) == 2
+    assert "out holds another study (with another uncertainty)" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("more, said", [
+    (["--vary", "contact.stiffness=200:400"], "must not be given to fitted.toml as well"),
+    (["--vary", "relaxation.weights.1=0.1:0.2"], "must not be given to --uncertain as well"),
+    (["--samples", "256"], "must come to 10000 points at most (got 41984 points)"),
+])  # fmt: skip
+def test_a_study_with_bands_that_cannot_be_is_refused(more, said, here, refused):
+    fitted(here, (3, 0))
+    refused(["study", "my.toml", *GAINS, "--uncertain", "fitted.toml", "--out", "out", *more], said)
