@@ -277,7 +277,7 @@ def _judge(made: Estimate, index: int, flat: bool) -> Judgment:
     low, high = max(value - half, each.low), min(value + half, each.high)
     if flat and not each.beside:
         return Judgment("flat", each.low, each.high)
-    if not each.wanted and not each.beside:
+    if not each.wanted:
         return Judgment("bounded", low, high)
     if min(value - each.low, each.high - value) < min(1e-4 * (each.high - each.low), 0.05 * half):
         return Judgment("at-bound", low, high)

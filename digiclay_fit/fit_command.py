@@ -199,12 +199,14 @@ def list_rows(found: Findings) -> Iterator[list[str]]:
         verdict = judgment.verdict if judgment else "follows from others"
         if half > (USELESS if each.log else USELESS * abs(each.value)):
             verdict = verdict if judgment and verdict != "bounded" else "flat"
-        if judgment and verdict == "one-sided" and each.key != cell.STROKE:
+        if judgment and verdict == "one-sided":
             ends = judgment.low, judgment.high
         value, low, high = (
             np.exp(np.clip((each.value, *ends), -700.0, 700.0)) if each.log else (each.value, *ends)
         )
-        interval = "none" if verdict == "flat" else f"{low:.4g} to {high:.4g}"
+        # Of a stroke the knee is judged, which has a row.
+        hidden = verdict == "flat" or (verdict == "one-sided" and each.key == cell.STROKE)
+        interval = "none" if hidden else f"{low:.4g} to {high:.4g}"
         other = int(np.abs(correlation[number] * (np.arange(len(derived)) != number)).argmax())
         near = f"{derived[other].key} ({correlation[number, other]:+.2f})"
         yield [

@@ -24,6 +24,7 @@ from benchmarks.fit_coverage import (
 from benchmarks.synthetic_devices import Cell, Finger
 from digiclay_fit.cell import DELAY, LAG
 from digiclay_fit.estimation import SEEN, find_rms
+from digiclay_fit.fit_command import list_rows
 from digiclay_fit.records import Trial, find_records, read_records
 from digiclay_fit.verdicts import fit, make_model
 
@@ -148,6 +149,17 @@ def test_intervals_contain_the_truth(name):
 @pytest.mark.parametrize("number", range(len(UNKNOWABLE)))
 def test_what_a_record_cannot_tell_is_refused_by_name(number):
     assert list_unnamed(number, 0) == []
+
+
+def test_a_stroke_that_flow_does_not_feel_has_no_interval_and_the_knee_has_an_end():
+    measured = measure_cell(draw(0))
+    rows = list(list_rows(fit("cell", TAP, measured.trials, (), ("stroke", "lag", "delay"))))
+    verdicts = {name: (interval, verdict) for name, _, interval, verdict, _ in rows}
+    assert verdicts["valve.stroke"] == ("none", "one-sided")
+    interval, verdict = verdicts["knee of the flow"]
+    assert verdict == "one-sided"
+    # Pa: the flow of a supply of 50 kPa is laminar.
+    assert 4.5e4 < float(interval.split()[0]) < 6e4
 
 
 def change(trials, answer):
