@@ -1,5 +1,7 @@
 """A hand that gives way: extreme values, batches, resumed sessions, several fingers, files, refusals."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from digiclay.commands.describe import description
@@ -9,10 +11,13 @@ from digiclay.core.control.methods import METHODS
 from digiclay.core.engine.hand_steps import solve_force
 from digiclay.core.engine.simulation import begin, periods
 from digiclay.core.files.tables import parse_tables
+from digiclay.core.model.trajectory import sample_poses
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.toml_table import format_scene, resolve, tabulate
 from digiclay.core.session import snapshot
+from digiclay.core.session.live_session import simulate_path
 from digiclay.core.session.run_scene import run
+from digiclay.core.session.take import Take, from_bytes, replay, to_bytes
 
 from tests.assemble import over_middle, refused_in_a_line, table
 
@@ -101,6 +106,24 @@ def test_a_session_goes_on_from_a_kept_state_bit_for_bit():
     # What is stored without a hand goes on with one at rest.
     bare = assemble(scene())
     assert not snapshot.load(system, snapshot.dump(bare, begin(bare))).deflection.rise.any()
+
+
+def test_a_take_is_replayed_bit_for_bit_in_ticks_of_any_length():
+    made = scene({}, simulation={"physics_step": 2e-3})
+    system = assemble(made)
+    poses = sample_poses(made.trajectories(), np.arange(61) * system.period)
+
+    def play(*ends):
+        state = begin(system)
+        for first, last in pairwise((0, *ends)):
+            *_, state = simulate_path(system, state, poses[first : last + 1])
+        return snapshot.dump(system, state)
+
+    end = play(1, 2, 7, 30, 60)
+    assert snapshot.load(system, end).deflection.rise[0] != 0.0
+    take = from_bytes(to_bytes(Take(made, snapshot.dump(system, begin(system)), poses, end)))
+    *_, state = replay(take)
+    assert snapshot.dump(system, state) == end == play(60)
 
 
 def test_several_fingers_have_a_hand_each_or_none():
