@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import trimesh
+from digiclay.cli import main
 from digiclay.core.base.errors import DigiclayError
 from digiclay.core.batch.run_together import run_together
 from digiclay.core.engine.bodies import MovedMesh, PathUndersides
@@ -19,6 +20,11 @@ from digiclay.core.scene.toml_table import format_scene, resolve, tabulate
 from digiclay.core.session import snapshot
 from digiclay.core.session.accuracy import Replay, estimate_errors
 from digiclay.core.session.finished_run import HISTORY_ARRAYS, read_run
+from digiclay.core.session.memory_limit import (
+    BYTES_A_CELL,
+    check_memory,
+    measure_available_memory,
+)
 from digiclay.core.session.run_scene import run, save
 from digiclay.core.shapes.body import pack_mesh
 from digiclay.plots.run import session_figure
@@ -425,3 +431,20 @@ def test_the_plot_of_a_session_has_the_force_of_each_body(others):
     lines = {line.get_label(): line.get_ydata() for line in axes["force"].get_lines()}
     for number, force in enumerate(done.history["body_force"].sum(axis=2).T, 1):
         assert np.array_equal(lines[f"body {number}"], force)
+
+
+def test_memory_counts_the_forces_of_bodies():
+    scene = resolve(table(body(BALL)))
+    rows = assemble(scene).rows
+    # As many periods as fill four fifths of the memory, without the forces of the body.
+    fitting = 0.8 * measure_available_memory() / (scene.cells * BYTES_A_CELL)
+    long = replace(scene.simulation, duration=fitting * scene.simulation.control_period)
+    check_memory(replace(scene, simulation=long, bodies=()), rows)
+    with pytest.raises(DigiclayError, match="free memory"):
+        check_memory(replace(scene, simulation=long), rows)
+
+
+def test_describe_names_the_bodies_and_their_paths(tmp_path, capsys):
+    (tmp_path / "my.toml").write_text(format_scene(resolve(table(body(BALL)))), encoding="utf-8")
+    assert main(["describe", str(tmp_path / "my.toml")]) == 0
+    assert "body 1: a packed mesh, its path until 0.9 s" in capsys.readouterr().out

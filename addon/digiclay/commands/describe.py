@@ -145,6 +145,9 @@ def description(scene: Scene, system: System) -> Iterator[str]:
     for finger in scene.fingers:
         path, points = finger.trajectory, finger.trajectory.waypoints
         yield f"  {len(points)} waypoints, {path.interpolation}, the last at {points[-1].time:g} s"
+    for number, each in enumerate(scene.bodies, 1):
+        last = each.trajectory.waypoints[-1].time
+        yield f"  body {number}: {each.body.file or 'a packed mesh'}, its path until {last:g} s"
     sizes = scene.cells, scene.periods, count_busy_cells(scene)
     needed = count_bytes_needed(scene.recorder, system.rows, *sizes)
     free = measure_available_memory()

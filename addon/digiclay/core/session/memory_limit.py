@@ -29,10 +29,10 @@ def count_busy_cells(scene: Scene) -> int:
 
 def check_memory(scene: Scene, rows: Rows) -> None:
     """Refuse a session that memory cannot hold, before it starts; ParameterError names the remedy."""
-    busy = count_busy_cells(scene)
-    refuse_what_cannot_fit(
-        scene.recorder, rows, scene.cells, scene.periods, measure_available_memory(), busy
-    )
+    busy, free = count_busy_cells(scene), measure_available_memory()
+    if scene.recorder:  # the force of each body on each pin, and its copy in the history
+        free -= 2 * 8 * len(scene.bodies) * scene.cells * scene.recorder.rows(scene.periods)
+    refuse_what_cannot_fit(scene.recorder, rows, scene.cells, scene.periods, max(free, 0), busy)
 
 
 def count_bytes_needed(
