@@ -414,6 +414,12 @@ def test_arrays_that_are_no_mesh_are_refused(vertices):
         pack_mesh(vertices, [[0, 1, 2]])
 
 
+def test_a_packed_mesh_of_too_many_triangles_is_refused():
+    many = pack_mesh(np.eye(3), np.tile([0, 1, 2], (1_000_001, 1)))
+    with pytest.raises(DigiclayError, match="of at most 1,000,000 triangles"):
+        assemble(resolve(change(mesh=many)))
+
+
 def test_a_batch_refuses_bodies():
     with pytest.raises(DigiclayError, match="must have no bodies"):
         list(run_together([resolve(table(body(BALL)))] * 2))

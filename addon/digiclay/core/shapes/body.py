@@ -100,11 +100,11 @@ def _unpack(text: str, owner: str) -> Mesh:
         end = 4 + 24 * int(np.frombuffer(data, "<i4", 1)[0])
         vertices = np.frombuffer(data[4:end], "<f8").reshape(-1, 3)
         triangles = np.frombuffer(data[end:], "<i4").reshape(-1, 3)
-        whole = opened.eof
+        whole = opened.eof and len(triangles) <= MOST_TRIANGLES
     except (binascii.Error, ValueError, zlib.error):
         whole = False
     if not whole:
-        rule = f"must be a mesh packed as text, of at most {MOST_BYTES / 1e6:g} MB"
+        rule = f"must be a mesh packed as text, of at most {MOST_TRIANGLES:,} triangles"
         raise ParameterError(owner, "mesh", rule, repr(shorten(text)))
     return check_mesh(vertices, triangles, owner)
 
@@ -126,12 +126,12 @@ def read_body(body: Body, owner: str = "body") -> Mesh:
             raise ParameterError(owner, "file", rule, f"{path}: {error.strerror}") from None
         except ParameterError as error:
             raise ParameterError(owner, "file", error.rule, error.value, error.hint) from None
+        if len(read.faces) > MOST_TRIANGLES:
+            rule = f"must have at most {MOST_TRIANGLES:,} triangles"
+            raise ParameterError(owner, "file", rule, f"{len(read.faces):,}")
         axes, signs = UPWARDS[read.up if body.up == AUTO else body.up]
         length = read.length or LENGTHS["mm"] if body.unit == AUTO else LENGTHS[body.unit]
         mesh = check_mesh(read.vertices[:, axes] * signs * length, read.faces, owner)
-    if len(mesh.triangles) > MOST_TRIANGLES:
-        rule = f"must have at most {MOST_TRIANGLES:,} triangles"
-        raise ParameterError(owner, field, rule, f"{len(mesh.triangles):,}")
     used = mesh.vertices[np.unique(mesh.triangles)]
     low, _, high = np.sqrt(np.abs(np.linalg.eigvalsh(np.cov(used.T))))
     if low < THIN * high:
