@@ -8,7 +8,7 @@ from digiclay.commands.describe import description
 from digiclay.core.base.errors import ParameterError
 from digiclay.core.batch.run_together import measure_together, run_together
 from digiclay.core.control.methods import METHODS
-from digiclay.core.engine.hand_steps import solve_force
+from digiclay.core.engine.hand_steps import lower_reach, solve_force
 from digiclay.core.engine.simulation import begin, periods
 from digiclay.core.files.tables import parse_tables
 from digiclay.core.model.trajectory import sample_poses
@@ -146,6 +146,17 @@ def test_several_fingers_have_a_hand_each_or_none():
     np.testing.assert_allclose(pair["fingertip"][:, 0], alone["fingertip"], rtol=0, atol=1e-9)
 
 
+@pytest.mark.parametrize("count", [1, 2])
+def test_pins_are_looked_for_where_a_hand_is_below_its_path(count):
+    made = resolve({**BED, "finger": [{"trajectory": WAY, "hand": {}}] * count})
+    system = assemble(made)
+    (finger,) = system.trace(sample_poses(made.trajectories(), system.instants)[None], 0)
+    state = begin(system)
+    low = state.deflection._replace(rise=np.full(count, -5e-3))
+    lowered = lower_reach(system.hands, state._replace(deflection=low), finger)
+    np.testing.assert_allclose(lowered.window[3], np.array(finger.window[3]) - 5e-3, rtol=1e-9)
+
+
 @pytest.mark.parametrize("method", METHODS)
 def test_every_method_meets_a_hand(method):
     history = run(scene({}, control={"method": method})).history
@@ -209,7 +220,8 @@ def test_a_hand_is_named_where_a_scene_is_described():
 def test_a_hand_that_begins_elsewhere_begins_at_rest():
     # From 1 m above it comes down within a control period: as a fingertip that a server lets in.
     way = over_middle((0, 1.0), (0.1, 1.0), (0.1025, 39.5e-3), (0.3, 39.5e-3))
-    history = run(scene({}, trajectory={"interpolation": "linear", "waypoints": way})).history
+    path = {"interpolation": "linear", "waypoints": way}
+    history = run(scene({"damping": 0.5}, trajectory=path)).history
     assert 0.0 < history["total_force"].max() < 0.3
 
 
