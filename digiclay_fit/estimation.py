@@ -319,7 +319,7 @@ def find_rms(values: Floats) -> float:
     return float(np.sqrt(np.mean(values**2)))
 
 
-def improves(made: Estimate, plain: Floats, count: int, sure: float = 0.95) -> bool:
+def improves(made: Estimate, plain: Floats, count: int) -> bool:
     """Return whether a fit of `count` parameters beats the residuals `plain` by likelihood ratio."""
     from scipy.special import gammaincinv
 
@@ -327,4 +327,4 @@ def improves(made: Estimate, plain: Floats, count: int, sure: float = 0.95) -> b
     regular = np.abs(residual) <= OUTLIER * made.noise
     squares = [max(float(np.mean(each[regular] ** 2)), 1e-300) for each in (plain, residual)]
     gain = made.independent * math.log(squares[0] / squares[1])
-    return bool(gain > 2.0 * gammaincinv(0.5 * count, sure))  # of the chi-squared distribution
+    return bool(gain > 2.0 * gammaincinv(0.5 * count, 0.95))  # of the chi-squared distribution

@@ -11,7 +11,7 @@ from digiclay.core.base.errors import OutputError
 from digiclay.core.model.touch import describe_excess
 from digiclay.core.scene.schema import Scene
 
-from .cell import CellModel
+from .cell import KNEES, CellModel
 from .estimation import (
     NORMAL,
     SEEN,
@@ -26,8 +26,8 @@ from .estimation import (
 from .pulp import PulpModel
 from .records import Trial, estimate_noise
 
-#: Likelihood from which a free stroke contradicts a held one.
-CONTRADICTED = 0.999
+#: Twice the logarithm of a likelihood ratio from which a free stroke contradicts a held one: 99.9 %.
+CONTRADICTED = 10.83
 #: Noise of the position that matters, as a share of that of the force.
 TOO_NOISY = 0.15
 
@@ -144,8 +144,11 @@ def _needs_stroke(
     """Return whether the stroke is held, and the data contradict it."""
     if "stroke" in groups:
         return False
-    free = estimate(CellModel(scene, trials, (*groups, "stroke")))
-    return improves(free, made.residual, 1, CONTRADICTED)
+    model = CellModel(scene, trials, (*groups, "stroke"))
+    starts = [np.insert(made.free, 1, np.log(knee)) for knee in KNEES]
+    best = min(float(minimize(model, start, **made.loss).cost) for start in starts)
+    gain = 2.0 * (made.cost - best) / made.noise**2 * made.independent / made.residual.size
+    return gain > CONTRADICTED
 
 
 def _predict(other: Model, free: Floats, model: Model) -> Floats:
