@@ -174,6 +174,10 @@ SOME = [[1e-2, 2e-3], [2e-3, 1e-2]]
             "must be finite, symmetric",
         ),
         "no variance": ({"covariance": [[0.0, 0.0], [0.0, 1e-2]]}, "must be finite, symmetric"),
+        "a covariance beyond all numbers": (
+            {"covariance": [[1e-300, 1e10], [1e10, 1e-300]]},
+            "must be finite, symmetric",
+        ),
         "a correlation above 1": ({"covariance": [[1e-2, 2e-2], [2e-2, 1e-2]]}, "must be finite"),
         "an unknown field": ({"covarance": SOME}, "uncertainty.covarance must be a known key"),
     },

@@ -133,7 +133,7 @@ def find_root(covariance: Floats) -> Floats:
     with np.errstate(invalid="ignore"):
         limits = np.outer(scale, scale)
         alike = np.abs(covariance - covariance.T) <= ROUNDING * limits
-    sound = alike & (np.abs(covariance) <= 1.001 * limits) & np.isfinite(limits) & (limits > 0.0)
+    sound = alike & (np.abs(covariance) <= 1.001 * limits) & (limits > 0.0)
     values, vectors = np.linalg.eigh(covariance / limits if sound.all() else -np.eye(len(scale)))
     rule = "must be finite, symmetric and positive definite, but for rounding"
     _require("covariance", values[0] > -ROUNDING, rule, covariance.tolist())
