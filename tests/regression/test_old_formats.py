@@ -7,7 +7,7 @@ import pytest
 from digiclay.core.base.quantity import list_quantities
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.scene_source import load
-from digiclay.core.scene.schema import SECTIONS
+from digiclay.core.scene.schema import LATER, SECTIONS
 from digiclay.core.scene.toml_table import ABSENT, format_scene
 from digiclay.core.session import snapshot
 from digiclay.core.session.take import from_bytes
@@ -40,7 +40,7 @@ def values(scene):
             table[section] = {
                 name: listed(value) for name, value in vars(part).items() if known(part, name)
             }
-        elif section not in ("contact", "blister"):
+        elif section not in ("contact", "blister", *LATER):
             table[section] = ABSENT
     if scene.control is not None:
         table["control"]["method"] = scene.method
