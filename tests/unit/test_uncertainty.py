@@ -254,6 +254,7 @@ def test_bands_are_quantiles_of_runs_of_the_members_one_by_one(measured):
     free = content["bands"]["free_rise"]
     assert free["value"] == digiclay.free_speed(scenes[0]).rise
     assert free["integration"] is None
+    assert free["ends"] == pytest.approx([free["value"]] * 2)  # the valve is known
     assert content["notes"][1:] == ["40 points run in 1 batch"]
 
 
@@ -308,6 +309,22 @@ def test_every_method_and_several_fingers_have_bands(scene, method, fingers, her
     # A batch differs from a run by rounding.
     assert content["members"][7]["figures"]["max_total_force"] == pytest.approx(force, rel=1e-9)
     assert ("several fingers" in capsys.readouterr().out) == (fingers > 1)
+
+
+def test_a_band_is_that_of_the_members_that_have_a_value_and_says_of_how_many(here, capsys):
+    # Pins more than 2 mm lower are not touched, those of one member in six.
+    rest = {"keys": ["actuator.rest_height"], "covariance": [[4e-6]], "logarithms": [False]}
+    fitted(here, parts="", **rest)
+    assert call(f"{RUN} --members 60 --no-errors") == 0
+    content = read_json(here / "o/uncertainty.json")
+    figures = [row["figures"] for row in content["members"]]
+    touched = sum(each["rfd"] is not None for each in figures)
+    assert 40 <= touched < 60
+    assert content["bands"]["rfd"]["members"] == touched
+    assert content["bands"]["max_total_force"]["members"] == 60
+    lines = capsys.readouterr().out.splitlines()
+    assert [f" of {touched} " in line for line in lines if "RFD (" in line] == [True]
+    assert not any(" of 60 " in line for line in lines)
 
 
 def test_members_that_fail_are_counted_and_said_and_none_is_dropped(here, capsys):

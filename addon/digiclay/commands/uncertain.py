@@ -131,7 +131,8 @@ def describe(content: Record) -> Iterator[str]:
     """Give the table of the bands, and lines on the members."""
     rows = []
     for name, band in content["bands"].items():
-        metric = {**METRICS, **FREE}[name]
+        metric, count = {**METRICS, **FREE}[name], band["members"]
+        few = f" of {count}" if count < len(content["members"]) else ""
         value, low, high, error = (
             metric.factor * each
             for each in (band["value"], *band["ends"], band["integration"] or 0.0)
@@ -140,7 +141,7 @@ def describe(content: Record) -> Iterator[str]:
             [
                 metric.title,
                 f"{value:.4g}",
-                f"{low:.4g} to {high:.4g}",
+                f"{low:.4g} to {high:.4g}{few}",
                 f"± {50.0 * (high - low) / abs(value):.2g} %",
                 f"± {error:.2g}" if error else "–",
             ]
