@@ -12,7 +12,7 @@ from digiclay.commands.arguments import add_command, add_options, whole_number
 from digiclay.commands.evaluation_pool import Evaluation, run_series
 from digiclay.commands.progress import Counted, format_command
 from digiclay.commands.refusals import refuse_without
-from digiclay.commands.uncertain import UNCERTAIN
+from digiclay.commands.uncertain import UNCERTAIN, list_words
 from digiclay.core.base.arrays import Floats
 from digiclay.core.base.errors import OutputError
 from digiclay.core.files.run_folder import write_whole
@@ -85,36 +85,28 @@ def _read_samples(text: str) -> int:
 def carry_out(arguments: Namespace) -> int:
     """Run what is not done yet, and write tables, page and plot."""
     refuse_without("digiclay study", "study", "SALib", "matplotlib")
-    files = arguments.uncertain
-    arguments.parts = [*arguments.parts, *files]
+    arguments.parts = [*arguments.parts, *arguments.uncertain]
     subject = read_subject(arguments)
     count, second = len(subject.ranges), arguments.second
     if count < 2:
         raise OutputError(
             "A study needs at least two --vary: with one parameter all indices are 1. Use digiclay sweep."
         )
-    total = count_points(arguments.samples, count, second=second)
-    members = Members([], [], "")
-    if files:
-        sizes = arguments.members, arguments.seed
-        members = draw_members(files, subject.path, subject.settings, *sizes)
-        refuse_twice(subject.keys, [Setting(key, "", "--uncertain") for key in members.keys])
-        total *= 1 + arguments.members
+    members = _draw(arguments, subject)
+    total = count_points(arguments.samples, count, second=second) * (1 + len(members.points))
     refuse_too_many("--samples", total)
     orders = "first, second" if second else "first"
     plan = {"samples": arguments.samples, "seed": arguments.seed, "orders": orders}
-    if files:
+    if members.points:
         plan["uncertainty"] = [hash_points(members.points)]
     with Counted(sys.stderr, "study", "points read", quiet=arguments.quiet) as bar:
         shares = sample_shares(arguments.samples, count, arguments.seed, second=second)
         points = subject.make_points(shares, 1, bar)
         bundles = make_bundles(points)
-        rows = [(*point.words, *each.words) for point in points for each in members.points]
         keys = (*subject.keys, *members.keys)
-        first = len(points) + 1
-        repeats = make_bundles(
-            place_points(subject.path, subject.settings, keys, rows, first=first)
-        )
+        rows = [(*point.words, *member.words) for point in points for member in members.points]
+        repeated = place_points(subject.path, subject.settings, keys, rows, first=len(points) + 1)
+        repeats = make_bundles(repeated)
 
     def evaluate(evaluation: Evaluation) -> None:
         if subject.evaluate_unchanged(evaluation, quiet=arguments.quiet):
@@ -125,7 +117,7 @@ def carry_out(arguments: Namespace) -> int:
 
     def write(records: dict[int, Record]) -> list[str]:
         lines = _write(arguments, subject, points, records)
-        if files:
+        if members.points:
             table = list_bands(subject.names, len(points), len(members.points), records)
             write_whole(arguments.out / "bands.csv", format_csv(table).encode())
             lines += [f"bands.csv: {members.note}", *repeats.describe()]
@@ -135,6 +127,17 @@ def carry_out(arguments: Namespace) -> int:
     return run_series(
         arguments, "study", total + 1, opened, evaluate, write, pieces=len(bundles.every)
     )
+
+
+def _draw(arguments: Namespace, subject: Subject) -> Members:
+    """Return the members at each point, or none without fitted files."""
+    files = arguments.uncertain
+    if not files:
+        return Members([], [], "")
+    sizes = arguments.members, arguments.seed
+    members = draw_members(files, subject.path, subject.settings, *sizes)
+    refuse_twice(subject.keys, [Setting(key, "", "--uncertain") for key in members.keys])
+    return members
 
 
 def list_bands(
@@ -195,9 +198,7 @@ def _format_call(arguments: Namespace, subject: Subject) -> str:
     words += [word for key, value, _ in subject.settings for word in ("--set", f"{key}={value}")]
     words += ["--samples", str(arguments.samples), "--seed", str(arguments.seed)]
     words += ["--metric", ",".join(subject.names), *(["--second"] if arguments.second else [])]
-    for file in arguments.uncertain:
-        words += ["--uncertain", str(file), "--members", str(arguments.members)]
-    return format_command([*words, "--out", str(arguments.out)])
+    return format_command([*words, *list_words(arguments), "--out", str(arguments.out)])
 
 
 class Findings(NamedTuple):

@@ -114,7 +114,7 @@ def _evolve(
     shares = next(generations)
     while True:
         points = subject.make_points(shares, len(done) + 1)
-        _refuse_others(evaluation.folder.path, subject, points, evaluation.records)
+        _refuse_others(arguments.out, subject, points, evaluation.records)
         evaluation.finish(make_bundles(points).every, subject.keys)
         records = evaluation.collect()
         if lost := evaluation.failed.keys() - evaluation.records.keys():

@@ -123,7 +123,7 @@ def test_what_the_scene_does_not_permit_is_drawn_again_and_said(here, refused):
     wide[3, 3] = 0.01  # a weight of 0.1 ± 0.1: 16 % are below 0
     members = draw(fitted(here, covariance=wide.tolist()), count=200)
     weights = [each.scene.section("relaxation").weights[0] for each in members.points]
-    assert [each.index for each in members.points] == list(range(1, 201))
+    assert [each.index for each in members.points] == list(range(200))
     assert 0.0 <= min(weights) < 0.02
     said = members.note.partition("seed 1; ")[2]
     # 0.16 / 0.84 of 200: 38 ± 3 standard deviations of 7.
@@ -371,5 +371,18 @@ def test_a_run_stopped_before_its_bands_says_how_to_have_them(
     begin = "Stopped before uncertainty.json; to have it: digiclay "
     assert said.startswith(begin)
     assert call(said.removeprefix(begin)) == 0
+    again = (here / "first/uncertainty.json").read_bytes()
+    assert again == (measured / "o/uncertainty.json").read_bytes()
+
+
+def test_a_run_outlives_the_processes_of_its_members(measured, here, monkeypatch, capsys):
+    pytest.importorskip("distributed", reason="digiclay[cluster] is not installed")
+    monkeypatch.setattr("digiclay.commands.cluster.PATIENCE", 0.5)
+    line = f"run my.toml --uncertain '{measured}/fitted.toml' --members 40 --quiet --out first"
+    assert call(f"{line} --scheduler tcp://127.0.0.1:9") == 2
+    told, error = capsys.readouterr().err.splitlines()
+    assert error.startswith("No Dask scheduler answers")
+    assert list_files(here / "first") == {"scene.toml", "history.npz", "metrics.json"}
+    assert call(told.partition("to have it: digiclay ")[2]) == 0
     again = (here / "first/uncertainty.json").read_bytes()
     assert again == (measured / "o/uncertainty.json").read_bytes()

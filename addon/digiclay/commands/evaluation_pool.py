@@ -102,7 +102,7 @@ def open_pool(
 
 
 class Evaluation(ExitStack):
-    """Points of a series under evaluation, with a progress line; each is kept as soon as it is done.
+    """Points of a series under evaluation, with a progress line; a folder gets each as soon as it is done.
 
     `records` has the finished points by index, below `total`; `failed` those that no worker
     survived, which the same command tries again. `pieces`: bundles at a time, at most, where they
@@ -113,7 +113,7 @@ class Evaluation(ExitStack):
         self,
         arguments: Namespace,
         label: str,
-        folder: Folder,
+        folder: Folder | None,
         total: int,
         stop: Stop,
         *,
@@ -121,7 +121,7 @@ class Evaluation(ExitStack):
     ) -> None:
         super().__init__()
         self.folder, self.total, self.stop = folder, total, stop
-        self.records = folder.read_records()
+        self.records = folder.read_records() if folder else dict[int, Record]()
         #: Points of which errors are wanted and not estimated yet.
         self.unjudged: list[Point] = []
         self.failed: dict[int, Record] = {}
@@ -163,7 +163,8 @@ class Evaluation(ExitStack):
                             "figures": figures,
                             **({"errors_absent": absent} if absent else {}),
                         }
-                    self.folder.keep(point, keys, record)
+                    if self.folder:
+                        self.folder.keep(point, keys, record)
                     self.records[point.index] = record
 
         def fail(bundle: Sequence[Point], why: str) -> None:

@@ -2,6 +2,7 @@
 
 import os
 import shutil
+import sys
 import time
 from collections.abc import Iterator, Sequence
 from typing import Self, TextIO
@@ -128,3 +129,8 @@ def format_command(arguments: Sequence[str]) -> str:
     from subprocess import list2cmdline
 
     return list2cmdline(words)
+
+
+def tell_stopped_before(what: str, later: Sequence[str]) -> None:
+    """Print the output that a stop prevented, and the command that makes it."""
+    print(f"Stopped before {what}; to have it: {format_command(later)}", file=sys.stderr)

@@ -32,10 +32,10 @@ from .arguments import (
     told_as_options,
 )
 from .evaluation_pool import add_pool
-from .progress import Bar, Line, format_command, table
+from .progress import Bar, Line, table, tell_stopped_before
 from .refusals import refuse_without, refuse_without_blender
 from .stop import STOPPED, Stop
-from .uncertain import FILE, UNCERTAIN, describe, draw, list_words, measure, write
+from .uncertain import UNCERTAIN, add_bands, draw
 
 if TYPE_CHECKING:
     from ..core.studies.omissions import Fitted
@@ -146,18 +146,9 @@ def carry_out(arguments: Namespace) -> int:
             result = simulate(arguments, scene, path, stop)
             if fit:
                 result = replace(result, metrics={**result.metrics, "budget": noted(fit)})
-            extras, lines = _plan_extras(arguments, result), list_cautions(scene)
-            if members:
-                bands = measure(arguments, members, result, stop)
-                lines += describe(bands) if bands else []
-                words = list_words(arguments)
-                later = Extra(
-                    [FILE],
-                    partial(write, bands),
-                    lambda run: ["run", str(run), *words, "--out", str(run), "--overwrite"],
-                )
-                extras.insert(0, later)
-            return write_run(arguments, claim, result, extras, stop, *lines)
+            extras = _plan_extras(arguments, result)
+            code = write_run(arguments, claim, result, extras, stop, *list_cautions(scene))
+            return add_bands(arguments, members, result, out, stop) if members else code
 
 
 def _refuse_early(arguments: Namespace, scene: Scene) -> None:
@@ -285,8 +276,3 @@ def write_run(
     if wrong:
         raise wrong[0]
     return STOPPED if stop() else 0
-
-
-def tell_stopped_before(what: str, later: Sequence[str]) -> None:
-    """Print the output that a stop prevented, and the command that makes it."""
-    print(f"Stopped before {what}; to have it: {format_command(later)}", file=sys.stderr)

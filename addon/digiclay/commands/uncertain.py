@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from argparse import Namespace
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -16,14 +15,12 @@ from ..core.scene.scene_source import find
 from ..core.session.run_scene import Result
 from ..core.studies.axes import Point
 from ..core.studies.evaluation import TIMES, explain_failed_batches, make_bundles
-from ..core.studies.series import finish
 from ..core.studies.speed_limits import find_free_speed
 from ..core.studies.uncertainty import LEAST, MEMBERS, MOST, Members, draw_members, find_band
-from .arguments import settings_of, whole_number
-from .evaluation_pool import open_pool
-from .progress import Counted
-from .progress import table as aligned
-from .stop import Stop
+from .arguments import say, settings_of, whole_number
+from .evaluation_pool import Evaluation
+from .progress import table, tell_stopped_before
+from .stop import STOPPED, Stop
 
 #: Options of the uncertainty.
 UNCERTAIN: dict[str, Any] = {
@@ -64,64 +61,66 @@ def draw(arguments: Namespace) -> Members | None:
 
 
 def list_words(arguments: Namespace) -> list[str]:
-    """Return the options of the uncertainty."""
+    """Return the options that draw the same members with the same seed."""
     words = [word for file in arguments.uncertain for word in ("--uncertain", str(file))]
-    return [*words, "--members", str(arguments.members), "--seed", str(arguments.seed)]
+    return [*words, "--members", str(arguments.members)] if words else []
+
+
+def add_bands(arguments: Namespace, members: Members, result: Result, run: Path, stop: Stop) -> int:
+    """Add the bands of a run to its folder, and print them; return the exit code."""
+    content = None
+    try:
+        content = measure(arguments, members, result, stop)
+    finally:
+        if content is None:  # also when the processes broke down
+            words = [*list_words(arguments), "--seed", str(arguments.seed)]
+            tell_stopped_before(FILE, ["run", str(run), *words, "--out", str(run), "--overwrite"])
+    if content is None:
+        return STOPPED
+    write_whole(run / FILE, format_json(content))
+    if not content["bands"]:
+        raise DigiclayError(f"No metric has {LEAST} members: {content['notes'][-1]}")
+    say(arguments, *describe(content))
+    return 0
 
 
 def measure(arguments: Namespace, members: Members, result: Result, stop: Stop) -> Record | None:
     """Run the members, and return the content of the file; None after a stop."""
-    points, records = members.points, dict[int, Record]()
-    bundles = make_bundles(points)
-
-    def keep(bundle: Sequence[Point], evaluated: Sequence[Record | None]) -> None:
-        for point, record in zip(bundle, evaluated, strict=True):
-            if record is not None:
-                records[point.index] = record
-
-    def fail(bundle: Sequence[Point], why: str) -> None:
-        keep(bundle, [{"error": why}] * len(bundle))
-
-    with Counted(sys.stderr, "bands", "members", quiet=arguments.quiet) as bar:
-
-        def draw_bar(note: str) -> None:
-            bar(len(records), len(points), note)
-
-        with open_pool(arguments, len(bundles.every), stop, draw_bar) as evaluate:
-            finish(evaluate(bundles.every), keep, fail)
+    points, bundles = members.points, make_bundles(members.points)
+    with Evaluation(arguments, "bands", None, len(points), stop) as evaluation:
+        evaluation.finish(bundles.every, members.keys)
+        records = evaluation.collect()
     if len(records) < len(points):
         return None
-    for point in points:
-        figures = records[point.index].get("figures", {})
-        for name in TIMES:  # others each time
-            figures.pop(name, None)
-        if point.scene and figures:
-            figures["free_rise"] = find_free_speed(point.scene)
-    every = [records[point.index] for point in points]
+    rows = [_make_row(members.keys, point, records[point.index]) for point in points]
     notes = [members.note, *bundles.describe(), *explain_failed_batches(records)]
-    if failed := [record["error"] for record in every if "error" in record]:
-        notes.append(f"{len(failed)} of {len(every)} members failed; the first: {failed[0]}")
-    bands = find_bands(result, [record["figures"] for record in every if "figures" in record])
-    values = [map(float, point.words) for point in points]
-    rows = [
-        {"values": dict(zip(members.keys, each, strict=True)), **record}
-        for each, record in zip(values, every, strict=True)
-    ]
+    if failed := [row["error"] for row in rows if "error" in row]:
+        notes.append(f"{len(failed)} of {len(rows)} members failed; the first: {failed[0]}")
+    bands = find_bands(result, [row["figures"] for row in rows if "figures" in row])
     return {"bands": bands, "notes": notes, "members": rows}
+
+
+def _make_row(keys: Sequence[str], point: Point, record: Record) -> Record:
+    """Return a member in the file: its values, and its record but for times, which differ each time."""
+    row = {"values": dict(zip(keys, map(float, point.words), strict=True)), **record}
+    if point.scene and "figures" in record:
+        figures = {name: value for name, value in record["figures"].items() if name not in TIMES}
+        row["figures"] = {**figures, "free_rise": find_free_speed(point.scene)}
+    return row
 
 
 def find_bands(result: Result, figures: Sequence[Record]) -> dict[str, Record]:
     """Return the band of each metric that is not 0, in SI; `figures`: of the members."""
     bands: dict[str, Record] = {}
-    own = {**result.metrics, "free_rise": find_free_speed(result.scene)}
+    nominal = {**result.metrics, "free_rise": find_free_speed(result.scene)}
     for name, (error, factor) in BANDED.items():
-        values = [each[name] for each in figures if each[name] is not None]
-        if own.get(name) and (ends := find_band(values)):
-            integration = own[error] * factor if error in own else None
+        values = [member[name] for member in figures if member[name] is not None]
+        ends = find_band(values)
+        if nominal.get(name) and ends:
             bands[name] = {
-                "value": own[name],
+                "value": nominal[name],
                 "ends": ends,
-                "integration": integration,
+                "integration": nominal[error] * factor if error in nominal else None,
                 "members": len(values),
             }
     return bands
@@ -133,10 +132,8 @@ def describe(content: Record) -> Iterator[str]:
     for name, band in content["bands"].items():
         metric, count = {**METRICS, **FREE}[name], band["members"]
         few = f" of {count}" if count < len(content["members"]) else ""
-        value, low, high, error = (
-            metric.factor * each
-            for each in (band["value"], *band["ends"], band["integration"] or 0.0)
-        )
+        value, low, high = (metric.factor * number for number in (band["value"], *band["ends"]))
+        error = metric.factor * (band["integration"] or 0.0)
         rows.append(
             [
                 metric.title,
@@ -146,14 +143,5 @@ def describe(content: Record) -> Iterator[str]:
                 f"± {error:.2g}" if error else "–",
             ]
         )
-    yield from aligned(HEAD, rows)
+    yield from table(HEAD, rows)
     yield from content["notes"]
-
-
-def write(content: Record | None, folder: Path) -> None:
-    """Write the file; refuse to have no band."""
-    if content is None:
-        return
-    write_whole(folder / FILE, format_json(content))
-    if not content["bands"]:
-        raise DigiclayError(f"No metric has {LEAST} members: {content['notes'][-1]}")

@@ -7,9 +7,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..base.arrays import Floats
+from ..base.arrays import Array, Flags, Floats
 from ..base.errors import ParameterError, SceneError
-from ..files.tables import refuse_unknown, shorten
+from ..files.tables import Table, refuse_unknown, shorten
 from ..scene.scene_source import Setting, load, read_parts, read_table, write_word
 from ..scene.schema import Scene
 from ..scene.toml_table import UNCERTAINTY
@@ -30,7 +30,7 @@ class Fitted(NamedTuple):
     keys: list[str]
     center: Floats
     """(k,): Values of the scene, as logarithms where `logarithms`, (k,)."""
-    logarithms: Any
+    logarithms: Flags
     root: Floats
     """(k, k): Multiplied by its transpose it is the covariance."""
 
@@ -42,7 +42,7 @@ class Fitted(NamedTuple):
 
 
 class Members(NamedTuple):
-    """Members of a scene: names of what varies, points from 1 on, and how they were drawn."""
+    """Members of a scene: names of what varies, points, and how they were drawn."""
 
     keys: list[str]
     points: list[Point]
@@ -59,28 +59,27 @@ def draw_members(
     """
     scene = load(path, settings)
     again = load(path, [*settings, *(part for file in files for part in read_parts(file))])
-    every = []
+    fitted = []
     for file in files:
         try:
-            every.append(_read(read_table(file).get(UNCERTAINTY), scene, again))
+            fitted.append(_read(read_table(file).get(UNCERTAINTY), scene, again))
         except ParameterError as error:
             raise SceneError(f"{file}: {error}") from None
-    every.sort(key=lambda fitted: fitted.keys)
-    keys = [key for fitted in every for key in fitted.keys]
+    fitted.sort(key=lambda each: each.keys)
+    keys = [key for each in fitted for key in each.keys]
     _require("keys", len(set(keys)) == len(keys), "must not name a parameter twice", keys)
     random = np.random.default_rng(seed)
-    points = [Point(number, (), None) for number in range(1, count + 1)]
-    outside, why = -count, ""
-    while refused := [point for point in points if point.scene is None]:
-        outside, why = outside + len(refused), why or refused[0].error
-        if outside > count:
-            raise SceneError(f"More than half of all members cannot be, such as {why}")
-        values = np.hstack([fitted.draw(random, len(refused)) for fitted in every])
+    points, refused = list[Point](), list[Point]()
+    while len(points) < count:
+        values = np.hstack([each.draw(random, count - len(points)) for each in fitted])
         rows = [tuple(map(write_word, row)) for row in values.tolist()]
-        placed = place_points(path, settings, keys, rows, option="--uncertain")
-        for point, drawn in zip(refused, placed, strict=True):
-            points[point.index - 1] = replace(drawn, index=point.index)
-    more = f"; {outside} more drawn again: {why}" if outside else ""
+        drawn = place_points(path, settings, keys, rows, option="--uncertain")
+        points += [point for point in drawn if point.scene]
+        refused += [point for point in drawn if not point.scene]
+        if len(refused) > count:
+            raise SceneError(f"More than half of all members cannot be, such as {refused[0].error}")
+    points = [replace(point, index=number) for number, point in enumerate(points)]
+    more = f"; {len(refused)} more drawn again: {refused[0].error}" if refused else ""
     return Members(keys, points, f"{count} members, seed {seed}{more}")
 
 
@@ -96,21 +95,9 @@ def _read(table: Any, scene: Scene, again: Scene) -> Fitted:
     refuse_unknown(UNCERTAINTY, table, ("keys", "logarithms", "covariance"))
     given = table.get("keys")
     size = len(given) if isinstance(given, list) else 0
-
-    def read(field: str, kinds: str, what: str, *shape: int) -> Any:
-        try:
-            values = np.array(table.get(field))
-        except ValueError:  # lists of different lengths
-            values = np.array(None)
-        rule = f"must be {' x '.join(map(str, shape))} {what}"
-        _require(
-            field, values.dtype.kind in kinds and values.shape == shape, rule, table.get(field)
-        )
-        return values
-
-    keys = read("keys", "U", "texts, at least 1", size)
-    flags = read("logarithms", "b", "of true and false", size)
-    covariance = read("covariance", "if", "numbers", size, size)
+    keys = _read_array(table, "keys", "U", "texts, at least 1", size)
+    flags = _read_array(table, "logarithms", "b", "of true and false", size)
+    covariance = _read_array(table, "covariance", "if", "numbers", size, size)
     center = np.empty(size)
     for number, key in enumerate(given):
         values = find_numbers(scene, key)
@@ -118,24 +105,35 @@ def _read(table: Any, scene: Scene, again: Scene) -> Fitted:
         _require("keys", len(values) == 1, rule, key)
         rule = "must not be changed by other options"
         _require("keys", values == find_numbers(again, key), rule, key)
-        _require(
-            "logarithms", values[0] > 0.0 or not flags[number], "must be of numbers above 0", key
-        )
+        rule = "must be of numbers above 0"
+        _require("logarithms", values[0] > 0.0 or not flags[number], rule, key)
         center[number] = np.log(values[0]) if flags[number] else values[0]
     order = np.argsort(keys)
     root = find_root(covariance[np.ix_(order, order)])
     return Fitted(keys[order].tolist(), center[order], flags[order], root)
 
 
+def _read_array(table: Table, field: str, kinds: str, what: str, *shape: int) -> Array:
+    """Return a list of the table as an array of a shape and of one of NumPy's kinds."""
+    try:
+        values = np.array(table.get(field))
+    except ValueError:  # lists of different lengths
+        values = np.array(None)
+    rule = f"must be {' x '.join(map(str, shape))} {what}"
+    _require(field, values.dtype.kind in kinds and values.shape == shape, rule, table.get(field))
+    return values
+
+
 def find_root(covariance: Floats) -> Floats:
     """Return the matrix that gives a covariance, multiplied by its transpose; ParameterError if none does."""
     scale = np.sqrt(np.abs(np.diag(covariance)))
-    with np.errstate(invalid="ignore"):
-        limits = np.outer(scale, scale)
-        alike = np.abs(covariance - covariance.T) <= ROUNDING * limits
-    sound = alike & (np.abs(covariance) <= 1.001 * limits) & (limits > 0.0)
-    values, vectors = np.linalg.eigh(covariance / limits if sound.all() else -np.eye(len(scale)))
+    with np.errstate(all="ignore"):  # what is not finite has no correlation of at most 1
+        correlation = covariance / np.outer(scale, scale)
+        lopsided = np.abs(correlation - correlation.T)
     rule = "must be finite, symmetric and positive definite, but for rounding"
+    sound = (np.abs(correlation) <= 1.001) & (lopsided <= ROUNDING)
+    _require("covariance", sound.all(), rule, covariance.tolist())
+    values, vectors = np.linalg.eigh(correlation)
     _require("covariance", values[0] > -ROUNDING, rule, covariance.tolist())
     root: Floats = scale[:, None] * vectors * np.sqrt(np.where(values > ROUNDING, values, 0.0))
     return root
@@ -146,7 +144,7 @@ def find_band(values: Sequence[float]) -> list[float]:
 
     One more member is in it with a probability of 95 %, whatever the distribution.
     """
-    ends: list[float] = []
-    if len(values) >= LEAST:
-        ends = np.quantile(values, ENDS, method="weibull").tolist()
+    if len(values) < LEAST:
+        return []
+    ends: list[float] = np.quantile(values, ENDS, method="weibull").tolist()
     return ends
