@@ -98,10 +98,10 @@ def read_formed(arguments: Namespace, command: str) -> tuple[Scene, Formed]:
 
 def read_animated(text: str) -> list[str]:
     """Read the formats of animated files."""
-    names = text.lower().split(",")
-    if not set(names) <= SUFFIXES.keys():
+    names = dict.fromkeys(text.lower().split(","))
+    if not names.keys() <= SUFFIXES.keys():
         raise ArgumentTypeError(f"must be some of {', '.join(SUFFIXES)} (got {text!r})")
-    return names
+    return list(names)
 
 
 EXAMPLES = """\
@@ -213,14 +213,13 @@ def _export_animated(arguments: Namespace) -> int:
         moments = film.moments(run.history["time"])
     time, height, position = (run.history[name] for name in ("time", "height", "position"))
     frames = np.column_stack([np.interp(moments, time, pin) for pin in height.T])
-    models = [model_of(arguments, run.scene, kind) for kind in kinds]
-    animations = [animate(position, frames, film.rate, model) for model in models]
-    folder = arguments.out or arguments.run
-    targets = [
-        (animation, name, folder / f"animated_{STEMS[kind]}{SUFFIXES[name]}")
-        for kind, animation in zip(kinds, animations, strict=True)
-        for name in dict.fromkeys(arguments.animated)
-    ]
+    folder, targets = arguments.out or arguments.run, []
+    for kind in kinds:
+        animation = animate(position, frames, film.rate, model_of(arguments, run.scene, kind))
+        stem = folder / f"animated_{STEMS[kind]}"
+        targets += [
+            (animation, name, Path(f"{stem}{SUFFIXES[name]}")) for name in arguments.animated
+        ]
     with claim_files([path for _, _, path in targets]):
         for animation, name, path in targets:
             write_animation(path, animation, name, arguments.unit)

@@ -30,21 +30,24 @@ def animate(position: Floats, height: Floats, rate: float, model: Model) -> Anim
         raise OutputError(
             "An animation must have at least 2 frames (got 1): the session is too short."
         )
-    plan, pin = position, None
     if model.kind == "pins":
-        pin, polygons = rod(model.cap, float(np.ptp(height)) + ROOTED * model.cap, SIDES)
-        fans = [(each[0], *edge) for each in polygons for edge in pairwise(each[1:])]
-        faces = np.array(fans, np.int32)
-    else:
-        formed = Formed.of(position, height[0], 0.0, 0.0, 0)
-        grid = make_skin_grid(formed, model)
-        # All frames have the triangles of the first one.
-        plan, faces = grid.position, grid.faces
-        skin = model.skin, model.parts, model.cap
-        height = np.array([interpolate_skin(formed, pins, *skin) for pins in height])
+        length = float(np.ptp(height)) + ROOTED * model.cap
+        pin, polygons = rod(model.cap, length, SIDES)
+        fans = [(first, *edge) for first, *others in polygons for edge in pairwise(others)]
+        return Animation(rate, _join(position, height), np.array(fans, np.int32), pin)
+    formed = Formed.of(position, height[0], 0.0, 0.0, 0)
+    grid = make_skin_grid(formed, model)
+    skin = model.skin, model.parts, model.cap
+    heights = np.array([interpolate_skin(formed, pins, *skin) for pins in height])
+    # All frames have the triangles of the first one.
+    return Animation(rate, _join(grid.position, heights), grid.faces)
+
+
+def _join(position: Floats, height: Floats) -> Floats:
+    """Return points (t, m, 3) at fixed positions (m, 2) and moving heights (t, m)."""
     points = np.empty((*height.shape, 3))
-    points[..., :2], points[..., 2] = plan, height
-    return Animation(rate, points, faces, pin)
+    points[..., :2], points[..., 2] = position, height
+    return points
 
 
 def write_animation(path: Path, animation: Animation, kind: str, unit: str) -> None:

@@ -430,18 +430,11 @@ class ExportAnimation(SteppedAction, Operator):
 
     def work(self, context: Context) -> Generator[float, None, None]:
         """Find the heights of all frames, which may need a simulation, and write them."""
-        bed, name = bed_of(context), bpy.path.abspath(self.filepath or "digital_clay")
-        current = next((each for each in SUFFIXES if name.endswith(SUFFIXES[each])), "")
-        if current and not self.properties.is_property_set("file_format"):
-            self.file_format = current
-        file = Path(name.removesuffix(SUFFIXES.get(current, "")) + SUFFIXES[self.file_format])
-        rate = bake.read_rate(context.scene)
+        bed, file, rate = bed_of(context), self._choose_file(), bake.read_rate(context.scene)
         if bake.is_baked(bed) and not self.take:
             position, height = bake.read_moments(bed)
         else:
-            session = running.find(bed)
-            recording = session and not self.take and takes.read_recording(session)
-            for part in bake.simulate_frames(recording or takes.read(bed, self.take), rate):
+            for part in bake.simulate_frames(self._find_take(bed), rate):
                 if isinstance(part, float):
                     yield part
                 else:
@@ -449,3 +442,18 @@ class ExportAnimation(SteppedAction, Operator):
         model = formed_bed.model(bed, kind=self.kind)
         write_animation(file, animate(position, height, rate, model), self.file_format, self.unit)
         inform(self, "Written: {}", file)
+
+    def _choose_file(self) -> Path:
+        """Return the file with the extension of its format, which the name tells where none is given."""
+        file = Path(bpy.path.abspath(self.filepath or "digital_clay"))
+        named = {suffix: name for name, suffix in SUFFIXES.items()}.get(file.suffix)
+        if named and not self.properties.is_property_set("file_format"):
+            self.file_format = named
+        stem = file.with_suffix("") if named else file
+        return Path(f"{stem}{SUFFIXES[self.file_format]}")
+
+    def _find_take(self, bed: Object) -> Take:
+        """Return the recording so far, if there is one and no take is asked for; else the take."""
+        session = running.find(bed)
+        recording = takes.read_recording(session) if session and not self.take else None
+        return recording or takes.read(bed, self.take)

@@ -58,15 +58,15 @@ def write_usd(file: BinaryIO, animation: Animation, factor: float) -> None:
     """Write a mesh, or a point instancer of pins, lengths in 1 / `factor` m, z up."""
     rate, points, faces, pin = animation
     head = USD_HEAD.format(meters=1.0 / factor, rate=rate, last=len(points) - 1)
-    name, counts = "skin" if pin is None else "pin", [3] * len(faces)
-    moving = USD_MESH.format(name=name, counts=counts, corners=faces.ravel().tolist())
+    name = "skin" if pin is None else "pin"
+    corners = faces.ravel().tolist()
+    moving = USD_MESH.format(name=name, counts=[3] * len(faces), corners=corners)
     if pin is not None:
-        prototypes = [0] * points.shape[1]
-        vertices = _list_points(pin * factor)
+        vertices, prototypes = _list_points(pin * factor), [0] * points.shape[1]
         moving = USD_PINS.format(pin=moving, vertices=vertices, prototypes=prototypes)
     file.write(f"{head}{moving}.timeSamples = {{\n".encode())
-    for frame, places in enumerate(points):
-        file.write(f"{frame}: {_list_points(places * factor)},\n".encode())
+    for frame, moved in enumerate(points):
+        file.write(f"{frame}: {_list_points(moved * factor)},\n".encode())
     file.write(b"}\n}\n}\n")
 
 
@@ -79,20 +79,21 @@ def write_glb(file: BinaryIO, animation: Animation, factor: float) -> None:
     """Write nodes that move, one per pin, or a skin with one morph target per frame, in meters, y up."""
     rate, points, faces, pin = animation
     arrays, count = GlbArrays(), len(points)
-    if pin is None and count > MOST_TARGETS:
-        rule = f"must have at most {MOST_TARGETS} frames (got {count}): choose usd or abc"
-        raise OutputError(f"An animated skin in a GLB {rule}.")
     paths = turn_upright(points.reshape(-1, 3)).reshape(points.shape)
     times = arrays.add(np.arange(count) / rate)
-    part = add_triangles(arrays, points[0] if pin is None else pin, faces)
     if pin is None:
-        moved, name = "weights", "skin"
+        if count > MOST_TARGETS:
+            rule = f"must have at most {MOST_TARGETS} frames (got {count}): choose usd or abc"
+            raise OutputError(f"An animated skin in a GLB {rule}.")
+        name, moved = "skin", "weights"
+        part = add_triangles(arrays, points[0], faces)
         part["targets"] = [{"POSITION": arrays.add(rise, "VEC3")} for rise in paths[1:] - paths[0]]
         # Each frame has the whole of its target and nothing of the others.
         outputs = [arrays.add(np.eye(count, count - 1, -1).ravel())]
         nodes: list[Record] = [{"mesh": 0, "name": name}]
     else:
-        moved, name = "translation", "pin"
+        name, moved = "pin", "translation"
+        part = add_triangles(arrays, pin, faces)
         outputs = [arrays.add(path, "VEC3") for path in paths.swapaxes(0, 1)]
         nodes = [
             {"mesh": 0, "name": f"pin_{number}", "translation": place}
