@@ -14,9 +14,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..base.arrays import Array, Cells, Floats
+from ..base.arrays import Array, Cells, Flags, Floats
 from ..base.errors import ParameterError
-from .layout import Grid
+from .layout import Grid, Layout
 
 #: Farthest vertex of a mesh, m.
 LARGEST = 1e6
@@ -111,78 +111,116 @@ def rasterize(
         For vertices that are not finite.
     """
     points = check_vertices(vertices)
-    count = samples if tip_radius > 0.0 else 1
-    middle, plan, (left, bottom) = count // 2, grid.layout, grid.corner
-    rows, columns = plan.rows * count, plan.columns * count
-    shift = plan.shift / plan.pitch * count
-    # How far below the axis the end of the pin is at each sample point.
-    side = (np.arange(count) - middle) / count
-    square = (side[:, None] * plan.row_spacing) ** 2 + (side * plan.pitch) ** 2
-    drop = (square / (2.0 * tip_radius or 1.0)).ravel()
-
-    # In distances of sample points, from the first one; vertices and corners by ascending y.
+    plan, count = grid.layout, samples if tip_radius > 0.0 else 1
     order = np.argsort(points[:, 1])
-    x = (points[order, 0] - left) * (count / plan.pitch) + middle
-    y = (points[order, 1] - bottom) * (count / plan.row_spacing) + middle
-    z = points[order, 2]
-    rank = np.empty(len(order), np.intp)
-    rank[order] = np.arange(len(order))
-    near = points[:, 2] < ceiling
+    places = _scale(points[order], grid, count)
+    corners = _sort_corners(triangles, order, points[:, 2] < ceiling)
+    corners = _add_sides_of_walls(corners, places[1])
+
+    drop = _measure_end(plan, count, tip_radius)
+    under = np.full(grid.count, np.inf)
+    lowest, _, highest = places[1][corners]
+    for triangle, row in _list_between(lowest, highest, plan.rows * count):
+        shift = row // count % 2 * (plan.shift / plan.pitch * count)
+        chord = _cut_triangles(places, corners[:, triangle], row, shift)
+        left, right = np.minimum(chord.start, chord.end), np.maximum(chord.start, chord.end)
+        for index, column in _list_between(left, right, plan.columns * count):
+            height, line = chord.find_height(index, column), row[index]
+            if count > 1:
+                height += drop[line % count, column % count]
+            np.minimum.at(under, line // count * plan.columns + column // count, height)
+    return np.where(under < ceiling, under, np.inf)
+
+
+def _measure_end(plan: Layout, count: int, radius: float) -> Floats:
+    """Return how far below its axis the end of a pin is at its sample points, (count, count), m."""
+    side = (np.arange(count) - count // 2) / count
+    square = (side[:, None] * plan.row_spacing) ** 2 + (side * plan.pitch) ** 2
+    return square / (2.0 * radius or 1.0)
+
+
+def _scale(points: Floats, grid: Grid, count: int) -> Floats:
+    """Return points (v, 3), m, as (3, v): x and y in distances of sample points from the first one."""
+    plan, middle, (left, bottom) = grid.layout, count // 2, grid.corner
+    x = (points[:, 0] - left) * (count / plan.pitch) + middle
+    y = (points[:, 1] - bottom) * (count / plan.row_spacing) + middle
+    return np.stack([x, y, points[:, 2]])
+
+
+def _sort_corners(triangles: Array, order: Cells, near: Flags) -> Cells:
+    """Return the triangles (3, t) with a vertex that is `near`, their corners as the `order` has them."""
+    rank = np.empty_like(order)
+    rank[order] = np.arange(order.size)
     a, b, c = np.ascontiguousarray(triangles.T)
     some = np.flatnonzero(near[a] | near[b] | near[c])
     a, b, c = rank[a[some]], rank[b[some]], rank[c[some]]
     low, high = np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
-    mid = a + b + c - low - high
-    # A wall along the rows, which has no two cuts with one: its three sides.
-    wall = np.flatnonzero(y[high] - y[low] <= 2.0 * ON_EDGE)
-    if wall.size:
-        a, b, c = low[wall], mid[wall], high[wall]
-        low = np.concatenate([low, a, b, a])
-        mid, high = (np.concatenate([corner, b, c, c]) for corner in (mid, high))
-
-    under = np.full(grid.count, np.inf)
-    for triangle, row in _spread(y[low], y[high], rows):
-        first, second, last = low[triangle], mid[triangle], high[triangle]
-        # A row cuts the side from the lowest to the highest corner, and one of the others.
-        upper = row > y[second] - ON_EDGE
-        x0, z0 = _cut(x, y, z, first, last, row)
-        x1, z1 = _cut(x, y, z, np.where(upper, second, first), np.where(upper, last, second), row)
-        moved = row // count % 2 * shift
-        wide = np.abs(x1 - x0) > 2.0 * ON_EDGE
-        z0 = np.where(wide, z0, np.minimum(z0, z1))  # along a wall the lowest
-        slope = np.divide(1.0, x1 - x0, out=np.zeros_like(x0), where=wide)
-        x0, x1 = x0 - moved, x1 - moved
-        for cut, column in _spread(np.minimum(x0, x1), np.maximum(x0, x1), columns):
-            part = ((column - x0[cut]) * slope[cut]).clip(0.0, 1.0)
-            height = z0[cut] + part * (z1 - z0)[cut]
-            line = row[cut]
-            cell = line // count * plan.columns + column // count
-            if count > 1:
-                height += drop[line % count * count + column % count]
-            np.minimum.at(under, cell, height)
-    return np.where(under < ceiling, under, np.inf)
+    return np.stack([low, a + b + c - low - high, high])
 
 
-def _cut(
-    x: Floats, y: Floats, z: Floats, start: Cells, end: Cells, row: Cells
-) -> tuple[Floats, Floats]:
+def _add_sides_of_walls(corners: Cells, y: Floats) -> Cells:
+    """Return triangles, and of each wall along the rows, which has no two cuts with one, its three sides."""
+    low, _, high = y[corners]
+    walls = corners[:, high - low <= 2.0 * ON_EDGE]
+    if not walls.size:
+        return corners
+    sides = (walls[side] for side in ([0, 1, 1], [1, 2, 2], [0, 2, 2]))
+    return np.concatenate([corners, *sides], axis=1)
+
+
+class _Chord(NamedTuple):
+    """Cuts of k rows with triangles, each (k,)."""
+
+    start: Floats
+    end: Floats
+    """x in distances of sample points."""
+    height: Floats
+    """At the start, m."""
+    rise: Floats
+    """From there to the end, m."""
+    slope: Floats
+    """Share of the rise per sample point."""
+
+    def find_height(self, index: Cells, column: Cells) -> Floats:
+        """Return the heights of cuts at columns, m."""
+        share = ((column - self.start[index]) * self.slope[index]).clip(0.0, 1.0)
+        return self.height[index] + share * self.rise[index]
+
+
+def _cut_triangles(places: Floats, corners: Cells, row: Cells, shift: Floats) -> _Chord:
+    """Return the cuts of rows (k,) with triangles (3, k); `shift`: of the rows along x."""
+    first, second, last = corners
+    # A row cuts the side from the lowest to the highest corner, and one of the others.
+    upper = row > places[1][second] - ON_EDGE
+    start, height = _cut_sides(places, first, last, row)
+    end, top = _cut_sides(
+        places, np.where(upper, second, first), np.where(upper, last, second), row
+    )
+    wide = np.abs(end - start) > 2.0 * ON_EDGE
+    height = np.where(wide, height, np.minimum(height, top))  # along a wall the lowest
+    slope = np.divide(1.0, end - start, out=np.zeros_like(start), where=wide)
+    return _Chord(start - shift, end - shift, height, top - height, slope)
+
+
+def _cut_sides(places: Floats, start: Cells, end: Cells, row: Cells) -> tuple[Floats, Floats]:
     """Return x and z at which rows cut sides of triangles; of a side along the row its start."""
+    x, y, z = places
     run = y[end] - y[start]
     across = run > 2.0 * ON_EDGE
-    part = np.divide(row - y[start], run, out=np.zeros_like(run), where=across).clip(0.0, 1.0)
-    return x[start] + part * (x[end] - x[start]), z[start] + part * (z[end] - z[start])
+    share = np.divide(row - y[start], run, out=np.zeros_like(run), where=across).clip(0.0, 1.0)
+    return x[start] + share * (x[end] - x[start]), z[start] + share * (z[end] - z[start])
 
 
-def _spread(low: Floats, high: Floats, limit: int) -> Iterator[tuple[Cells, Cells]]:
-    """Yield the whole numbers from `low` to `high` (k,), below `limit`, each with the index of its range."""
+def _list_between(low: Floats, high: Floats, limit: int) -> Iterator[tuple[Cells, Cells]]:
+    """Yield, in parts, the index of a range and a whole number from `low` to `high` (k,), below `limit`."""
     first = np.ceil(low - ON_EDGE).clip(0, limit).astype(np.intp)
     count = np.floor(high + ON_EDGE).clip(-1, limit - 1).astype(np.intp) - first + 1
     some = np.flatnonzero(count > 0)
     first, count = first[some], count[some]
     ends = np.cumsum(count)
+    begins = ends - count
     for part in np.split(np.arange(some.size), np.flatnonzero(np.diff(ends // CHUNK)) + 1):
         if part.size:
             index = np.repeat(part, count[part])
-            begin = ends[part] - count[part] - first[part]
-            number = np.arange(ends[part[0]] - count[part[0]], ends[part[-1]])
-            yield some[index], number - np.repeat(begin, count[part])
+            number = np.arange(begins[part[0]], ends[part[-1]])
+            yield some[index], number - np.repeat((begins - first)[part], count[part])
