@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from .compat import Context, Mesh, Object, bpy
-from .core.base.arrays import Array, Floats
+from .core.base.arrays import Array, Cells, Floats
 from .core.base.errors import DigiclayError
 from .core.model.fingertip import LEVEL, Fingertip, make_matrices
 from .roles import BED, ELLIPSOID, PALM, ROLE, fingertips_of, owner_of
@@ -227,6 +227,19 @@ def _judge_scale(rows: tuple[tuple[float, ...], ...]) -> tuple[float, str]:
     if np.linalg.det(matrix) < 0.0:
         return largest, f"must not mirror it (got {shown}, mirrored)"
     return largest, ""
+
+
+def read_triangles(bed: Object, thing: Object, mesh: Mesh) -> tuple[Floats, Cells]:
+    """Return vertices (v, 3), m, in a bed's space, and triangles (t, 3) of an object's mesh."""
+    uniform(bed)
+    mesh.calc_loop_triangles()
+    places = np.empty(3 * len(mesh.vertices), np.float32)
+    faces = np.empty(3 * len(mesh.loop_triangles), np.int32)
+    mesh.vertices.foreach_get("co", places)
+    mesh.loop_triangles.foreach_get("vertices", faces)
+    matrix = np.array(bed.matrix_world.inverted() @ thing.matrix_world)
+    points = places.reshape(-1, 3) @ matrix[:3, :3].T + matrix[:3, 3]
+    return points / SCALE, faces.reshape(-1, 3).astype(np.intp)
 
 
 def project(context: Context, bed: Object, points: Floats) -> Floats:

@@ -83,6 +83,13 @@ def fingertip_of(bed: Object) -> Object | None:
     return next(iter(fingertips_of(bed).values()), None)
 
 
+def list_meshes(context: Context) -> list[Object]:
+    """Return the selected mesh objects that are no parts of a bed."""
+    return [
+        thing for thing in context.selected_objects if thing.type == "MESH" and ROLE not in thing
+    ]
+
+
 def list_pressers(bed: Object) -> list[Object]:
     """Return the mesh objects that press a bed and stand in a scene with it, by name."""
     things = {thing for scene in bed.users_scene for thing in scene.objects}

@@ -362,6 +362,10 @@ def stl(folder, triangles):
         (change(samples=4), "body #1.samples must be odd"),
         (change(stifness=3.0), "body #1.stifness must be a known key"),
         (change(file="x.stl"), "body #1.file must be left out where mesh is given"),
+        (change(up="y"), "body #1.up must be left out where mesh is given"),
+        (change(unit="mm"), "body #1.unit must be left out where mesh is given"),
+        (change(up="w"), "body #1.up must be one of auto, z, y, x, -z, -y, -x (got 'w')"),
+        (change(unit="km"), "body #1.unit must be one of auto, mm, cm, m, inch (got 'km')"),
         (change(mesh=""), "body #1.file or mesh must be given"),
         (change(mesh="abc"), "body #1.mesh must be a mesh packed as text"),
         (change(mesh="", file="none.stl"), "body #1.file must be the file of a mesh"),
@@ -382,6 +386,7 @@ def stl(folder, triangles):
             "body #1.mesh must have a thickness",
         ),
         (table(3), "body must be a list of tables"),
+        (table(body(BALL), hand={}), "hand must be left out beside [[body]]"),
         (
             table(body(BALL), method="virtual_master"),
             "body must be left out: the method virtual_master",

@@ -40,23 +40,15 @@ def has_surface(thing: Object) -> bool:
 
 def read_relief(thing: Object, bed: Object, depsgraph: Depsgraph) -> ShapeMesh:
     """Return the surface of an object, all modifiers included, in the space of a bed, m."""
-    bridge.uniform(bed)
     evaluated = thing.evaluated_get(depsgraph)
     mesh = evaluated.to_mesh()
     if mesh is None:
         raise ParameterError("shape", "file", "must be an object with a surface", thing.name)
     try:
-        mesh.calc_loop_triangles()
-        places = np.empty(3 * len(mesh.vertices), np.float32)
-        faces = np.empty(3 * len(mesh.loop_triangles), np.int32)
-        mesh.vertices.foreach_get("co", places)
-        mesh.loop_triangles.foreach_get("vertices", faces)
+        vertices, triangles = bridge.read_triangles(bed, thing, mesh)
     finally:
         evaluated.to_mesh_clear()
-    matrix = np.array(bed.matrix_world.inverted() @ thing.matrix_world, np.float64)
-    vertices = places.reshape(-1, 3) @ matrix[:3, :3].T + matrix[:3, 3]
-    triangles = faces.reshape(-1, 3).astype(np.int64)
-    return make_shape_mesh(thing.name, vertices / bridge.SCALE, triangles, "z", 1.0)
+    return make_shape_mesh(thing.name, vertices, triangles, "z", 1.0)
 
 
 def show_relief(bed: Object, relief: Relief, shape: Shape) -> tuple[Fitted, float]:

@@ -5,7 +5,7 @@ from ..core.base.errors import DigiclayError
 from ..core.control.methods import find_method
 from ..device.pressers import read_cage
 from ..live.beds import Use, find_obstacle
-from ..roles import PRESSES, ROLE, bed_of, is_bed, is_local, list_pressers
+from ..roles import PRESSES, bed_of, is_bed, is_local, list_meshes, list_pressers
 from ..settings.declared import text
 from ..settings.groups import method_of
 from ..ui_text import localize
@@ -20,23 +20,15 @@ FINER = {"SUBSURF", "MULTIRES"}
 
 def find_pressed(context: Context) -> Object:
     """Return the bed to be pressed: active, selected, or the only one; DigiclayError without."""
-    active = bed_of(context)
-    found = [active] if active else [thing for thing in context.selected_objects if is_bed(thing)]
-    found = found or [thing for thing in context.scene.objects if is_bed(thing)]
-    if len(found) != 1:
+    candidates = [bed_of(context)], context.selected_objects, context.scene.objects
+    beds = next(filter(None, ([*filter(is_bed, things)] for things in candidates)), [])
+    if len(beds) != 1:
         rule = "Select one bed along with the meshes that are to press it (got {})"
-        raise DigiclayError(localize(rule, len(found)))
-    obstacle = find_obstacle(context, found[0], Use.FORM)
+        raise DigiclayError(localize(rule, len(beds)))
+    obstacle = find_obstacle(context, beds[0], Use.FORM)
     if obstacle:
         raise DigiclayError(obstacle)
-    return found[0]
-
-
-def list_meshes(context: Context) -> list[Object]:
-    """Return the selected mesh objects that are no parts of a bed."""
-    return [
-        thing for thing in context.selected_objects if thing.type == "MESH" and ROLE not in thing
-    ]
+    return beds[0]
 
 
 @action("digiclay.add_presser", "Add Presser", no_mesh)
@@ -68,10 +60,8 @@ def add_presser(operator: Operator, context: Context) -> None:
 )
 def remove_presser(operator: Operator, context: Context) -> None:
     """Make a mesh press the bed no longer; it stays as it is"""
-    pressers = list_pressers(bed_of(context))
-    names = [operator.presser] if operator.presser else [presser.name for presser in pressers]
-    for presser in pressers:
-        if presser.name in names:
+    for presser in list_pressers(bed_of(context)):
+        if operator.presser in ("", presser.name):
             del presser[PRESSES]
 
 

@@ -18,7 +18,7 @@ from ..live.beds import Use, active_session, blocking_reason, find_obstacle
 from ..press import brush
 from ..recorded import takes
 from ..recorded.bake import is_baked
-from ..roles import ROLE, bed_of, fingertip_of, is_bed, is_edited, list_pressers
+from ..roles import bed_of, fingertip_of, is_bed, is_edited, list_meshes, list_pressers
 from ..sessions import running
 from ..settings import own_presets
 from ..ui_text import localize
@@ -118,10 +118,7 @@ no_tool_in_view = Need(
     lambda context: not _has_view(context) or no_tool(context), "Select the Press tool in a 3D view"
 )
 no_mesh = Need(
-    lambda context: (
-        not any(thing.type == "MESH" and ROLE not in thing for thing in context.selected_objects)
-    ),
-    "Select the meshes that are to press the bed",
+    lambda context: not list_meshes(context), "Select the meshes that are to press the bed"
 )
 no_presser = Need(lambda context: not list_pressers(bed_of(context)), "No mesh presses the bed")
 no_view = Need(lambda context: not _has_view(context), "Pins are picked in a 3D view")

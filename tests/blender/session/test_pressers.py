@@ -206,6 +206,10 @@ ODD = {
         lambda ball: setattr(ball.data.vertices[7], "co", (np.nan, 0.0, 0.0)),
         lambda ball: setattr(ball.data.vertices[7], "co", (0.0, 0.0, 0.0)),
     ),
+    "Ball.mesh must have a thickness (got a flat mesh)": (
+        lambda ball: setattr(ball.scale, "z", 0.0),
+        lambda ball: setattr(ball.scale, "z", 1.0),
+    ),
     "samples must be odd (got 4)": (
         lambda ball: setattr(ball.digiclay.presser, "samples", 4),
         lambda ball: setattr(ball.digiclay.presser, "samples", 3),
@@ -317,6 +321,13 @@ def test_a_linked_mesh_is_refused(bed, ball, clock, tmp_path):
     select(here.objects[0])
     with pytest.raises(RuntimeError, match="Ball is linked: make it local first"):
         bpy.ops.digiclay.add_presser()
+
+
+def test_a_flat_mesh_is_refused(bed, ball):
+    bpy.ops.mesh.primitive_plane_add(location=ball.location, rotation=(0.3, 0.2, 0.1))
+    with pytest.raises(RuntimeError, match=r"Plane\.mesh must have a thickness"):
+        bpy.ops.digiclay.add_presser()
+    assert list_pressers(bed) == [ball]
 
 
 @pytest.mark.usefixtures("machine")

@@ -11,8 +11,11 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
+from itertools import repeat
+from operator import itemgetter
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -35,6 +38,10 @@ AHEAD = 0.06
 FASTER = 1.5
 #: Window of what no fingertip touches: its paraboloid is beyond all pins.
 FAR = (0.0, 0.0, 0.0, 1e9, 0.0, 1.0)
+
+
+#: Undersides of bodies at both ends of lines, (b, n), m, and the lower ends.
+Lines = tuple[Floats, Floats, Floats]
 
 
 class Stretch(NamedTuple):
@@ -80,12 +87,20 @@ class MovedMesh:
     def count_periods(self, period: float) -> int:
         """Return the number of control periods, s, between two computed undersides."""
         path, radius = self.trajectory, np.linalg.norm(self.mesh.vertices, axis=1).max()
-        sideways = np.hypot(*np.diff(path.positions[:, :2], axis=0).T)
+        shift = np.hypot(*np.diff(path.positions[:, :2], axis=0).T)
         cosine = np.abs((path.orientations[1:] * path.orientations[:-1]).sum(axis=1))
-        way = FASTER * sideways + 2.0 * np.arccos(np.minimum(cosine, 1.0)) * radius
-        speed = float((way / np.diff(path.times)).max(initial=0.0))
+        turn = 2.0 * np.arccos(np.minimum(cosine, 1.0))
+        speeds = (FASTER * shift + turn * radius) / np.diff(path.times)
+        speed = float(speeds.max(initial=0.0))
         time = LONGEST if self.travel >= speed * LONGEST else self.travel / speed
         return max(1, math.floor(time / period + 1e-9))
+
+    def rasterize(self, pose: Floats, grid: Grid, ceiling: float) -> Floats:
+        """Return the underside at a pose (7,), (n,), m, at most the ceiling."""
+        vertices = self.mesh.vertices @ make_matrices(pose[None, 3:])[0].T + pose[:3]
+        tip, triangles = self.tip_radius, self.mesh.triangles
+        under = rasterize(vertices, triangles, grid, self.samples, tip, ceiling)
+        return np.minimum(under, ceiling)
 
 
 class PathUndersides:
@@ -94,28 +109,26 @@ class PathUndersides:
     def __init__(
         self, bodies: tuple[MovedMesh, ...], grid: Grid, instants: Floats, ceiling: float
     ) -> None:
-        self._bodies, self._grid = bodies, grid
-        self._period, self._instants = float(instants[-1]), instants
+        self._bodies, self._instants, self._period = bodies, instants, float(instants[-1])
         self._strides = [body.count_periods(self._period) for body in bodies]
-        # Above its origin, what is no part of a body and stays above the ceiling.
-        self._beyond = [ceiling - float(body.trajectory.positions[:, 2].min()) for body in bodies]
-        self._known: list[dict[bytes, Floats]] = [{} for _ in bodies]
-        self._lines: tuple[list[int], tuple[Floats, Floats, Floats]] | None = None
+        self._make_lines = lru_cache(1)(self._join_undersides)
+
+        def remember(body: MovedMesh, stride: int) -> Callable[[bytes], Floats]:
+            # Above its origin, what is no part of the body and stays above the ceiling.
+            beyond = ceiling - float(body.trajectory.positions[:, 2].min())
+            last = int(4 + AHEAD / (stride * self._period))
+            return lru_cache(last)(lambda pose: body.rasterize(np.frombuffer(pose), grid, beyond))
+
+        self._rasterize = [*map(remember, bodies, self._strides)]
 
     def find(self, period: int) -> Stretch:
         """Return the undersides in a period."""
-        numbers = [period // stride for stride in self._strides]
-        if self._lines is None or self._lines[0] != numbers:
-            start, end = (
-                np.stack([self._compute(body, at + more)[0] for body, at in enumerate(numbers)])
-                for more in (0, 1)
-            )
-            self._lines = numbers, (start, end, np.minimum(start, end))
+        lines = self._make_lines(tuple(period // stride for stride in self._strides))
         strides = np.array(self._strides)[:, None]
         parts = (period % strides + self._instants / self._period) / strides
         moments = period * self._period + self._instants
         rise = [body.trajectory.poses(moments)[:, 2] for body in self._bodies]
-        return Stretch(*self._lines[1], parts, np.array(rise))
+        return Stretch(*lines, parts, np.array(rise))
 
     def find_lowest(self, period: int) -> Floats:
         """Return the lowest undersides from a period on for the time `AHEAD`, (b, n), m."""
@@ -126,22 +139,19 @@ class PathUndersides:
             lowest.append(np.minimum.reduce([under + height for under, height in each]))
         return np.stack(lowest)
 
-    def _compute(self, number: int, at: int) -> tuple[Floats, float]:
+    def _join_undersides(self, numbers: tuple[int, ...]) -> Lines:
+        """Return the lines from multiples of the bodies' periods to the next ones."""
+        bodies = list(enumerate(numbers))
+        start = np.stack([self._compute(body, at)[0] for body, at in bodies])
+        end = np.stack([self._compute(body, at + 1)[0] for body, at in bodies])
+        return start, end, np.minimum(start, end)
+
+    def _compute(self, body: int, at: int) -> tuple[Floats, float]:
         """Return the underside of a body at a multiple of its periods over its origin, (n,), and that, m."""
-        body, time = self._bodies[number], self._strides[number] * self._period
-        known, beyond = self._known[number], self._beyond[number]
-        (pose,) = body.trajectory.poses(np.array([at * time]))
+        time = at * (self._strides[body] * self._period)
+        (pose,) = self._bodies[body].trajectory.poses(np.array([time]))
         height, pose[2] = float(pose[2]), 0.0
-        under = known.pop(pose.tobytes(), None)
-        if under is None:
-            vertices = body.mesh.vertices @ make_matrices(pose[None, 3:])[0].T + pose[:3]
-            triangles, tip = body.mesh.triangles, body.tip_radius
-            under = rasterize(vertices, triangles, self._grid, body.samples, tip, beyond)
-            np.minimum(under, beyond, out=under)
-        known[pose.tobytes()] = under  # the last one used is the last one to go
-        if len(known) > 4 + AHEAD / time:
-            del known[next(iter(known))]
-        return under, height
+        return self._rasterize[body](pose.tobytes()), height
 
 
 #: Unit of given undersides, m: whole numbers of it are packed well, and all are exact.
@@ -159,30 +169,31 @@ class GivenUndersides:
     def __init__(self, instants: Floats, ceiling: float) -> None:
         self._shares, self._ceiling = instants / instants[-1], ceiling
         self._knots: Sequence[Knot] = ()
-        self._periods: list[int] = []
-        self._line: tuple[int, tuple[Floats, Floats, Floats]] | None = None
+        self._make_lines = lru_cache(1)(self._join_knots)
 
     def give(self, knots: Sequence[Knot]) -> None:
         """Take other undersides, by ascending periods."""
-        self._knots, self._periods, self._line = knots, [period for period, _ in knots], None
+        self._knots = knots
+        self._make_lines.cache_clear()
 
     def find(self, period: int) -> Stretch:
         """Return the undersides in a period."""
-        at = max(bisect_right(self._periods, period) - 1, 0)
-        ends = self._knots[at : at + 2]
-        if self._line is None or self._line[0] != at:
-            start, end = ends[0][1] * UNIT, ends[-1][1] * UNIT
-            low = np.minimum(start, end)
-            low[low >= self._ceiling - UNIT] = np.inf
-            self._line = at, (start, end, low)
-        lasts = max(ends[-1][0] - ends[0][0], 1)
-        part = ((period - ends[0][0] + self._shares) / lasts).clip(0.0, 1.0)
-        parts = np.tile(part, (len(ends[0][1]), 1))
-        return Stretch(*self._line[1], parts, np.zeros_like(parts))
+        at = max(bisect_right(self._knots, period, key=itemgetter(0)) - 1, 0)
+        (first, under), (last, _) = self._knots[at], self._knots[at : at + 2][-1]
+        part = ((period - first + self._shares) / max(last - first, 1)).clip(0.0, 1.0)
+        parts = np.tile(part, (len(under), 1))
+        return Stretch(*self._make_lines(at), parts, np.zeros_like(parts))
 
     def find_lowest(self, period: int) -> Floats:
         """Return the lowest undersides from this period to the next time, (b, n), m."""
         return self.find(period).low
+
+    def _join_knots(self, at: int) -> Lines:
+        """Return the lines from a time to the next one."""
+        start, end = self._knots[at][1] * UNIT, self._knots[at : at + 2][-1][1] * UNIT
+        low = np.minimum(start, end)
+        low[low >= self._ceiling - UNIT] = np.inf
+        return start, end, low
 
 
 @dataclass(frozen=True, eq=False)
@@ -260,14 +271,11 @@ class BodySystem(HandSystem):
 
     def trace(self, poses: Floats, first: int) -> list[Any]:
         """Return fingertips and bodies in each of t periods; see `System.trace`."""
-        hands: list[HandPeriod | None] = [None] * len(poses)
-        windows = np.tile(np.array(FAR)[:, None], (len(poses), 1, self.fingers))
-        if self.hand:
-            hands[:] = trace_hands(self.hand, poses)
-            for window, hand in zip(windows, hands, strict=True):
-                assert hand is not None
+        periods = []
+        hands = trace_hands(self.hand, poses) if self.hand else repeat(None, len(poses))
+        for number, hand in enumerate(hands, first):
+            window = np.tile(np.array(FAR)[:, None], self.fingers)
+            if hand:
                 window[:, : poses.shape[2]] = hand.window
-        return [
-            BodyPeriod(hand, self.undersides, first + number, window)
-            for number, (hand, window) in enumerate(zip(hands, windows, strict=True))
-        ]
+            periods.append(BodyPeriod(hand, self.undersides, number, window))
+        return periods

@@ -98,6 +98,18 @@ def map_array(path: Path) -> Array:
     return read
 
 
+def inflate(data: bytes, most: int) -> bytes:
+    """Return what zlib has packed, cut off behind `most` bytes and one; ValueError if it is damaged."""
+    packed = zlib.decompressobj()
+    try:
+        unpacked = packed.decompress(data, most + 1)
+    except zlib.error as error:
+        raise ValueError(str(error)) from None
+    if not packed.eof and len(unpacked) <= most:
+        raise ValueError("packed data that end too early")
+    return unpacked
+
+
 def encode_png(pixels: NDArray[np.uint8]) -> bytes:
     """Return the file of a picture (rows, columns, 3), sRGB, the upper row first."""
     rows, columns, _ = pixels.shape

@@ -23,6 +23,8 @@ LARGEST = 1e6
 #: Distance from an edge within which a sample point is on it, in distances of sample points:
 #: rounding must not open a gap between two triangles.
 ON_EDGE = 1e-9
+#: Thickness of a mesh, as a share of its length, below which it is flat.
+THIN = 1e-6
 #: Sample points that are computed at a time: few enough for the processor's cache.
 CHUNK = 30_000
 #: Most samples along a pitch.
@@ -70,6 +72,15 @@ def check_vertices(vertices: ArrayLike, name: str = "body") -> Floats:
         rule = f"must have vertices that are finite and at most {LARGEST:g} m away"
         raise ParameterError(name, "mesh", rule, f"vertex {bad} at {shown}")
     return points
+
+
+def refuse_flat(mesh: Mesh, name: str, field: str = "mesh") -> None:
+    """Refuse a mesh all of whose triangles are in a plane, or on a line; `field`: where it is from."""
+    used = np.zeros(len(mesh.vertices), np.bool_)
+    used[mesh.triangles] = True
+    low, _, high = np.sqrt(np.abs(np.linalg.eigvalsh(np.cov(mesh.vertices[used].T))))
+    if low < THIN * high:
+        raise ParameterError(name, field, "must have a thickness", "a flat mesh")
 
 
 def rasterize(

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import fields, replace
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -34,7 +34,9 @@ if TYPE_CHECKING:
     from ..control.device_info import DeviceInfo
     from ..control.pin_division import PinDivision
     from ..engine.bodies import Undersides
+    from ..engine.pairs import HandSystem
 
+Extended = TypeVar("Extended")
 
 #: Cells that several fingers press: module and function of the plan.
 TOGETHER = ("steppers.press_together", "plan_together")
@@ -68,17 +70,6 @@ def make_motion(scene: Scene) -> Motion:
     return Motion(cell, line, stepper, stepper.plan(cell, line, steps), steps, instants)
 
 
-def _make_control(scene: Scene, bed: Grid, motion: Motion) -> tuple[Controller, Sensors, Rows]:
-    """Return the control method and the sensors, and the rows of all parts."""
-    controller = _make_controller(scene, bed, (motion.cell,))
-    sensors = _make_sensors(scene, motion.cell, motion.line)
-    return (
-        controller,
-        sensors,
-        Rows(motion.cell.rows, motion.line.length, controller.rows, sensors.rows),
-    )
-
-
 def assemble(scene: Scene) -> System:
     """Return the system of a scene."""
     if scene.bodies:
@@ -86,22 +77,24 @@ def assemble(scene: Scene) -> System:
     if len(scene.fingers) != 1:
         return _assemble_hands(scene)
     motion, period = make_motion(scene), scene.simulation.control_period
-    bed = make_grid(scene.layout)
-    controller, sensors, rows = _make_control(scene, bed, motion)
-    fastest = float(find_speeds(motion.cell).rise)
+    cell, bed = motion.cell, make_grid(scene.layout)
+    controller = _make_controller(scene, bed, (cell,))
+    sensors = _make_sensors(scene, cell, motion.line)
+    rows = Rows(cell.rows, motion.line.length, controller.rows, sensors.rows)
+    fastest = float(find_speeds(cell).rise)
     noisy = scene.sensors and scene.sensors.noisy
     latency = scene.delay.dead_time if scene.delay else 0.0
     latency += scene.valve_lag.time_constant if scene.valve_lag else 0.0
     system = System(
         grid=bed,
-        cell=motion.cell,
+        cell=cell,
         sensors=sensors,
         controller=controller,
         stepper=motion.stepper,
         period=period,
         plan=motion.plan,
         fastest=fastest,
-        selection=Selection(bed, rows, motion.cell, period, fastest),
+        selection=Selection(bed, rows, cell, period, fastest),
         instants=motion.instants,
         rows=rows,
         by_set=bool(noisy or (scene.control and find_method(scene.method).by_set)),
@@ -110,17 +103,16 @@ def assemble(scene: Scene) -> System:
         hands=(),
     )
 
-    def move_alone(part: Segment, line: Queue) -> System:
-        plan = motion.stepper.plan(motion.cell, line, (part,))
-        return replace(system, plan=plan, instants=system.instants[: part.nodes[-1] + 1])
+    def plan(line: Queue, steps: tuple[Segment, ...]) -> System:
+        return replace(system, plan=motion.stepper.plan(cell, line, steps))
 
-    return replace(system, hands=_make_hand_steps(scene, motion, move_alone))
+    return replace(system, hands=_make_hand_steps(scene, motion, plan))
 
 
 def _make_hand_steps(
-    scene: Scene, motion: Motion, move_alone: Callable[[Segment, Queue], System]
+    scene: Scene, motion: Motion, plan: Callable[[Queue, tuple[Segment, ...]], System]
 ) -> tuple[HandStep, ...]:
-    """Return the steps of a period in which fingertips give way; `move_alone`: system of one step."""
+    """Return the steps of a period in which fingertips give way; `plan`: makes the system of some steps."""
     if motion.cell.touch is None or not any(scene.list_parts("hand")):
         return ()
     from ..model.yielding_hand import make_swing
@@ -128,44 +120,46 @@ def _make_hand_steps(
     steps, before = [], motion.steps[-1]
     for part in motion.steps:
         first, last = part.nodes[0], part.nodes[-1]
-        alone = replace(part, start=0.0, nodes=tuple(node - first for node in part.nodes))
-        steps.append(
-            HandStep(
-                move_alone(alone, motion.line.start_at(part.start)),
-                slice(first, last + 1),
-                make_swing(scene.list_parts("hand"), part.length, before.length),
-            )
-        )
+        nodes = tuple(node - first for node in part.nodes)
+        alone = plan(motion.line.start_at(part.start), (replace(part, start=0.0, nodes=nodes),))
+        alone = replace(alone, instants=motion.instants[: nodes[-1] + 1])
+        swing = make_swing(scene.list_parts("hand"), part.length, before.length)
+        steps.append(HandStep(alone, slice(first, last + 1), swing))
         before = part
     return tuple(steps)
+
+
+def _extend(kind: type[Extended], base: Any, **parts: Any) -> Extended:
+    """Return a dataclass of a more special kind than `base`, with other parts."""
+    shared = {field.name: getattr(base, field.name) for field in fields(base)}
+    return kind(**shared | parts)
 
 
 def _assemble_bodies(scene: Scene) -> System:
     """Return the system of a scene with bodies, which press like further fingers."""
     from ..engine.bodies import BodySelection, BodySystem, GivenUndersides
-    from ..engine.pairs import HandSystem
     from ..model.fingers import join_touches
 
     bodies = [each.body for each in scene.bodies]
     # The law and the relaxation of a finger; without a mesh a fingertip touches nothing of its own.
     pressing = [
-        Finger(Fingertip(), each.contact, each.relaxation, place.trajectory)
-        for each, place in zip(bodies, scene.bodies, strict=True)
+        Finger(Fingertip(), each.body.contact, each.body.relaxation, each.trajectory)
+        for each in scene.bodies
     ]
     tips = any(finger.fingertip for finger in scene.fingers)
     fingers = scene.fingers if tips else tuple(pressing[:1] * len(scene.fingers))
     system = _assemble_hands(replace(scene, fingers=(*fingers, *pressing), bodies=()))
-    assert isinstance(system, HandSystem)
-    caps = np.array([body.cap for body in bodies])
     undersides: Undersides = GivenUndersides(system.instants, scene.ceiling)
     if not any(body.given for body in bodies):
         undersides = _trace_meshes(scene, system)
-    common = {field.name: getattr(system, field.name) for field in fields(system)}
-    selection = BodySelection(system.grid, system.rows, system.cell, system.period, system.fastest)
     touches = [cell.touch for cell in system.cells[: len(scene.fingers)] if cell.touch]
-    hand = join_touches(touches) if tips else None
-    return BodySystem(
-        **{**common, "selection": selection}, hand=hand, undersides=undersides, caps=caps
+    return _extend(
+        BodySystem,
+        system,
+        selection=_extend(BodySelection, system.selection),
+        hand=join_touches(touches) if tips else None,
+        undersides=undersides,
+        caps=np.array([body.cap for body in bodies]),
     )
 
 
@@ -194,15 +188,14 @@ def _trace_meshes(scene: Scene, system: System) -> Undersides:
     return undersides
 
 
-def _assemble_hands(scene: Scene) -> System:
+def _assemble_hands(scene: Scene) -> HandSystem:
     """Return the system of a scene with several fingers."""
     from ..engine.pairs import HandSelection, HandSystem
     from ..model.fingers import MOST_FINGERS, join_touches
 
-    if not 0 < len(scene.fingers) <= MOST_FINGERS:
-        raise ParameterError(
-            "scene", "fingers", f"must be 1 to {MOST_FINGERS}", str(len(scene.fingers))
-        )
+    count = len(scene.fingers)
+    if not 0 < count <= MOST_FINGERS:
+        raise ParameterError("scene", "fingers", f"must be 1 to {MOST_FINGERS}", str(count))
     scene = replace(scene, fingers=_pad_relaxations(scene.fingers))
     different: dict[tuple[object, ...], Motion] = {}
     motions = []
@@ -221,26 +214,29 @@ def _assemble_hands(scene: Scene) -> System:
     cells = tuple(motion.cell for motion in motions)
     controller = _make_controller(scene, system.grid, cells)
     rows = Rows(cell.rows, first.line.length, controller.rows, system.sensors.rows, len(cells))
-    common = {field.name: getattr(system, field.name) for field in fields(system)}
-    selection = HandSelection(system.grid, rows, cell, system.period, system.fastest)
-    joint = {"cell": cell, "controller": controller, "selection": selection, "rows": rows}
-    together = import_part(*TOGETHER)(cells, first.line, first.steps) if touches else None
-    plans = tuple(motion.plan for motion in motions)
-    common |= {"hands": ()}
-    hands = HandSystem(**common | joint, cells=cells, plans=plans, press_together=together)
+    hands = _extend(
+        HandSystem,
+        system,
+        cell=cell,
+        controller=controller,
+        selection=_extend(HandSelection, system.selection, rows=rows, cell=cell),
+        rows=rows,
+        hands=(),
+        cells=cells,
+        plans=(),
+        press_together=None,
+    )
 
-    def move_alone(part: Segment, line: Queue) -> System:
-        alone = {
-            id(each): each.stepper.plan(each.cell, line, (part,)) for each in different.values()
-        }
+    def plan(line: Queue, steps: tuple[Segment, ...]) -> HandSystem:
+        plans = {cell: first.stepper.plan(cell, line, steps) for cell in dict.fromkeys(cells)}
         return replace(
             hands,
-            plans=tuple(alone[id(each)] for each in motions),
-            instants=hands.instants[: part.nodes[-1] + 1],
-            press_together=import_part(*TOGETHER)(cells, line, (part,)) if touches else None,
+            plans=tuple(plans[cell] for cell in cells),
+            press_together=import_part(*TOGETHER)(cells, line, steps) if touches else None,
         )
 
-    return replace(hands, hands=_make_hand_steps(scene, first, move_alone))
+    whole = plan(first.line, first.steps)
+    return replace(whole, hands=_make_hand_steps(scene, first, plan))
 
 
 def _pad_relaxations(fingers: tuple[Finger, ...]) -> tuple[Finger, ...]:

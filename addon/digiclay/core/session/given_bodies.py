@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import zlib
 from collections.abc import Mapping
 from dataclasses import replace
@@ -11,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..base.arrays import Array
+from ..files.formats import inflate
 from ..model.laws import import_part
 from ..scene.schema import BODY, Presser, Scene
 
@@ -44,7 +46,7 @@ def unpack_bodies(scene: Scene, arrays: Mapping[str, Array]) -> tuple[Scene, tup
     path = scene.fingers[0].trajectory
     bodies = tuple(Presser(import_part(*BODY)(**parameters), path) for parameters in given)
     shape = len(periods), len(bodies), scene.cells
-    data = zlib.decompressobj().decompress(arrays[PACKED].tobytes(), 4 * int(np.prod(shape)) + 1)
+    data = inflate(arrays[PACKED].tobytes(), 4 * math.prod(shape))
     changes = np.frombuffer(data, np.uint8).reshape(4, -1).T.tobytes()
     under = np.cumsum(np.frombuffer(changes, "<i4").reshape(shape), axis=0, dtype=np.int32)
     return replace(scene, bodies=bodies), tuple(zip(periods.tolist(), under, strict=True))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import binascii
 import zlib
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,19 +12,18 @@ from numpy.typing import ArrayLike
 
 from ..base.errors import ParameterError
 from ..base.quantity import Parameters, quantity
+from ..files.formats import inflate
 from ..files.tables import shorten
 from ..mesh_io import mesh_reader
 from ..mesh_io.mesh_reader import READERS
 from ..model.contact import Contact
 from ..model.relaxation import Relaxation
-from ..model.underside import MOST_SAMPLES, Mesh, check_mesh
-from .request import AUTO, LENGTHS, UPWARDS
+from ..model.underside import MOST_SAMPLES, Mesh, check_mesh, refuse_flat
+from .request import AUTO, LENGTHS, UPWARDS, find_length, turn_up
 
 #: Most triangles of a body, whose underside is computed many times per second, and bytes of a
 #: packed mesh.
 MOST_TRIANGLES, MOST_BYTES = 1_000_000, 100_000_000
-#: Thickness of a body, as a share of its length, below which it is flat.
-THIN = 1e-6
 #: Rate of stiffening of a body's contact, 1/m: at the cap a spring is straight to 0.1 %.
 STRAIGHT = 1.0
 
@@ -59,10 +57,11 @@ class Body(Parameters):
     )
 
     def check(self) -> None:
-        """Refuse a body with two meshes, and an even number of samples."""
-        if self.file and self.mesh:
-            rule = "must be left out where mesh is given"
-            raise ParameterError("Body", "file", rule, self.file)
+        """Refuse keys of a file beside a mesh, and an even number of samples."""
+        for field, usual in (("file", ""), ("up", AUTO), ("unit", AUTO)):
+            value = getattr(self, field)
+            if self.mesh and value != usual:
+                raise ParameterError("Body", field, "must be left out where mesh is given", value)
         if self.samples % 2 == 0:
             raise ParameterError("Body", "samples", "must be odd", str(self.samples))
 
@@ -92,48 +91,44 @@ def pack_mesh(vertices: ArrayLike, triangles: ArrayLike) -> str:
     return base64.b64encode(zlib.compress(head + body)).decode("ascii")
 
 
+def read_body(body: Body, owner: str = "body") -> Mesh:
+    """Return the mesh of a body in its own axes, m, z up; ParameterError if it cannot press pins."""
+    mesh = _unpack(body.mesh, owner) if body.mesh else _read_file(body, owner)
+    refuse_flat(mesh, owner, "mesh" if body.mesh else "file")
+    return mesh._replace(vertices=mesh.vertices * body.scale)
+
+
 def _unpack(text: str, owner: str) -> Mesh:
     """Return the mesh of a text of `pack_mesh`."""
-    opened = zlib.decompressobj()
     try:
-        data = opened.decompress(base64.b64decode(text, validate=True), MOST_BYTES)
+        data = inflate(base64.b64decode(text, validate=True), MOST_BYTES)
         end = 4 + 24 * int(np.frombuffer(data, "<i4", 1)[0])
         vertices = np.frombuffer(data[4:end], "<f8").reshape(-1, 3)
         triangles = np.frombuffer(data[end:], "<i4").reshape(-1, 3)
-        whole = opened.eof and len(triangles) <= MOST_TRIANGLES
-    except (binascii.Error, ValueError, zlib.error):
-        whole = False
-    if not whole:
+        sound = len(triangles) <= MOST_TRIANGLES
+    except ValueError:
+        sound = False
+    if not sound:
         rule = f"must be a mesh packed as text, of at most {MOST_TRIANGLES:,} triangles"
         raise ParameterError(owner, "mesh", rule, repr(shorten(text)))
     return check_mesh(vertices, triangles, owner)
 
 
-def read_body(body: Body, owner: str = "body") -> Mesh:
-    """Return the mesh of a body in its own axes, m, z up; ParameterError if it cannot press pins."""
-    field = "mesh" if body.mesh else "file"
-    if body.mesh:
-        mesh = _unpack(body.mesh, owner)
-    else:
-        path = Path(body.file)
-        if path.suffix.lower() not in READERS or not path.is_file():
-            rule = f"must be the file of a mesh ({', '.join(READERS)})"
-            raise ParameterError(owner, "file", rule, body.file)
-        try:
-            read = mesh_reader.read(path)
-        except OSError as error:
-            rule = "must be a file that can be read"
-            raise ParameterError(owner, "file", rule, f"{path}: {error.strerror}") from None
-        except ParameterError as error:
-            raise ParameterError(owner, "file", error.rule, error.value, error.hint) from None
-        if len(read.faces) > MOST_TRIANGLES:
-            rule = f"must have at most {MOST_TRIANGLES:,} triangles"
-            raise ParameterError(owner, "file", rule, f"{len(read.faces):,}")
-        axes, signs = UPWARDS[read.up if body.up == AUTO else body.up]
-        length = read.length or LENGTHS["mm"] if body.unit == AUTO else LENGTHS[body.unit]
-        mesh = check_mesh(read.vertices[:, axes] * signs * length, read.faces, owner)
-    used = mesh.vertices[np.unique(mesh.triangles)]
-    low, _, high = np.sqrt(np.abs(np.linalg.eigvalsh(np.cov(used.T))))
-    if low < THIN * high:
-        raise ParameterError(owner, field, "must have a thickness", "a flat mesh")
-    return mesh._replace(vertices=mesh.vertices * body.scale)
+def _read_file(body: Body, owner: str) -> Mesh:
+    """Return the mesh of a body's file."""
+    path = Path(body.file)
+    if path.suffix.lower() not in READERS or not path.is_file():
+        rule = f"must be the file of a mesh ({', '.join(READERS)})"
+        raise ParameterError(owner, "file", rule, body.file)
+    try:
+        read = mesh_reader.read(path)
+    except OSError as error:
+        rule = "must be a file that can be read"
+        raise ParameterError(owner, "file", rule, f"{path}: {error.strerror}") from None
+    except ParameterError as error:
+        raise ParameterError(owner, "file", error.rule, error.value, error.hint) from None
+    if len(read.faces) > MOST_TRIANGLES:
+        rule = f"must have at most {MOST_TRIANGLES:,} triangles"
+        raise ParameterError(owner, "file", rule, f"{len(read.faces):,}")
+    turned = turn_up(read.vertices, read.up if body.up == AUTO else body.up)
+    return check_mesh(turned * find_length(body.unit, read.length), read.faces, owner)

@@ -4,7 +4,6 @@ A shape is a sample shape, given by its name, a mesh, a picture, or a numpy arra
 """
 
 import base64
-import binascii
 import importlib
 import math
 import zlib
@@ -16,7 +15,7 @@ import numpy as np
 
 from ..base.arrays import Floats
 from ..base.errors import ParameterError, SceneError
-from ..files.formats import map_array
+from ..files.formats import inflate, map_array
 from ..files.run_folder import find_file, list_files
 from ..mesh_io import mesh_reader
 from ..mesh_io.mesh_limits import make_refusal
@@ -25,7 +24,7 @@ from ..model.actuator import Actuator
 from ..model.layout import Grid
 from .heightmap import GRIDS, PICTURES, HeightMap, make_height_map, read_grid, read_pixels
 from .mesh_relief import ShapeMesh, make_shape_mesh
-from .request import AUTO, LENGTHS, Placement, Shape, Tops
+from .request import AUTO, Placement, Shape, Tops, find_length
 
 #: A shape from a file, in the file's unit.
 Relief = HeightMap | ShapeMesh
@@ -59,12 +58,10 @@ def unpack(text: str, grid: Grid) -> Floats:
     """Return the heights (n,), m, of the cells of a bed from a text that `pack` made for this bed."""
     wanted = 4 * grid.count
     try:
-        opened = zlib.decompressobj()
-        data = opened.decompress(base64.b64decode(text, validate=True), wanted + 1)
-        whole = opened.eof or len(data) > wanted
-    except (binascii.Error, ValueError, zlib.error):
-        whole, data = False, b""
-    if not whole or (len(data) % 4 and len(data) <= wanted):
+        data = inflate(base64.b64decode(text, validate=True), wanted)
+    except ValueError:
+        data = b"?"  # no whole number of heights
+    if len(data) % 4 and len(data) <= wanted:
         shown = repr(text if len(text) <= 20 else f"{text[:17]}...")
         raise ParameterError("shape", "heights", "must be heights packed as text", shown, HINT)
     if len(data) != wanted:
@@ -261,5 +258,5 @@ def _mesh(path: Path, shape: Shape) -> ShapeMesh:
         raise ParameterError("shape", "file", rule, str(path))
     mesh = mesh_reader.read(path)
     up = shape.up if shape.up != AUTO else mesh.up
-    length = LENGTHS[shape.unit] if shape.unit != AUTO else mesh.length or LENGTHS["mm"]
+    length = find_length(shape.unit, mesh.length)
     return make_shape_mesh(path.name, mesh.vertices, mesh.faces, up, length)

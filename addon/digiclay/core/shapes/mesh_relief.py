@@ -11,7 +11,7 @@ from ..base.arrays import Cells, Flags, Floats, Indices
 from ..mesh_io.mesh_limits import CORNERS, LARGEST, make_refusal
 from ..model.layout import RELATIVE_TOLERANCE, Grid
 from ..surface.regions import label_components
-from .request import UPWARDS, Placement, Tops
+from .request import Placement, Tops, turn_up
 
 #: A hole is small if no more than this share of the covered pins stands under it.
 SMALL = 0.05
@@ -213,5 +213,4 @@ def make_shape_mesh(
         shown = ", ".join(f"{value:g}" for value in points[bad[0]])
         rule = f"must have vertices that are finite numbers, of at most {LARGEST:g}"
         raise make_refusal(rule, name, f"vertex {bad[0]} at {shown}")
-    axes, signs = UPWARDS[up]
-    return ShapeMesh(name, points[:, axes] * signs, corners, length)
+    return ShapeMesh(name, turn_up(points, up), corners, length)

@@ -20,6 +20,19 @@ UPWARDS: dict[str, tuple[tuple[int, int, int], tuple[int, int, int]]] = {
     "-x": ((2, 1, 0), (1, 1, -1)),
 }
 AUTO = "auto"
+
+
+def turn_up(vertices: Floats, up: str) -> Floats:
+    """Return the vertices (v, 3) of a file with z upwards; `up`: one of `UPWARDS`."""
+    axes, signs = UPWARDS[up]
+    return vertices[:, axes] * signs
+
+
+def find_length(unit: str, of_file: float | None) -> float:
+    """Return the length of a unit, m; `AUTO`: that of the file, or of a millimeter if it names none."""
+    return of_file or LENGTHS["mm"] if unit == AUTO else LENGTHS[unit]
+
+
 #: Unit and bounds of a length that places a shape.
 LENGTH: Record = {"unit": "m", "at_least": -100.0, "at_most": 100.0}
 
