@@ -29,8 +29,6 @@ ABOVE, HALF = 0.15, 0.4
 LOOKS = (DARK, 6.0), (LIGHT, 1.8)
 #: Least share that is drawn.
 LEAST = 0.02
-
-
 #: Beds whose lines are stored.
 MOST = 32
 
@@ -53,10 +51,10 @@ def find_hatch(grid: Grid, height: Floats, shares: Floats, skin: bool) -> Floats
     tops, pins = np.column_stack([grid.positions, height]), np.flatnonzero(shares > LEAST)
     ends = []
     for neighbor in (beside[pins, 1], beside[pins, 1 + half]):
-        way = 0.5 * (tops[neighbor] - tops[pins])
+        arm = 0.5 * (tops[neighbor] - tops[pins])
         if not skin:
-            way = HALF * pitch * np.sign(way) * (0.7, 0.7, 0.0)
-        ends.append(tops[pins] + shares[pins, None] * way + (0.0, 0.0, ABOVE * pitch))
+            arm = HALF * pitch * np.sign(arm) * (0.7, 0.7, 0.0)
+        ends.append(tops[pins] + shares[pins, None] * arm + (0.0, 0.0, ABOVE * pitch))
     return np.stack(ends, axis=1).reshape(-1, 3)
 
 
@@ -97,24 +95,30 @@ def _draw() -> None:
 
 
 def _find_batch(bed: Object) -> Any:
-    """Return the lines over a bed; None: no pin is locked."""
-    import gpu
-    from gpu_extras.batch import batch_for_shader
-
+    """Return the lines over a bed, made again where anything of them has changed; None: no pin is locked."""
     if running.find(bed) is None and beds.STATE not in bed:
         return None
     uid, made_of = bed.session_uid, identify(bed)
     former, batch = DRAWN.hatches.pop(uid, (None, None))
     if former != made_of:
-        shares, batch = find_shares(bed), None
-        if (shares > LEAST).any():
-            ends = find_hatch(*read_surface(bed), shares, view.is_skin_shown(bed)) * bridge.SCALE
-            shader = gpu.shader.from_builtin("POLYLINE_UNIFORM_COLOR")
-            batch = batch_for_shader(shader, "LINES", {"pos": ends.astype(np.float32)})
+        batch = _make_batch(bed)
     DRAWN.hatches[uid] = made_of, batch
     if len(DRAWN.hatches) > MOST:
         del DRAWN.hatches[next(iter(DRAWN.hatches))]
     return batch
+
+
+def _make_batch(bed: Object) -> Any:
+    """Return new lines over a bed; None: no pin is locked."""
+    import gpu
+    from gpu_extras.batch import batch_for_shader
+
+    shares = find_shares(bed)
+    if not (shares > LEAST).any():
+        return None
+    ends = find_hatch(*read_surface(bed), shares, view.is_skin_shown(bed)) * bridge.SCALE
+    shader = gpu.shader.from_builtin("POLYLINE_UNIFORM_COLOR")
+    return batch_for_shader(shader, "LINES", {"pos": ends.astype(np.float32)})
 
 
 def _draw_hatch(context: Context, bed: Object, batch: Any) -> None:

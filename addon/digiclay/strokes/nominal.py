@@ -269,7 +269,9 @@ def _mark(nominal: Nominal, stroke: Stroke, device: Device, image: Image, index:
     """Bring pins about the path from a sample to the next one, `index`, to their heights, in place."""
     level = device.find_level(stroke, image, nominal.before)
     for start, end in pairwise(_divide_path(nominal, stroke, device, image, index, level)):
-        cells = _find_beside(device, start.place, end.place)
+        cells = _find_beside(device.grid, start.place, end.place, device.reach)
+        if device.locked is not None:
+            cells = cells[~device.locked[cells]]
         counted = device.find_start(stroke, nominal.ground)[cells]
         ground = counted if level is None else nominal.ground[cells]
         if device.blister is None:
@@ -308,11 +310,10 @@ def _divide_path(
     return ends
 
 
-def _find_beside(device: Device, start: Place, end: Place) -> Cells:
-    """Return the pins about a piece of a path, m, but for those that nothing moves."""
+def _find_beside(grid: Grid, start: Place, end: Place, reach: float) -> Cells:
+    """Return the pins in a disc about a piece of a path, all within reach of it, m, among them."""
     middle = 0.5 * (start[0] + end[0]), 0.5 * (start[1] + end[1])
-    cells = device.grid.disc(*middle, device.reach + 0.5 * math.dist(start, end))
-    return cells if device.locked is None else cells[~device.locked[cells]]
+    return grid.disc(*middle, reach + 0.5 * math.dist(start, end))
 
 
 def _limit_change(stroke: Stroke, change: Floats, gone: Floats) -> tuple[Floats, Flags]:
@@ -356,8 +357,7 @@ def _weigh(weight: Floats, stroke: Stroke, device: Device, image: Image, index: 
     last, sample = stroke.samples[max(index - 1, 0)], stroke.samples[index]
     start, end = image.place(last.x, last.y), image.place(sample.x, sample.y)
     radius, falloff = find_radius(device.finger, device.grid.layout), stroke.falloff
-    reach = radius + 0.5 * math.dist(start, end)
-    cells = device.grid.disc(0.5 * (start[0] + end[0]), 0.5 * (start[1] + end[1]), reach)
+    cells = _find_beside(device.grid, start, end, radius)
     distance, share = _measure(device.grid, cells, start, end)
     named = evaluate(RING[stroke.brush] if falloff is Falloff.DEVICE else falloff, distance, radius)
     first, full = (1.0, 1.0) if stroke.brush in LOCKS else (last.share, sample.share)

@@ -24,14 +24,15 @@ class Ghost:
 
     def has_grown(self, stroke: Stroke, before: Floats, device: Device) -> bool:
         """Tell whether the stroke of its number, on pins at heights (n,), m, is this one drawn on."""
-        if stroke.from_base and not _is_near(self.device.base, device.base):
-            return False
-        if not np.array_equal(self.device.shares, device.shares):
-            return False
-        former, count = self.stroke, self.nominal.count
-        same = former.images == stroke.images and former.turn is stroke.turn
-        same = same and former.samples[count - 1 :][:1] == stroke.samples[count - 1 :][:1]
-        return same and _is_near(self.nominal.before, before)
+        former, last = self.stroke, slice(self.nominal.count - 1, self.nominal.count)
+        return (
+            former.images == stroke.images
+            and former.turn is stroke.turn
+            and former.samples[last] == stroke.samples[last]
+            and np.array_equal(self.device.shares, device.shares)
+            and _is_near(self.nominal.before, before)
+            and (not stroke.from_base or _is_near(self.device.base, device.base))
+        )
 
 
 def _is_near(former: Floats | None, now: Floats | None) -> bool:
