@@ -9,7 +9,7 @@ from which that follows; else the knee is that of the scene's stroke.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from digiclay.core.base.arrays import Floats
@@ -95,46 +95,44 @@ class CellModel:
         self.power = orifice.power
         self.resistance = scene.conduit.resistance(scene.fluid) if scene.conduit else 0.0
         absent = 1e-3 if "lag" in groups else 1e-9
-        lag = scene.valve_lag.time_constant if scene.valve_lag else absent
-        dead = scene.delay.dead_time if scene.delay else 0.0
         self.usual = {
             HIGH: scene.supply.high,
             LOW: scene.supply.low,
-            LAG: lag,
-            DELAY: dead,
+            LAG: scene.valve_lag.time_constant if scene.valve_lag else absent,
+            DELAY: scene.delay.dead_time if scene.delay else 0.0,
         }
-        start, far = math.log(orifice.laminar), math.log(1e4)
-        found = [Parameter(DIAMETER, "m3/(s Pa)", start, start - far, start + far, log=True)]
-        if "stroke" in groups:
-            low, high = math.log(10.0), math.log(1e9)
-            knee = Parameter(STROKE, "Pa", math.log(KNEES[0]), low, high, True, beside=DIAMETER)
-            found.append(knee)
-        if "supply" in groups:
-            for key in (HIGH, LOW):
-                found.append(Parameter(key, "Pa", self.usual[key], -1e6, 1e6))
-        if "lag" in groups:
-            found.append(
-                Parameter(LAG, "s", math.log(lag), math.log(1e-5), math.log(1.0), log=True)
-            )
-        if "delay" in groups:
-            longest = max(float(trial.time[-1]) for trial in self.trials) / 2.0
-            found.append(Parameter(DELAY, "s", min(dead, longest / 2.0), 0.0, longest))
-        self.defaults = {i: each.start for i, each in enumerate(found)}
         #: Logarithm of knee times conductance: that of a stroke, at any diameter.
         self.knee = math.log(orifice.knee * orifice.laminar)
-        if "stroke" in groups:
-            self.defaults[1] = math.log(orifice.knee)
-        first = len(found)
+        shared = list(self._list_shared(orifice.laminar))
+        zeros = []
         for number, trial in enumerate(trials, 1):
-            rest = float(trial.answer[0])
-            low, high = rest - 1.0, rest + 1.0
-            key = f"zero of height {number}"
-            found.append(Parameter(key, "m", rest, low, high, wanted=False, of_trial=True))
-        self.parameters, self.zeros = tuple(found), first
-        self.index = {each.key: i for i, each in enumerate(found)}
+            rest, key = float(trial.answer[0]), f"zero of height {number}"
+            bounds = rest - 1.0, rest + 1.0
+            zeros.append(Parameter(key, "m", rest, *bounds, wanted=False, of_trial=True))
+        self.parameters, self.zeros = (*shared, *zeros), len(shared)
+        self.index = {each.key: i for i, each in enumerate(self.parameters)}
+        self.defaults = {i: each.start for i, each in enumerate(shared)}
+        if STROKE in self.index:
+            self.defaults[self.index[STROKE]] = math.log(orifice.knee)
         self.held_first = tuple(
             self.index[key] for key in (STROKE, LAG, DELAY) if key in self.index
         )
+
+    def _list_shared(self, conductance: float) -> Iterator[Parameter]:
+        """Give the parameters that all trials share, the conductance first, then the knee if it is free."""
+        start, far = math.log(conductance), math.log(1e4)
+        yield Parameter(DIAMETER, "m3/(s Pa)", start, start - far, start + far, log=True)
+        if "stroke" in self.groups:
+            low, high = math.log(10.0), math.log(1e9)
+            yield Parameter(STROKE, "Pa", math.log(KNEES[0]), low, high, True, beside=DIAMETER)
+        if "supply" in self.groups:
+            for key in (HIGH, LOW):
+                yield Parameter(key, "Pa", self.usual[key], -1e6, 1e6)
+        if "lag" in self.groups:
+            yield Parameter(LAG, "s", math.log(self.usual[LAG]), math.log(1e-5), 0.0, log=True)
+        if "delay" in self.groups:
+            longest = max(float(trial.time[-1]) for trial in self.trials) / 2.0
+            yield Parameter(DELAY, "s", min(self.usual[DELAY], longest / 2.0), 0.0, longest)
 
     def _value(self, free: Floats, key: str) -> float:
         """Return a parameter in SI, or what it is where it is not free."""
@@ -201,8 +199,8 @@ class CellModel:
             conductance * lift_slope / series**2 * push,
             np.divide(by_wide, size, out=np.zeros_like(size), where=size > 0.0),
         )
-        way = np.sign(drop)
-        return flow * way, by_log * way, by_knee * way, by_drop, by_size * way * sign
+        down = np.sign(drop)
+        return flow * down, by_log * down, by_knee * down, by_drop, by_size * down * sign
 
     def list_starts(self) -> list[Floats]:
         """Return the values at which a fit starts: with a free knee below, about and above the supply."""
@@ -217,30 +215,19 @@ class CellModel:
 
     def derive(self, free: Floats) -> list[Derived]:
         """Return the values for a scene; the stroke too if it is free, else the diameter with that stroke."""
-        valve, fluid = self.valve, self.fluid
-        conductance = free[0]
+        valve, fluid, unit = self.valve, self.fluid, np.eye(free.size)
         drag = 8.0 * valve.knee_reynolds**2 * fluid.density * fluid.viscosity
         shape = math.log(math.pi * valve.discharge_slope)
-        unit = np.eye(free.size)
-        found = []
+        wide, gradient = 0.5 * (math.log(drag * valve.stroke) + free[0]), 0.5 * unit[0]
+        derived = []
         if "stroke" in self.groups:
-            term = math.log(4.0 * math.sqrt(fluid.density / 2.0)) + conductance + 0.5 * free[1]
+            wide = math.log(4.0 * math.sqrt(fluid.density / 2.0)) + free[0] + 0.5 * free[1]
             gradient = unit[0] + 0.5 * unit[1]
-            found.append(
-                Derived(
-                    STROKE,
-                    "m",
-                    2.0 * term - math.log(drag) - conductance,
-                    2.0 * gradient - unit[0],
-                    True,
-                )
-            )
-        else:
-            term, gradient = 0.5 * (math.log(drag * valve.stroke) + conductance), 0.5 * unit[0]
-        found.insert(0, Derived(DIAMETER, "m", 0.5 * (term - shape), 0.5 * gradient, True))
-        for place, each in enumerate(self.parameters):
-            if each.wanted and each.key not in (DIAMETER, STROKE):
-                found.append(
-                    Derived(each.key, each.unit, float(free[place]), unit[place], each.log)
-                )
-        return found
+            stroke = 2.0 * wide - math.log(drag) - free[0]
+            derived.append(Derived(STROKE, "m", stroke, unit[0] + unit[1], True))
+        derived.insert(0, Derived(DIAMETER, "m", 0.5 * (wide - shape), 0.5 * gradient, True))
+        return derived + [
+            Derived(each.key, each.unit, float(free[i]), unit[i], each.log)
+            for i, each in enumerate(self.parameters)
+            if each.wanted and each.key not in (DIAMETER, STROKE)
+        ]

@@ -218,18 +218,15 @@ class SteppedAction(TimedAction):
         if event.type != "TIMER":
             return {"RUNNING_MODAL"}
         until = time.perf_counter() + SHARE * TICK
-        try:
-            share = next(self._steps)
-            while time.perf_counter() < until:
-                share = next(self._steps)
-        except StopIteration:
-            self.cancel(context)
-            return {"FINISHED"}
-        context.window_manager.progress_update(100.0 * share)
-        show_status(
-            context, localize("{}: {:.0f} %     Esc: stop", localize(self.bl_label), 100.0 * share)
-        )
-        return {"RUNNING_MODAL"}
+        for share in self._steps:
+            if time.perf_counter() >= until:
+                percent = 100.0 * share
+                context.window_manager.progress_update(percent)
+                words = localize("{}: {:.0f} %     Esc: stop", localize(self.bl_label), percent)
+                show_status(context, words)
+                return {"RUNNING_MODAL"}
+        self.cancel(context)
+        return {"FINISHED"}
 
     def cancel(self, context: Context) -> None:
         """Take back what shows the progress."""
