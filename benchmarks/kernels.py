@@ -7,9 +7,10 @@ from pathlib import Path
 
 import numpy as np
 from digiclay.core.engine.simulation import begin, periods
+from digiclay.core.files.run_folder import list_files
 from digiclay.core.files.tables import Record
 from digiclay.core.scene.assembly import assemble
-from digiclay.core.scene.scene_source import find, list_samples, make_scene, read_table
+from digiclay.core.scene.scene_source import SAMPLES, find, make_scene, read_table
 from digiclay.core.scene.schema import Scene
 
 from digiclay_study.method_trials import GROUPS, LIMITS, RANDOM, list_trajectories, place_trial
@@ -36,9 +37,9 @@ QUICK, EVERY = 12, 10
 
 
 def list_scenes() -> dict[str, Scene]:
-    """Return the sample scenes with each method that fits, and the suite's trajectories, by name."""
+    """Return samples without bodies, with each method that fits, and the suite's trajectories, by name."""
     scenes, groups = {}, [group for group in GROUPS if group not in LIMITS]
-    for name in list_samples():
+    for name in list_files(SAMPLES, ".toml"):
         table = read_table(find(name))
         for method in METHODS:
             given = dict(table)

@@ -37,27 +37,31 @@ scenes = ["ridge_mound_valley"]
 [film]
 """
 FRAME = 300
-#: Scenes of several fingers.
+#: Scenes of several fingers, and of bodies.
 HANDS = ("two_hands_bowl", "pinch_crease", "five_fingers_mound")
+BODIES = ("hand_print", "face_cast", "ball_track")
 #: Instants at which a scene shows more than at its last touch, s.
 INSTANTS = {
+    "ball_track": 4.58,
     "elastic_press": 1.4,
+    "face_cast": 4.4,
     "five_fingers_mound": 7.0,
     "force_display": 3.0,
+    "hand_print": 3.0,
     "pinch_crease": 7.0,
     "slow_press": 2.4,
     "tap": 0.2,
     "two_hands_bowl": 9.0,
     "viscous_press": 2.7,
 }
-#: Film of one of them: a series, and how long a frame is shown, ms.
-HAND_FILM = """\
-scenes = ["two_hands_bowl"]
+#: Films of some: a series of a scene at a speed, and how long a frame is shown, ms.
+SCENE_FILM = """\
+scenes = ["{}"]
 [film]
 width = 640
 height = 400
 rate = 10
-speed = 3.0
+speed = {}
 arrows = false
 """
 SHOWN_FOR = 100
@@ -154,7 +158,7 @@ def draw_instant(folder: Path, name: str, size: str, color: str = "neutral") -> 
 
 
 def draw_hands(folder: Path, name: str) -> None:
-    """Draw an instant of a scene of several fingers."""
+    """Draw an instant of a scene of several fingers or of bodies."""
     save_jpeg(draw_instant(folder, name, "900x563"), f"{name}.jpg", 85)
 
 
@@ -163,11 +167,11 @@ def draw_sample(folder: Path, name: str) -> None:
     save_jpeg(draw_instant(folder, name, "520x390"), f"samples/{name}.jpg", 70)
 
 
-def draw_hand_film(folder: Path) -> None:
-    """Draw a film of two hands."""
-    runs = make_film(folder, HAND_FILM, "0+53")
-    frames = [Image.open(path).convert("RGB") for path in sorted(runs.rglob("0*.png"))]
-    save_film(frames, "two_hands.webp", SHOWN_FOR)
+def draw_scene_film(folder: Path, scene: str, speed: float, frames: int, name: str) -> None:
+    """Draw a film of a scene, or its first frames."""
+    runs = make_film(folder, SCENE_FILM.format(scene, speed), f"0+{frames}")
+    film = [Image.open(path).convert("RGB") for path in sorted(runs.rglob("0*.png"))]
+    save_film(film, name, SHOWN_FOR)
 
 
 def draw_by_program(folder: Path, page: str, program: str, name: str) -> None:
@@ -293,9 +297,14 @@ DRAWN: dict[str, Callable[[Path], None]] = {
     "batch.jpg": draw_series,
     "export.jpg": draw_export,
     "shapes.jpg": draw_shapes,
-    **{f"{name}.jpg": partial(draw_hands, name=name) for name in HANDS},
+    **{f"{name}.jpg": partial(draw_hands, name=name) for name in (*HANDS, *BODIES)},
     **{f"samples/{name}.jpg": partial(draw_sample, name=name) for name in list_samples()},
-    "two_hands.webp": draw_hand_film,
+    "two_hands.webp": partial(
+        draw_scene_film, scene="two_hands_bowl", speed=3.0, frames=53, name="two_hands.webp"
+    ),
+    "hand_print.webp": partial(
+        draw_scene_film, scene="hand_print", speed=0.8, frames=38, name="hand_print.webp"
+    ),
     "hand_forces.png": draw_hand_forces,
     "noise.svg": partial(
         draw_by_program, page="figure.md", program="question.py", name="noise.svg"

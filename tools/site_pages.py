@@ -162,7 +162,8 @@ hide: [toc]
 # Sample scenes
 
 `digiclay run NAME` simulates a sample, `digiclay.scene("NAME")` is its scene in Python, and *Add > Mesh >
-Digital Clay Samples* adds it in Blender. Each picture shows the last touch, or the middle of a press.
+Digital Clay Samples* adds those without bodies in Blender. Each picture shows the last touch, the
+middle of a press, or what a body has left.
 """
 #: Head of a page whose results of a search come after those of the pages for readers.
 BEHIND = "---\nsearch:\n  boost: 0.0005\n---\n"
@@ -233,13 +234,15 @@ def make_parameters_page() -> str:
 
 def make_samples_page() -> str:
     """Return the page of all sample scenes."""
-    rows = [("", "Scene", "Control method", "Fingers", "Duration, s")]
+    rows = [("", "Scene", "Control method", "Fingers", "Bodies", "Duration, s")]
     for name in list_samples():
         scene = load(find(name))
         picture = f'![{name}](../pictures/samples/{name}.jpg){{ style="min-width: 195px; max-width: 195px" }}'
         words = f"`{name}`<br>{write_cell(scene.description)}"
         duration = f"{scene.periods * scene.simulation.control_period:.3g}"
-        rows.append((picture, words, f"`{scene.method}`", str(len(scene.fingers)), duration))
+        fingers = sum(finger.fingertip is not None for finger in scene.fingers)
+        counts = str(fingers), str(len(scene.bodies))
+        rows.append((picture, words, f"`{scene.method}`", *counts, duration))
     return SAMPLES + write_table(*rows)
 
 

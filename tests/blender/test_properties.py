@@ -10,8 +10,9 @@ from digiclay.core.base.errors import ParameterError
 from digiclay.core.base.modes import Mode
 from digiclay.core.base.quantity import list_quantities
 from digiclay.core.control.methods import METHODS
+from digiclay.core.files.run_folder import list_files
 from digiclay.core.model.layout import ARRANGEMENTS, Layout, make_grid
-from digiclay.core.scene.scene_source import find, list_samples, load
+from digiclay.core.scene.scene_source import SAMPLES, find, load
 from digiclay.core.scene.schema import OPTIONAL, SECTIONS, import_parameters
 from digiclay.core.scene.toml_table import PRESETS, resolve
 from digiclay.device import parts, view
@@ -68,7 +69,7 @@ def test_every_parameter_has_a_property_with_its_unit_meaning_and_bounds(section
                 assert known.broken_rule(value) == "", name
 
 
-@pytest.mark.parametrize("sample", list_samples())
+@pytest.mark.parametrize("sample", list_files(SAMPLES, ".toml"))
 def test_a_sample_scene_comes_back_bit_for_bit(sample):
     scene = load(find(sample))
     bed = thing(scene.layout, len(scene.fingers))

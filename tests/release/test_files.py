@@ -48,6 +48,22 @@ def test_what_the_manifest_leaves_out_is_not_there(contents):
     ]
     assert named
     assert set(named) & set(contents) == set()
+    assert [name for name in contents if name.startswith("sample_shapes/bodies")] == []
+
+
+def test_samples_are_found_in_the_zip_which_has_none_with_bodies(extension_zip, tmp_path):
+    zipfile.ZipFile(extension_zip).extractall(tmp_path / "digiclay")
+    code = "import digiclay.core.scene.scene_source as s; print(*s.list_samples(), s.find('tap'))"
+    done = subprocess.run(
+        [sys.executable, "-P", "-c", code],
+        env=os.environ | {"PYTHONPATH": str(tmp_path)},
+        capture_output=True,
+        encoding="utf-8",
+        timeout=TIMEOUT,
+    )
+    *names, path = done.stdout.split()
+    assert (len(names) > 20, "hand_print" in names) == (True, False), done.stderr
+    assert Path(path).is_relative_to(tmp_path)
 
 
 def test_the_bundled_wheels_are_those_of_the_manifest_with_their_license(
@@ -72,7 +88,7 @@ def test_the_wheel_has_the_package_and_those_beside_it_and_no_benchmark(wheel):
         *BESIDE,
     }
     beside = {f"{name}/{path.name}" for name in BESIDE for path in (ROOT / name).glob("*.*")}
-    samples = ("sessions/tap.toml", "measurements/valve.csv")
+    samples = ("sessions/tap.toml", "measurements/valve.csv", "bodies/hand.ply")
     shipped = {
         "digiclay/manual/guide.html",
         *(f"digiclay/sample_shapes/{name}" for name in samples),

@@ -339,6 +339,17 @@ def test_a_scene_of_bodies_is_written_read_and_changed(tmp_path, press):
     assert "body" not in format_scene(resolve({}))
 
 
+@pytest.mark.parametrize("pitch", [2.5e-3, 3e-3])
+def test_no_fingertip_joins_bodies_in_a_file_of_any_pitch(pitch, tmp_path):
+    # A file without a format has the contact's share of version 0.2, which is that of 3 mm.
+    place = "{ time = 0, position = [0, 0, 0.06] }"
+    head = f"control.method = 'plastic'\nlayout.pitch = {pitch}\nsimulation.duration = 1\n"
+    text = f"{head}[[body]]\nfile = 'a.stl'\ntrajectory.waypoints = [{place}]\n"
+    (tmp_path / "my.toml").write_text(text, encoding="utf-8")
+    (finger,) = load(tmp_path / "my.toml").fingers
+    assert finger.fingertip is None
+
+
 def change(**values):
     """Return a table whose body has other values."""
     return table({**body(BALL), **values})

@@ -82,7 +82,7 @@ def test_a_scene_beside_the_jobs_file_is_found_from_any_folder(tmp_path, monkeyp
         ("scenes = []", "scenes must be a list of scenes"),
         ('scenes = "tap"', "scenes must be a list of scenes"),
         ('scenes = ["tap", 3]', "scenes must be a list of scenes"),
-        ('scenes = ["tapp"]', "tapp is neither a file nor a sample .* Did you mean tap?"),
+        ('scenes = ["tapp"]', "tapp is neither a file nor a sample. Did you mean tap?"),
         (
             'scenes = ["tap"]\nmethod = ["cell_states"]',
             "method must be a known key .* Did you mean methods?",

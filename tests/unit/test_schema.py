@@ -265,10 +265,19 @@ def test_a_word_no_file_can_be_called_is_told_as_any_other(word):
         find(word)
 
 
-def test_every_sample_is_a_scene_called_like_its_file_and_a_misspelt_one_is_told_with_all_names():
+def test_every_sample_is_a_scene_called_like_its_file():
     assert [name for name in list_samples() if load(find(name)).name != name] == []
-    names = ", ".join(list_samples())
+
+
+@pytest.mark.parametrize(
+    "word, known",
+    [
+        ("ridge_mund_valley", ". Did you mean ridge_mound_valley?"),
+        ("qqq", f" ({', '.join(list_samples())})."),
+    ],
+    ids=["misspelt", "like no other"],
+)
+def test_what_is_no_sample_is_told_with_the_nearest_or_with_all(word, known):
     with pytest.raises(SceneError) as caught:
-        find("ridge_mund_valley")
-    said = f"ridge_mund_valley is neither a file nor a sample ({names}). Did you mean ridge_mound_valley?"
-    assert str(caught.value) == said
+        find(word)
+    assert str(caught.value) == f"{word} is neither a file nor a sample{known}"

@@ -9,10 +9,11 @@ from .. import bridge, preferences
 from ..compat import Context, Event, Menu, NodeTree, Object, Operator, UILayout, bpy
 from ..core.base.errors import ParameterError
 from ..core.control.methods import METHODS
+from ..core.files.run_folder import list_files
 from ..core.files.tables import Record
 from ..core.model.layout import ARRANGEMENTS, Layout
 from ..core.model.trajectory import sample_poses
-from ..core.scene.scene_source import find, list_samples, load
+from ..core.scene.scene_source import SAMPLES, find, load
 from ..core.scene.schema import Scene
 from ..core.scene.toml_table import PRESETS, resolve
 from ..core.shapes.fitting import list_shapes
@@ -39,6 +40,8 @@ from .action import Action, FileAction, Result, action, file_of, inform, millime
 from .poll_messages import baked, cannot_change, edited, inside_edit, no_collection, session_runs
 
 DEFAULT = Layout()
+#: Sample scenes that Blender can open: none has bodies.
+SESSIONS = list(list_files(SAMPLES, ".toml"))
 #: Beyond this a bed is a matter of scene files: the redo panel would stall on every change.
 MOST = 400
 #: Blender stores no reference to the texts of a list that is made on demand: this one does.
@@ -360,7 +363,7 @@ class OpenScene(AddSceneAction, FileAction, Operator):
     sample=choice(
         "Sample",
         items=[
-            *((f"session:{name}", title(name), "A session") for name in list_samples()),
+            *((f"session:{name}", title(name), "A session") for name in SESSIONS),
             *(
                 (f"shape:{name}", title(name), "A shape on a bed of 25 × 25 pins")
                 for name in list_shapes()
@@ -391,7 +394,7 @@ def _list_samples(layout: UILayout, kind: str, names: Iterable[str]) -> None:
 @menu("DIGICLAY_MT_session_samples", "Sessions")
 def session_samples(entries: Menu, context: Context) -> None:
     """Sample sessions of Digital Clay"""
-    _list_samples(entries.layout, "session", list_samples())
+    _list_samples(entries.layout, "session", SESSIONS)
 
 
 @menu("DIGICLAY_MT_shape_samples", "Shapes")

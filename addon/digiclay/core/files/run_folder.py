@@ -293,8 +293,8 @@ def write_folder(out: Path, *, overwrite: bool) -> Iterator[Path]:
 
 
 def list_files(folder: Path, *kinds: str) -> dict[str, Path]:
-    """Return the files of a folder with one of the extensions `kinds`, by their stems."""
-    return {path.stem: path for path in sorted(folder.iterdir()) if path.suffix in kinds}
+    """Return the files of a folder, if there is one, with the extensions `kinds`, by their stems."""
+    return {path.stem: path for path in sorted(folder.glob("*")) if path.suffix in kinds}
 
 
 def find_file(word: str, samples: Mapping[str, Path], kind: str) -> Path:
@@ -309,7 +309,5 @@ def find_file(word: str, samples: Mapping[str, Path], kind: str) -> Path:
     if Path(word).suffix or Path(word).name != word:
         raise SceneError(f"{shown}: there is no such file.")
     close = find_nearest_name(word, list(samples))
-    asked = f" Did you mean {close}?" if close else ""
-    raise SceneError(
-        f"{shown or repr(word)} is neither a file nor a {kind} ({', '.join(samples)}).{asked}"
-    )
+    known = f". Did you mean {close}?" if close else f" ({', '.join(samples)})."
+    raise SceneError(f"{shown or repr(word)} is neither a file nor a {kind}{known}")

@@ -40,18 +40,25 @@ Source = Scene | Table | str | os.PathLike[str]
 #: Sections that another scene may take from a file, and what else may stand there.
 PORTABLE = (*SECTIONS[1 : SECTIONS.index("control")],)
 BESIDE = (FORMAT, "name", "description", UNCERTAINTY)
-#: Folder of the sample scenes.
+#: Folders of the sample scenes without bodies, and with them.
 SAMPLES = Path(__file__).parents[2] / "sample_shapes" / "sessions"
+BODY_SAMPLES = SAMPLES.parent / "bodies"
 
 
 def list_samples() -> list[str]:
     """Return the names of the sample scenes."""
-    return list(list_files(SAMPLES, ".toml"))
+    return list(_list_sample_files())
+
+
+def _list_sample_files() -> dict[str, Path]:
+    """Return the files of the sample scenes, by their names."""
+    files = {**list_files(SAMPLES, ".toml"), **list_files(BODY_SAMPLES, ".toml")}
+    return dict(sorted(files.items()))
 
 
 def find(word: str) -> Path:
     """Return the file of a scene by a sample's name, a file, or a run's folder; SceneError if absent."""
-    samples = list_files(SAMPLES, ".toml")
+    samples = _list_sample_files()
     if word not in samples and os.path.isdir(word):
         word = os.path.join(word, "scene.toml")
     return find_file(word, samples, "sample")
@@ -148,7 +155,9 @@ def make_scene(
         if settings:
             make_scene(path, table)  # reports an error of the file itself first
         key = split_key(f"{error.owner}.{error.field}")
-        origins = [path.name if path.parent == SAMPLES else str(path)] if path else []
+        origins = (
+            [path.name if path.parent in (SAMPLES, BODY_SAMPLES) else str(path)] if path else []
+        )
         origins += [setting.option for setting in settings]
         for setting in settings:
             changed = split_key(setting.key)

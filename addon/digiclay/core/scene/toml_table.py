@@ -94,10 +94,15 @@ def resolve(table: Table, name: str = "", cache: ReadParts | None = None) -> Sce
     fingers = tuple(
         _read_finger(owner, given, defaults, rest_height, cache) for owner, given in tables
     )
-    if bodies and not any(name in table for name in (*FINGER_SECTIONS, FINGERS)):
-        # Nothing but bodies presses; what is recorded as a fingertip's path is the first one's.
+    if _has_bodies_alone(table):
+        # What is recorded as a fingertip's path is the first body's.
         fingers = (Finger(None, None, None, bodies[0].trajectory),)
     return Scene(**parts, **texts, fingers=fingers, method=method, bodies=bodies)
+
+
+def _has_bodies_alone(table: Table) -> bool:
+    """Return whether nothing but bodies presses."""
+    return bool(table.get(BODIES)) and not any(key in table for key in (*FINGER_SECTIONS, FINGERS))
 
 
 def _read_bodies(given: object, cache: ReadParts) -> tuple[Presser, ...]:
@@ -135,7 +140,7 @@ def keep_former_share(table: Table) -> Table:
     It was the same at any pitch. A file with ``format = 2`` has the share of the area of a cell.
     """
     given = table.get("layout")
-    if table.get(FORMAT, 1) != 1 or not isinstance(given, dict):
+    if table.get(FORMAT, 1) != 1 or not isinstance(given, dict) or _has_bodies_alone(table):
         return table
     layout = read_part("layout", Layout, {}, given)
     former = 0.29 if layout.arrangement == "hexagonal" else 0.34

@@ -1,0 +1,47 @@
+"""Sample scenes with bodies: what they leave is their undersides; their meshes are those of formulas."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from digiclay.core.mesh_io import mesh_reader
+from digiclay.core.scene.recorder import Recorder
+from digiclay.core.scene.scene_source import BODY_SAMPLES, find, load
+from digiclay.core.session.run_scene import run
+
+from tests.make_bodies import make_bodies, write_track
+from tests.scenes.test_bodies import find_under
+
+
+@pytest.mark.parametrize("name, held", [("hand_print", 1.5), ("face_cast", 2.3)])
+def test_the_print_of_a_sample_body_is_its_underside(name, held):
+    scene = load(find(name))
+    assert scene.cells == 10_000
+    assert scene.fingers[0].fingertip is None
+    done = run(replace(scene, recorder=Recorder(every=1000)))
+    height, under = done.history["height"][-1], find_under(scene, held)[0]
+    pressed = under < scene.actuator.rest_height
+    assert pressed.sum() > 1400
+    assert np.corrcoef(height[pressed], under[pressed])[0, 1] > 0.999
+    assert np.sqrt(np.mean((height - under)[pressed] ** 2)) < 0.3e-3
+    assert (height[~pressed] == scene.actuator.rest_height).all()
+
+
+def test_a_ball_that_rolls_leaves_a_track_with_its_knobs():
+    scene = load(find("ball_track"))
+    done = run(replace(scene, recorder=Recorder(every=1000)))
+    height, (x, y) = done.history["height"][-1], done.history["position"].T
+    away = np.abs(y - 26e-3 * np.sin(np.pi * x / 62e-3))
+    deep = scene.actuator.rest_height - height[(away < 3e-3) & (np.abs(x) < 55e-3)]
+    # The ball is 11 mm deep, its knobs 3.5 mm deeper.
+    assert 10e-3 < deep.min() < 11.5e-3
+    assert 13e-3 < deep.max() < 14.6e-3
+
+
+def test_the_meshes_of_the_samples_are_those_of_their_formulas():
+    for name, (vertices, triangles) in make_bodies().items():
+        stored = mesh_reader.read(BODY_SAMPLES / f"{name}.ply")
+        assert np.array_equal(stored.faces, triangles)
+        # Written as 32-bit numbers, in mm.
+        assert np.abs(stored.vertices - vertices).max() < 1e-4
+    assert find("ball_track").read_text(encoding="utf-8") == write_track()
