@@ -10,7 +10,7 @@ import shutil
 import struct
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -188,7 +188,8 @@ def _visible_points(bed: Object, history: Mapping[str, Array], rows: Cells, size
         for level in (height.min(axis=0), height.max(axis=0))
     ]
     for at in extremes:
-        stage.show(bed, Instant.of(history, int(rows[at]), **sizes))
+        extreme = Instant.of(history, int(rows[at]), **sizes)
+        stage.show(bed, replace(extreme, fingertip=poses[at]))
         clouds.append(stage.outline(bed))
     stage.show(bed, instant)
     return np.concatenate(clouds)
