@@ -12,16 +12,18 @@ from digiclay.commands.arguments import add_command, add_options, whole_number
 from digiclay.commands.evaluation_pool import Evaluation, run_series
 from digiclay.commands.progress import Counted, format_command
 from digiclay.commands.refusals import refuse_without
-from digiclay.commands.uncertain import UNCERTAIN, list_words
+from digiclay.commands.series_options import UNCERTAIN
+from digiclay.commands.uncertain import list_words
 from digiclay.core.base.arrays import Floats
 from digiclay.core.base.errors import OutputError
 from digiclay.core.files.run_folder import write_whole
 from digiclay.core.files.tables import Record
+from digiclay.core.metrics.bands import LEAST, MOST, find_band
 from digiclay.core.scene.scene_source import Setting
 from digiclay.core.studies.axes import Point, find_ends, place_points, refuse_twice
 from digiclay.core.studies.evaluation import FIGURES, describe_effort, make_bundles
 from digiclay.core.studies.sweep_plan import format_csv, hash_points
-from digiclay.core.studies.uncertainty import LEAST, MOST, Members, draw_members, find_band
+from digiclay.core.studies.uncertainty import Members, draw_members
 from digiclay.plots.sweep import read_unit
 
 from .indices import (

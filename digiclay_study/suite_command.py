@@ -7,9 +7,10 @@ from pathlib import Path
 
 from digiclay import __version__
 from digiclay.commands.arguments import METHOD, add_options, settings_of, whole_number
-from digiclay.commands.evaluation_pool import add_pool, run_series
+from digiclay.commands.evaluation_pool import run_series
 from digiclay.commands.progress import format_command
 from digiclay.commands.refusals import refuse_without
+from digiclay.commands.series_options import add_pool
 from digiclay.core.base.errors import DigiclayError, OutputError, ParameterError
 from digiclay.core.control.methods import METHODS
 from digiclay.core.files import tables

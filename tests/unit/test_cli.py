@@ -323,7 +323,7 @@ def test_a_run_imports_no_other_command_and_none_of_the_packages_it_does_without
     script = "import sys; from digiclay.cli import main; main(sys.argv[1:]); print(*sys.modules)"
     modules = finish(start(script, "run", "my.toml", "--out", "o", "--quiet"))[1].split()
     parts = {name.removeprefix("digiclay.") for name in modules if name.startswith("digiclay")}
-    files = {"arguments", "parser", "progress", "refusals", "run", "stop"}
+    files = {"arguments", "parser", "progress", "refusals", "run", "series_options", "stop"}
     assert {part for part in parts if part.startswith("commands.")} == {
         f"commands.{name}" for name in files
     }

@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 from digiclay.cli import main
 from digiclay.core.base.errors import DigiclayError, ParameterError
+from digiclay.core.metrics.bands import find_band
 from digiclay.core.scene.scene_source import Setting, find, load, read_parts
 from digiclay.core.session.run_scene import run
-from digiclay.core.studies.uncertainty import find_band
 
 from digiclay_study.point_series import Range, fit_ranges, read_range
 from tests.scene_files import (

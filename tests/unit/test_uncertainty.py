@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 from digiclay.cli import main
 from digiclay.commands import evaluation_pool
+from digiclay.core.metrics.bands import find_band
 from digiclay.core.scene.scene_source import find, read_parts
 from digiclay.core.session.run_scene import Result
-from digiclay.core.studies.uncertainty import draw_members, find_band
+from digiclay.core.studies.uncertainty import draw_members
 from scipy import stats
 
 from tests.assemble import table

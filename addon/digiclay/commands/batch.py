@@ -19,9 +19,9 @@ from ..farms.series_plan import FORMATS, Submission, plan_series, split_frames
 from ..plugins.method_loader import find_word
 from .arguments import QUIET, Options, command, load_by_option, one_of, say
 from .batch_folder import Folder, open_batch
-from .evaluation_pool import read_count
 from .job_steps import PROGRESS, check_outputs, find_error, read_fraction, read_tail
 from .progress import Counted, format_duration
+from .series_options import read_count
 from .stop import FAILED, STOPPED, Stop
 from .worker import Process, Processes, count_cores, find_program, start_blender
 

@@ -8,41 +8,18 @@ from functools import partial
 from itertools import takewhile
 from pathlib import Path
 
-from ..core.base.errors import DigiclayError
 from ..core.files.tables import Record
 from ..core.metrics.metric_table import ERRORS
 from ..core.studies.axes import Point
 from ..core.studies.evaluation import Pool, evaluate_bundle, has_errors, judge_all, make_bundles
 from ..core.studies.series import finish
 from ..core.studies.sweep_plan import Folder
-from .arguments import QUIET, add_options, add_scene, one_of, say, whole_number
+from .arguments import QUIET, add_options, add_scene, say
 from .progress import Counted
-from .refusals import refuse_without
+from .refusals import in_blender
+from .series_options import MOST_PROCESSES, add_pool
 from .stop import STOPPED, Stop
-from .worker import count_cores, in_blender
-
-#: The most processes of a command.
-MOST = 61
-#: Reads a number of processes.
-read_count = whole_number(1, MOST)
-
-
-def _read_address(text: str) -> str:
-    """Return the address of a scheduler; refuse it without Dask, before any work."""
-    if in_blender():
-        raise DigiclayError(
-            "--scheduler is not for the extension: run 'digiclay' outside of Blender."
-        )
-    refuse_without("--scheduler", "cluster", "distributed")
-    return text
-
-
-#: Options of which one says where bundles are evaluated.
-PLACES = {
-    "--workers N": (read_count, "number of processes; default: one per core"),
-    "--scheduler ADDRESS": (_read_address, "a Dask cluster instead, such as tcp://127.0.0.1:8786"),
-}
-add_pool = one_of(PLACES)
+from .worker import count_cores
 
 
 def add_series(parser: ArgumentParser, syntax: str, metrics: str, varied: str = "RANGE") -> None:
@@ -87,7 +64,7 @@ def open_pool(
                 stopped=lambda: draw_and_ask(cluster.describe()),
             )
         return
-    count = 1 if in_blender() else min(arguments.workers or count_cores(), MOST, pieces)
+    count = 1 if in_blender() else min(arguments.workers or count_cores(), MOST_PROCESSES, pieces)
     if count > 1:
         from .evaluator import open_evaluators
 

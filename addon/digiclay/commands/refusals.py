@@ -8,6 +8,14 @@ from pathlib import Path
 from ..core.base.errors import OutputError
 from .stop import defer_interrupt
 
+#: The package, as an extension in Blender or installed with pip.
+PACKAGE = __name__.removesuffix(".commands.refusals")
+
+
+def in_blender() -> bool:
+    """Return whether this is an extension inside Blender, which cannot start others like itself."""
+    return PACKAGE != "digiclay"
+
 
 def refuse_without(option: str, extra: str, *modules: str) -> None:
     """Refuse what needs libraries of an extra of this package that are not installed."""

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from ..core.base.errors import OutputError, ParameterError, SceneError
 from ..core.control.methods import list_added
 from ..core.files.run_folder import Claim, claim_folder, find_name
+from ..core.metrics.bands import MEMBERS
 from ..core.scene.schema import Scene
 from ..core.session.finished_run import require_surface
 from ..core.session.plate import list_cautions
@@ -31,14 +32,14 @@ from .arguments import (
     scene_of,
     told_as_options,
 )
-from .evaluation_pool import add_pool
 from .progress import Bar, Line, table, tell_stopped_before
 from .refusals import refuse_without, refuse_without_blender
+from .series_options import UNCERTAIN, add_pool
 from .stop import STOPPED, Stop
-from .uncertain import UNCERTAIN, add_bands, draw
 
 if TYPE_CHECKING:
     from ..core.studies.omissions import Fitted
+    from ..core.studies.uncertainty import Members
 
 
 def within(scene: Scene, budget: float, *, quiet: bool) -> Fitted:
@@ -133,7 +134,7 @@ OPTIONS: dict[str, Any] = {
 )
 def carry_out(arguments: Namespace) -> int:
     """Run, write, and print a summary line."""
-    members = draw(arguments)
+    members = _draw_members(arguments)
     scene, path = scene_of(arguments)
     out = arguments.out or Path(find_name(path))
     _refuse_early(arguments, scene)
@@ -148,7 +149,28 @@ def carry_out(arguments: Namespace) -> int:
                 result = replace(result, metrics={**result.metrics, "budget": noted(fit)})
             extras = _plan_extras(arguments, result)
             code = write_run(arguments, claim, result, extras, stop, *list_cautions(scene))
-            return add_bands(arguments, members, result, out, stop) if members else code
+            if not members:
+                return code
+            from .uncertain import add_bands
+
+            return add_bands(arguments, members, result, out, stop)
+
+
+def _draw_members(arguments: Namespace) -> Members | None:
+    """Return the members that the options ask for; their scene gets the parts of the files."""
+    if arguments.uncertain:
+        from .uncertain import draw
+
+        return draw(arguments)
+    if (
+        arguments.members != MEMBERS
+        or arguments.seed != 1
+        or arguments.workers
+        or arguments.scheduler
+    ):
+        rule = "must be given with --uncertain only"
+        raise OutputError(f"--members, --seed, --workers and --scheduler {rule}.")
+    return None
 
 
 def _refuse_early(arguments: Namespace, scene: Scene) -> None:

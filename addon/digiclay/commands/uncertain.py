@@ -5,34 +5,23 @@ from __future__ import annotations
 from argparse import Namespace
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any
 
 from ..core.base.errors import DigiclayError, OutputError
 from ..core.files.run_folder import format_json, write_whole
 from ..core.files.tables import Record
+from ..core.metrics.bands import LEAST, find_band
 from ..core.metrics.metric_table import FREE, METRICS
 from ..core.scene.scene_source import find
 from ..core.session.run_scene import Result
 from ..core.studies.axes import Point
 from ..core.studies.evaluation import TIMES, explain_failed_batches, make_bundles
 from ..core.studies.speed_limits import find_free_speed
-from ..core.studies.uncertainty import LEAST, MEMBERS, MOST, Members, draw_members, find_band
-from .arguments import say, settings_of, whole_number
+from ..core.studies.uncertainty import Members, draw_members
+from .arguments import say, settings_of
 from .evaluation_pool import Evaluation
 from .progress import table, tell_stopped_before
 from .stop import STOPPED, Stop
 
-#: Options of the uncertainty.
-UNCERTAIN: dict[str, Any] = {
-    "--uncertain FILE": {
-        "type": Path,
-        "action": "append",
-        "default": [],
-        "help": "take the parts of a fitted file, and add bands of 95 %% over its intervals",
-    },
-    "--members N": (whole_number(LEAST, MOST), f"runs for them; default: {MEMBERS}", MEMBERS),
-    "--seed N": (whole_number(1, 2**31), "of their random numbers; default: 1", 1),
-}
 #: The file in the folder of a run.
 FILE = "uncertainty.json"
 #: Metrics that have bands. The integration changes them at most by this estimated error, a difference of
@@ -46,14 +35,9 @@ BANDED: dict[str, tuple[str, float]] = {
 HEAD = ("metric", "value", "95 % band", "half of it", "integration, at most")
 
 
-def draw(arguments: Namespace) -> Members | None:
+def draw(arguments: Namespace) -> Members:
     """Return the members that the options ask for; their scene gets the parts of the files."""
     files, sizes = arguments.uncertain, (arguments.members, arguments.seed)
-    if not files:
-        if sizes != (MEMBERS, 1) or arguments.workers or arguments.scheduler:
-            rule = "must be given with --uncertain only"
-            raise OutputError(f"--members, --seed, --workers and --scheduler {rule}.")
-        return None
     if arguments.budget is not None:
         raise OutputError("--uncertain must be given without --budget, which omits parts.")
     arguments.parts = [*arguments.parts, *files]

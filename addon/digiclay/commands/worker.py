@@ -19,23 +19,17 @@ from typing import Any, Generic, Self, TypeVar
 
 from ..core.base.errors import DigiclayError, explain_os_error
 from ..core.studies.series import describe_error
+from .refusals import PACKAGE, in_blender
 
 #: Seconds that processes get to stop by themselves.
 GRACE = 20.0
 #: Seconds between two checks for ended processes.
 PAUSE = 0.05
-#: The package, as an extension in Blender or installed with pip.
-PACKAGE = __name__.removesuffix(".commands.worker")
 #: Where Blender keeps the extension when it was installed from a file.
 EXTENSION = "bl_ext.user_default.digiclay"
 
 Started = TypeVar("Started", bound="Process")
 Piece = TypeVar("Piece")
-
-
-def in_blender() -> bool:
-    """Return whether this is an extension inside Blender, which cannot start others like itself."""
-    return PACKAGE != "digiclay"
 
 
 def find_program(module: str = "") -> tuple[list[str], dict[str, str]]:

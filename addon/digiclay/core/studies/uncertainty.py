@@ -15,11 +15,6 @@ from ..scene.schema import Scene
 from ..scene.toml_table import UNCERTAINTY
 from .axes import Point, find_numbers, place_points
 
-#: Members by default, with which the width of a band is off by 7 % (standard deviation; four times as
-#: many halve it); the fewest, of which one is beyond each end of a band; the most.
-MEMBERS, LEAST, MOST = 100, 40, 1000
-#: Ends of a 95 % band.
-ENDS = 0.025, 0.975
 #: Correlations below this number are rounding of the file.
 ROUNDING = 1e-6
 
@@ -137,14 +132,3 @@ def find_root(covariance: Floats) -> Floats:
     _require("covariance", values[0] > -ROUNDING, rule, covariance.tolist())
     root: Floats = scale[:, None] * vectors * np.sqrt(np.where(values > ROUNDING, values, 0.0))
     return root
-
-
-def find_band(values: Sequence[float]) -> list[float]:
-    """Return both ends of the 95 % band of members' values, or none of fewer than `LEAST`.
-
-    One more member is in it with a probability of 95 %, whatever the distribution.
-    """
-    if len(values) < LEAST:
-        return []
-    ends: list[float] = np.quantile(values, ENDS, method="weibull").tolist()
-    return ends
