@@ -131,12 +131,9 @@ def draw_force(axes: Axes, history: History, wanted: ArrayLike | None, label: st
         asked = INK
         for number, force in enumerate(array(history, "finger_force").reshape(len(time), -1).T):
             again, color = divmod(number, len(LINES))
-            look: dict[str, Any] = {
-                "color": LINES[color],
-                "linestyle": STYLES[again],
-                "linewidth": 1.1,
-            }
-            axes.plot(time, force, label=str(number + 1) if again and not color else None, **look)
+            name = str(number + 1) if again and not color else None
+            style, shown = STYLES[again], LINES[color]
+            axes.plot(time, force, color=shown, linestyle=style, linewidth=1.1, label=name)
     else:
         axes.plot(
             time, array(history, "total_force"), color=INK, linewidth=1.3, label="total force"
@@ -144,8 +141,8 @@ def draw_force(axes: Axes, history: History, wanted: ArrayLike | None, label: st
     bodies = array(history, "body_force").sum(axis=2).T if "body_force" in history else ()
     alone = len(bodies) == 1 and "finger_force" not in history
     for number, force in enumerate(() if alone else bodies):
-        look = {"color": INK, "linestyle": STYLES[number % len(STYLES)], "linewidth": 1.1}
-        axes.plot(time, force, label=f"body {number + 1}", **look)
+        style, name = STYLES[number % len(STYLES)], f"body {number + 1}"
+        axes.plot(time, force, color=INK, linestyle=style, linewidth=1.1, label=name)
     if wanted is not None:
         axes.plot(time, wanted, color=asked, linewidth=1.3, linestyle=DASHES, label=label)
     full = len(axes.get_lines()) > 4 * len(LINES)  # of the legend's line

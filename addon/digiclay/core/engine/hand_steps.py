@@ -113,10 +113,8 @@ def solve_force(press: Callable[[Floats], Floats], guess: Floats) -> Floats:
             # The bounds of fingers on the same pins move with the others' forces.
             wrong = high - low <= TIE
             low, high = np.where(wrong, none, low), np.where(wrong, any_force, high)
-            low, high = (
-                np.maximum(low, np.minimum(force, felt)),
-                np.minimum(high, np.maximum(force, felt)),
-            )
+            low = np.maximum(low, np.minimum(force, felt))
+            high = np.minimum(high, np.maximum(force, felt))
             middle = np.sqrt((low + SMALL) * (high + SMALL)) - SMALL
             secant = force - error * (force - former) / (error - last)
             quick = (secant > low) & (secant < high) & (np.abs(error) < 0.5 * np.abs(last))

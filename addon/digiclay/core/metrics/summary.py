@@ -299,10 +299,8 @@ def split_fingers(history: Mapping[str, Any]) -> Iterator[Mapping[str, Any]]:
         # All of a finger together are exact.
         scale = np.divide(total, found, out=np.zeros_like(total), where=found > 0.0)[:, None]
         rows = {name: np.zeros_like(history[name]) for name in ("force", "mode")}  # at rest
-        rows["force"][:, cells], rows["mode"][:, cells] = (
-            own * given * scale,
-            own * history["mode"][:, cells],
-        )
+        rows["force"][:, cells] = own * given * scale
+        rows["mode"][:, cells] = own * history["mode"][:, cells]
         yield {**common, **rows, "total_force": total, "fingertip": tips[:, finger]}
 
 

@@ -179,12 +179,11 @@ def _trace_meshes(scene: Scene, system: System) -> Undersides:
         for number, each in enumerate(scene.bodies, 1)
     )
     undersides = PathUndersides(moved, system.grid, system.instants, scene.ceiling)
-    begin, cells = undersides.find(0), np.arange(system.grid.count)
-    for number in range(len(moved)):
-        lowest = float(begin.at(number, cells)[0].min())
+    begin = undersides.find(0)
+    for number, lowest in enumerate(begin.start.min(axis=1) + begin.rise[:, 0], 1):
         if lowest < 0.0:
             rule = "must begin above the floor of the bed, z = 0"
-            raise ParameterError(f"body #{number + 1}", "trajectory", rule, f"{lowest:.3g} m")
+            raise ParameterError(f"body #{number}", "trajectory", rule, f"{lowest:.3g} m")
     return undersides
 
 

@@ -125,29 +125,25 @@ class HistoryWriter:
         self._done, self._given = felt.stop, given.stop
 
     def finish(self, period: int, every: int) -> dict[str, Array]:
-        """Return the rows: period (t,), height, force, command, mode (t, n), of bodies their force (t, b, n).
+        """Return the rows, valid until `begin`: period (t,), height, force, command, mode (t, n).
 
-        They are valid until `begin`.
-
-        A session that ends between two rows, of `every` periods each, gets another one.
+        Of bodies also their force, (t, b, n). A session that ends between two rows, of `every`
+        periods each, gets another one.
         """
         count = 1 - (-period // every)
         self._felt[:, count - 1] = self._now
         self._command[count - 1], self._mode[count - 1] = 0.0, self._mode_now
-        (height, force, *bodies), command, mode = (
-            self._felt[:, :count],
-            self._command[:count],
-            self._mode[:count],
-        )
-        period_of_row = np.minimum(np.arange(count) * every, period)
-        return {
-            "period": period_of_row,
+        height, force, *bodies = self._felt[:, :count]
+        rows = {
+            "period": np.minimum(np.arange(count) * every, period),
             "height": height,
             "force": force,
-            "command": command,
-            "mode": mode,
-            **({"body_force": np.stack(bodies, axis=1)} if bodies else {}),
+            "command": self._command[:count],
+            "mode": self._mode[:count],
         }
+        if bodies:
+            rows["body_force"] = np.stack(bodies, axis=1)
+        return rows
 
 
 class RunRecording(Recording):
@@ -159,30 +155,33 @@ class RunRecording(Recording):
         self._history = HistoryWriter(recorder.rows(periods), state.rows.shape[1], bodies)
         self._history.begin(state.row(0), state.mode())
         super().__init__(recorder, rows, self._history.write, bodies)
-        self._pressing = [np.zeros(rows.fingers)]
-        self._rises = [state.deflection.rise] if state.deflection else []
+        self._fingers = [_read_fingers(state)]
         self._last = state
 
     def observe(self, state: State) -> None:
-        """Record the state after a control period; of several fingers also the force of each."""
+        """Record the state after a control period."""
         super().observe(state)
         self._last = state
-        if state.deflection and state.period % self.every == 0:
-            self._rises.append(state.deflection.rise)
-        if state.active.rows.fingers and state.period % self.every == 0:
-            self._pressing.append(state.finger_forces())
+        if state.period % self.every == 0:
+            self._fingers.append(_read_fingers(state))
 
     def finish(self, period: int) -> dict[str, Array]:
         """Return the rows up to the last period of the session, see `HistoryWriter.finish`."""
         self.flush()
         rows = self._history.finish(period, self.every)
-        if self._last.active.rows.fingers:
-            forces = [*self._pressing, self._last.finger_forces()]
-            rows["finger_force"] = np.array(forces[: len(rows["period"])])
-        if self._last.deflection:
-            rises = [*self._rises, self._last.deflection.rise]
-            rows["deflection"] = np.array(rises[: len(rows["period"])])
-        return rows
+        last = _read_fingers(self._last)
+        each = [*self._fingers, last][: len(rows["period"])]
+        return rows | {name: np.array([values[name] for values in each]) for name in last}
+
+
+def _read_fingers(state: State) -> dict[str, Floats]:
+    """Return what a state has of each finger: of several the force, and how far hands give way, m."""
+    values = {}
+    if state.active.rows.fingers:
+        values["finger_force"] = state.finger_forces()
+    if state.deflection:
+        values["deflection"] = state.deflection.rise
+    return values
 
 
 def write(history: dict[str, Array], path: Path) -> None:

@@ -218,26 +218,7 @@ def evaluate(
     """Return the result of an ended session; `rows`: of `HistoryWriter.finish`, or none."""
     if not rows:
         return report(scene, ended, {}, versions)
-    moments = rows.pop("period") * scene.simulation.control_period
-    poses = sample_poses(scene.trajectories(), moments)
-    if "deflection" in rows:
-        intended = poses[..., 2].copy()
-        poses[..., 2] += rows.pop("deflection")
-        rows["intended_height"] = intended[:, 0] if len(scene.fingers) == 1 else intended
-    if scene.bodies:
-        tips = any(finger.fingertip for finger in scene.fingers)
-        pressing = rows.pop("finger_force")[:, : len(scene.fingers)]
-        if tips:
-            rows["finger_force"] = pressing if len(scene.fingers) > 1 else pressing[:, 0]
-        paths = [each.trajectory.trajectory() for each in scene.bodies]
-        rows["body"] = sample_poses(paths, moments)
-    history = {
-        "time": moments,
-        **rows,
-        "fingertip": poses[:, 0] if len(scene.fingers) == 1 else poses,
-        "total_force": rows["force"].sum(axis=1),
-        "position": system.grid.positions,
-    }
+    history = _complete(scene, system, rows)
     each, depths, felt = [], [], []
     for finger, of_finger in zip(scene.fingers, split_fingers(history), strict=True):
         each.append(compute_metrics(of_finger, scene.set_point))
@@ -249,7 +230,7 @@ def evaluate(
         metrics["fingers"] = each
     if scene.bodies:
         metrics["bodies"] = measure_bodies(history)
-    metrics |= measure_losses(scene, system.fastest, moments, felt)
+    metrics |= measure_losses(scene, system.fastest, history["time"], felt)
     if depths:
         depth = np.max(depths, axis=0)
         metrics["max_indentation"] = float(depth.max())
@@ -258,8 +239,31 @@ def evaluate(
         )
         if metrics["beyond_a_finger"]:
             pressing = history.get("finger_force", history["total_force"]).reshape(len(depth), -1)
-            history["beyond_a_finger"] = is_beyond(pressing.max(axis=1), depth)
+            history["beyond_a_finger"] = np.asarray(is_beyond(pressing.max(axis=1), depth))
     return replace(report(scene, ended, metrics, versions), history=history)
+
+
+def _complete(scene: Scene, system: System, rows: History) -> History:
+    """Return the arrays of a history, with paths and sums, from the rows of `evaluate`."""
+
+    def per_finger(values: Array) -> Array:
+        return values[:, 0] if len(scene.fingers) == 1 else values
+
+    moments = rows.pop("period") * scene.simulation.control_period
+    history, poses = {"time": moments, **rows}, sample_poses(scene.trajectories(), moments)
+    if "deflection" in rows:
+        history["intended_height"] = per_finger(poses[..., 2].copy())
+        poses[..., 2] += history.pop("deflection")
+    if scene.bodies:
+        pressing = history.pop("finger_force")[:, : len(scene.fingers)]
+        if any(finger.fingertip for finger in scene.fingers):
+            history["finger_force"] = per_finger(pressing)
+        paths = [each.trajectory.trajectory() for each in scene.bodies]
+        history["body"] = sample_poses(paths, moments)
+    history["fingertip"] = per_finger(poses)
+    history["total_force"] = rows["force"].sum(axis=1)
+    history["position"] = system.grid.positions
+    return history
 
 
 def report(

@@ -123,9 +123,12 @@ def dump(system: System, state: State) -> bytes:
     active, rows = state.active, system.rows
     arrays: list[Array] = []
     memory = flatten(state.memory, arrays)
-    locks = None if state.locks is None else flatten(state.locks, arrays)
-    under = None if active.under is None else flatten(np.packbits(active.under), arrays)
-    hands = state.deflection and flatten(np.array(state.deflection), arrays)
+    optional = {
+        "locks": state.locks,
+        "under": None if active.under is None else np.packbits(active.under),
+        "hands": state.deflection and np.array(state.deflection),
+    }
+    given = {name: flatten(array, arrays) for name, array in optional.items() if array is not None}
     values = state.rows, state.modes, state.aged, active.cells, active.block, active.mode
     body = [
         np.ascontiguousarray(array, kind)
@@ -156,9 +159,7 @@ def dump(system: System, state: State) -> bytes:
             "until": active.until,
         },
         "memory": memory,
-        **({"locks": locks} if locks else {}),
-        **({"under": under} if under else {}),
-        **({"hands": hands} if hands else {}),
+        **given,
         "thin": thin,
         "arrays": [[array.dtype.str, list(array.shape)] for array in arrays],
     }
@@ -408,11 +409,11 @@ def change_fingers(
     # What is pressed and what still moves goes on.
     chosen = replace(fresh.active, cells=state.active.cells, near=state.active.near)
     bed = State(state.period, rows, state.modes, state.aged, float(rows[0].max()), chosen, memory)
-    deflection, taken = begin(system).deflection, system.selection.take(bed, chosen)
-    if deflection and state.deflection:
-        for row, before in zip(deflection, state.deflection, strict=True):
+    if fresh.deflection and state.deflection:
+        for row, before in zip(fresh.deflection, state.deflection, strict=True):
             _take_fingers(row, before, former.fingers, origins)
-    return bed._replace(active=taken, locks=state.locks, deflection=deflection)
+    taken = system.selection.take(bed, chosen)
+    return bed._replace(active=taken, locks=state.locks, deflection=fresh.deflection)
 
 
 def _take_fingers(into: Floats, of: Floats, former: int, origins: Sequence[int | None]) -> None:
