@@ -40,7 +40,7 @@ test: ## run the tests of behavior and of file formats, in Blender 4.5 too
 	cat .reports/time.txt >>.reports/test.txt; rm .reports/time.txt; \
 	echo; cat .reports/test.txt; exit $$status
 
-test-convergence: ## run tests/convergence: errors of the integration against references, tolerances and estimates
+test-convergence: ## run tests/convergence: errors of integration and fits against references, tolerances and estimates
 	@$(ENVIRONMENT) requirements/test.txt $(IN_311)
 	@rm -f .reports/convergence.txt; $(PART) .reports/convergence.txt "tests of convergence" 900 -- $(HANGS) -n auto --dist loadfile tests/convergence
 
