@@ -13,7 +13,7 @@ from digiclay.commands.evaluation_pool import Evaluation, run_series
 from digiclay.commands.progress import Counted, format_command
 from digiclay.commands.refusals import refuse_without
 from digiclay.commands.series_options import UNCERTAIN
-from digiclay.commands.uncertain import list_words
+from digiclay.commands.uncertain import list_options
 from digiclay.core.base.arrays import Floats
 from digiclay.core.base.errors import OutputError
 from digiclay.core.files.run_folder import write_whole
@@ -200,7 +200,7 @@ def _format_call(arguments: Namespace, subject: Subject) -> str:
     words += [word for key, value, _ in subject.settings for word in ("--set", f"{key}={value}")]
     words += ["--samples", str(arguments.samples), "--seed", str(arguments.seed)]
     words += ["--metric", ",".join(subject.names), *(["--second"] if arguments.second else [])]
-    return format_command([*words, *list_words(arguments), "--out", str(arguments.out)])
+    return format_command([*words, *list_options(arguments), "--out", str(arguments.out)])
 
 
 class Findings(NamedTuple):

@@ -134,7 +134,7 @@ OPTIONS: dict[str, Any] = {
 )
 def carry_out(arguments: Namespace) -> int:
     """Run, write, and print a summary line."""
-    members = _draw_members(arguments)
+    members = _read_members(arguments)
     scene, path = scene_of(arguments)
     out = arguments.out or Path(find_name(path))
     _refuse_early(arguments, scene)
@@ -156,18 +156,14 @@ def carry_out(arguments: Namespace) -> int:
             return add_bands(arguments, members, result, out, stop)
 
 
-def _draw_members(arguments: Namespace) -> Members | None:
+def _read_members(arguments: Namespace) -> Members | None:
     """Return the members that the options ask for; their scene gets the parts of the files."""
     if arguments.uncertain:
-        from .uncertain import draw
+        from .uncertain import read_members
 
-        return draw(arguments)
-    if (
-        arguments.members != MEMBERS
-        or arguments.seed != 1
-        or arguments.workers
-        or arguments.scheduler
-    ):
+        return read_members(arguments)
+    sizes = arguments.members, arguments.seed
+    if sizes != (MEMBERS, 1) or arguments.workers or arguments.scheduler:
         rule = "must be given with --uncertain only"
         raise OutputError(f"--members, --seed, --workers and --scheduler {rule}.")
     return None

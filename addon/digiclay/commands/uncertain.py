@@ -35,7 +35,7 @@ BANDED: dict[str, tuple[str, float]] = {
 HEAD = ("metric", "value", "95 % band", "half of it", "integration, at most")
 
 
-def draw(arguments: Namespace) -> Members:
+def read_members(arguments: Namespace) -> Members:
     """Return the members that the options ask for; their scene gets the parts of the files."""
     files, sizes = arguments.uncertain, (arguments.members, arguments.seed)
     if arguments.budget is not None:
@@ -44,7 +44,7 @@ def draw(arguments: Namespace) -> Members:
     return draw_members(files, find(arguments.scene), settings_of(arguments), *sizes)
 
 
-def list_words(arguments: Namespace) -> list[str]:
+def list_options(arguments: Namespace) -> list[str]:
     """Return the options that draw the same members with the same seed."""
     words = [word for file in arguments.uncertain for word in ("--uncertain", str(file))]
     return [*words, "--members", str(arguments.members)] if words else []
@@ -57,7 +57,7 @@ def add_bands(arguments: Namespace, members: Members, result: Result, run: Path,
         content = measure(arguments, members, result, stop)
     finally:
         if content is None:  # also when the processes broke down
-            words = [*list_words(arguments), "--seed", str(arguments.seed)]
+            words = [*list_options(arguments), "--seed", str(arguments.seed)]
             tell_stopped_before(FILE, ["run", str(run), *words, "--out", str(run), "--overwrite"])
     if content is None:
         return STOPPED

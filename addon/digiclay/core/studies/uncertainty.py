@@ -33,7 +33,8 @@ class Fitted(NamedTuple):
         """Return the values of members, (n, k)."""
         values = self.center + random.standard_normal((count, len(self.keys))) @ self.root.T
         with np.errstate(over="ignore"):  # infinity is outside of every range
-            return np.where(self.logarithms, np.exp(self.logarithms * values), values)
+            np.exp(values, out=values, where=self.logarithms)
+        return values
 
 
 class Members(NamedTuple):
