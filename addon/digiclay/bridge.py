@@ -119,7 +119,9 @@ def move_fingertips(
     every, whole = fingertips_of(bed), np.array(bed.matrix_world)
     for number, at, finger in zip(numbers or every, poses, fingers, strict=False):
         if number in every:
-            parts.setdefault(every[number].parent, []).append((every[number], _place(at, finger)))
+            center = finger.outline(np.asarray(at, np.float64)[None])[0, :3]
+            place = make_place(center, at[3:])
+            parts.setdefault(every[number].parent, []).append((every[number], place))
     for above, tips in parts.items():
         role = above and above.get(ROLE)
         stood = np.array(above.matrix_world if above else np.eye(4))
@@ -136,11 +138,11 @@ def move_fingertips(
                 tip.matrix_world = (whole @ place).T.tolist()
 
 
-def _place(at: Floats, finger: Fingertip) -> Floats:
-    """Return the matrix (4, 4) of a fingertip at a pose (7,) in the space of its bed."""
+def make_place(origin: Floats, turn: Floats) -> Floats:
+    """Return the matrix (4, 4), in a bed's space, of what is turned (4,) about its origin (3,), m."""
     matrix = np.eye(4)
-    matrix[:3, :3] = make_matrices(at[None, 3:])[0]
-    matrix[:3, 3] = finger.outline(np.asarray(at, np.float64)[None])[0, :3] * SCALE
+    matrix[:3, :3] = make_matrices(turn[None])[0]
+    matrix[:3, 3] = origin * SCALE
     return matrix
 
 

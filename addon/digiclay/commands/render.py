@@ -146,17 +146,15 @@ def _looks(arguments: Namespace) -> Still | Turntable | Film:
 
 def sizes(scene: Scene) -> Record:
     """Return the sizes of the device for drawing."""
-    from ..core.shapes.body import read_body
+    from ..core.shapes.body import read_bodies
     from ..device.instant import find_ellipsoids
 
-    absent = scene.bodies and not any(finger.fingertip for finger in scene.fingers)
+    absent = scene.bodies and not any(scene.list_parts("fingertip"))
     return {
         "pitch": scene.layout.pitch,
         "actuator": scene.actuator,
         "finger": () if absent else find_ellipsoids(scene),
-        "bodies": tuple(
-            read_body(each.body, f"body #{number}") for number, each in enumerate(scene.bodies, 1)
-        ),
+        "bodies": read_bodies(each.body for each in scene.bodies),
     }
 
 

@@ -9,7 +9,6 @@ from .. import bridge
 from ..compat import Object, Scene, bpy, shader_nodes
 from ..core.base.arrays import Floats
 from ..core.base.modes import Mode
-from ..core.model.fingertip import make_matrices
 from ..device import parts, view
 from ..device.instant import Instant
 from .legend import Front, write_force_legend, write_mode_legend
@@ -77,12 +76,8 @@ def _place_bodies(bed: Object, instant: Instant) -> None:
     """Put the bodies over a bed to the poses of an instant."""
     for part in bed.children:
         if instant.body is not None and BODY in part:
-            pose, matrix = instant.body[part[BODY]], np.eye(4)
-            matrix[:3, :3], matrix[:3, 3] = (
-                make_matrices(pose[None, 3:])[0],
-                pose[:3] * bridge.SCALE,
-            )
-            part.matrix_basis = matrix.T.tolist()
+            pose = instant.body[part[BODY]]
+            part.matrix_basis = bridge.make_place(pose[:3], pose[3:]).T.tolist()
 
 
 def choose_margins(bed: Object) -> Margins:

@@ -78,13 +78,12 @@ def lower_reach(steps: tuple[HandStep, ...], state: State, finger: Any) -> Any:
     rises, none = [now.rise], np.zeros_like(now.force)
     for step in steps:
         now, passed = step.swing.move(now, finger.heights[step.nodes], none)
-        rises += [*passed]
-    least, window = np.minimum.reduce(rises), finger.window
-    if isinstance(window, list):
-        return finger._replace(window=[*window[:3], window[3] + least.item(), *window[4:]])
-    lowered = np.array(np.broadcast_to(window, (6, least.size)))
-    lowered[3] += least
-    return finger._replace(window=lowered)
+        rises.extend(passed)
+    least, window = np.minimum.reduce(rises), np.reshape(finger.window, (6, -1))
+    window = np.array(np.broadcast_to(window, (6, least.size)))
+    window[3] += least
+    alone = isinstance(finger.window, list)
+    return finger._replace(window=window[:, 0].tolist() if alone else window)
 
 
 def move_hands(steps: tuple[HandStep, ...], state: State, finger: Any) -> Deflection:
@@ -101,8 +100,10 @@ def solve_force(press: Callable[[Floats], Floats], guess: Floats) -> Floats:
     Secants of the logarithm, within bounds; the last call of `press` is with the result. A force
     that is not found is infinite.
     """
-    force, none, any_force = guess, np.zeros_like(guess), np.full_like(guess, np.inf)
-    low, high, former, last = none, any_force, any_force, any_force
+    force, none, unlimited = guess, np.zeros_like(guess), np.full_like(guess, np.inf)
+    low, high = none, unlimited
+    # Force and error of the trial before: none yet.
+    former = last = unlimited
     for _ in range(MOST_TRIALS):
         felt = press(force)
         with np.errstate(all="ignore"):
@@ -112,7 +113,7 @@ def solve_force(press: Callable[[Floats], Floats], guess: Floats) -> Floats:
                 return force
             # The bounds of fingers on the same pins move with the others' forces.
             wrong = high - low <= TIE
-            low, high = np.where(wrong, none, low), np.where(wrong, any_force, high)
+            low, high = np.where(wrong, none, low), np.where(wrong, unlimited, high)
             low = np.maximum(low, np.minimum(force, felt))
             high = np.minimum(high, np.maximum(force, felt))
             middle = np.sqrt((low + SMALL) * (high + SMALL)) - SMALL

@@ -146,7 +146,7 @@ def _assemble_bodies(scene: Scene) -> System:
         Finger(Fingertip(), each.body.contact, each.body.relaxation, each.trajectory)
         for each in scene.bodies
     ]
-    tips = any(finger.fingertip for finger in scene.fingers)
+    tips = any(scene.list_parts("fingertip"))
     fingers = scene.fingers if tips else tuple(pressing[:1] * len(scene.fingers))
     system = _assemble_hands(replace(scene, fingers=(*fingers, *pressing), bodies=()))
     undersides: Undersides = GivenUndersides(system.instants, scene.ceiling)
@@ -166,17 +166,18 @@ def _assemble_bodies(scene: Scene) -> System:
 def _trace_meshes(scene: Scene, system: System) -> Undersides:
     """Return the undersides of the meshes of a scene along their paths."""
     from ..engine.bodies import MovedMesh, PathUndersides
-    from ..shapes.body import read_body
+    from ..shapes.body import read_bodies
 
+    meshes = read_bodies(each.body for each in scene.bodies)
     moved = tuple(
         MovedMesh(
-            read_body(each.body, f"body #{number}"),
+            mesh,
             each.trajectory.trajectory(),
             each.body.samples,
             each.body.tip_radius,
             each.body.travel,
         )
-        for number, each in enumerate(scene.bodies, 1)
+        for mesh, each in zip(meshes, scene.bodies, strict=True)
     )
     undersides = PathUndersides(moved, system.grid, system.instants, scene.ceiling)
     begin = undersides.find(0)

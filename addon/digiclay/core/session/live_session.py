@@ -392,15 +392,18 @@ def give_undersides(system: System, knots: Sequence[Knot]) -> None:
 
 def _lead_bodies(session: Session, count: int) -> Session:
     """Give the undersides along a path of `count` periods to the system; return the session at its end."""
-    aim, first = session.aim, session.state.period
+    aim, under, first = session.aim, session.under, session.state.period
     if aim is None:
         return session
-    under = session.under if session.under is not None and len(session.under) == len(aim) else aim
-    knots, recording = ((first, under), (first + count, aim)), session.recording
-    give_undersides(session.system, knots)
+    if under is None or len(under) != len(aim):  # others than before begin where they are
+        under = aim
+    begin, end = (first, under), (first + count, aim)
+    give_undersides(session.system, (begin, end))
+    recording = session.recording
     if recording:
-        known = recording.knots[-1:]
-        more = knots[1:] if known and known[0][0] == first and known[0][1] is under else knots
+        last, last_under = recording.knots[-1] if recording.knots else (None, None)
+        goes_on = last == first and last_under is under
+        more = (end,) if goes_on else (begin, end)
         recording = replace(recording, knots=(*recording.knots, *more))
     return replace(session, under=aim, recording=recording)
 

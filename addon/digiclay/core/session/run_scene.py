@@ -256,7 +256,7 @@ def _complete(scene: Scene, system: System, rows: History) -> History:
         poses[..., 2] += history.pop("deflection")
     if scene.bodies:
         pressing = history.pop("finger_force")[:, : len(scene.fingers)]
-        if any(finger.fingertip for finger in scene.fingers):
+        if any(scene.list_parts("fingertip")):
             history["finger_force"] = per_finger(pressing)
         paths = [each.trajectory.trajectory() for each in scene.bodies]
         history["body"] = sample_poses(paths, moments)

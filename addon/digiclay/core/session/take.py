@@ -124,7 +124,6 @@ def replay(take: Take, scene: Scene | None = None) -> Iterator[State]:
 def play(take: Take, scene: Scene | None = None) -> Iterator[tuple[System, State]]:
     """Yield system and state of a take, as `replay`, at its start and after each period."""
     scene = scene or take.scene
-
     bodies = len(scene.bodies)
 
     def prepare(count: int) -> System:

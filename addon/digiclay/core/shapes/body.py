@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import zlib
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -91,11 +92,15 @@ def pack_mesh(vertices: ArrayLike, triangles: ArrayLike) -> str:
     return base64.b64encode(zlib.compress(head + body)).decode("ascii")
 
 
-def read_body(body: Body, owner: str = "body") -> Mesh:
-    """Return the mesh of a body in its own axes, m, z up; ParameterError if it cannot press pins."""
-    mesh = _unpack(body.mesh, owner) if body.mesh else _read_file(body, owner)
-    refuse_flat(mesh, owner, "mesh" if body.mesh else "file")
-    return mesh._replace(vertices=mesh.vertices * body.scale)
+def read_bodies(bodies: Iterable[Body]) -> tuple[Mesh, ...]:
+    """Return the meshes of a scene's bodies in their own axes, m, z up; ParameterError if one is unsound."""
+    meshes = []
+    for number, body in enumerate(bodies, 1):
+        owner = f"body #{number}"
+        mesh = _unpack(body.mesh, owner) if body.mesh else _read_file(body, owner)
+        refuse_flat(mesh, owner, "mesh" if body.mesh else "file")
+        meshes.append(mesh._replace(vertices=mesh.vertices * body.scale))
+    return tuple(meshes)
 
 
 def _unpack(text: str, owner: str) -> Mesh:
