@@ -17,7 +17,7 @@ from digiclay.core.base.errors import DigiclayError
 from digiclay.core.model.laws import select_law
 from digiclay.core.scene.schema import Scene
 
-from .estimation import Derived, Parameter
+from .estimation import Derived, Model, Parameter
 from .records import Trial
 
 #: Groups of parameters that may be free beside the diameter of the orifice.
@@ -80,7 +80,7 @@ class CellTrial:
         return summed[:, self.at_sample]
 
 
-class CellModel:
+class CellModel(Model):
     """Model of all samples of some trials; `groups`: what is free."""
 
     def __init__(self, scene: Scene, trials: Sequence[Trial], groups: Sequence[str]) -> None:
@@ -110,7 +110,6 @@ class CellModel:
             bounds = rest - 1.0, rest + 1.0
             zeros.append(Parameter(key, "m", rest, *bounds, wanted=False, of_trial=True))
         self.parameters, self.zeros = (*shared, *zeros), len(shared)
-        self.index = {each.key: i for i, each in enumerate(self.parameters)}
         self.defaults = {i: each.start for i, each in enumerate(shared)}
         if STROKE in self.index:
             self.defaults[self.index[STROKE]] = math.log(orifice.knee)
@@ -134,25 +133,14 @@ class CellModel:
             longest = max(float(trial.time[-1]) for trial in self.trials) / 2.0
             yield Parameter(DELAY, "s", min(self.usual[DELAY], longest / 2.0), 0.0, longest)
 
-    def _value(self, free: Floats, key: str) -> float:
-        """Return a parameter in SI, or what it is where it is not free."""
-        if key not in self.index:
-            return self.usual[key]
-        place = self.index[key]
-        return math.exp(free[place]) if self.parameters[place].log else float(free[place])
-
-    def predict(self, free: Floats) -> tuple[Floats, Floats]:
-        """Return the heights (n,) at all samples and their Jacobian (n, p)."""
-        parts = [self._predict_trial(number, free) for number in range(len(self.trials))]
-        return np.concatenate([part[0] for part in parts]), np.vstack([part[1] for part in parts])
-
-    def _predict_trial(self, number: int, free: Floats) -> tuple[Floats, Floats]:
+    def predict_trial(self, number: int, free: Floats) -> tuple[Floats, Floats]:
+        """Return the heights at the samples of a trial, and their Jacobian."""
         trial, index = self.trials[number], self.index
-        lag, delay = self._value(free, LAG), self._value(free, DELAY)
+        lag, delay = self.read_value(free, LAG), self.read_value(free, DELAY)
         trial.divide(delay)
         opening, by_lag, by_delay = trial.open(lag, delay)
         up = opening > 0.0
-        source = np.where(up, self._value(free, HIGH), self._value(free, LOW))
+        source = np.where(up, self.read_value(free, HIGH), self.read_value(free, LOW))
         drop = source - trial.load / self.area
         knee = free[index[STROKE]] if STROKE in index else self.knee - free[0]
         flow, by_conductance, by_knee, by_drop, by_opening = self._flow(
@@ -204,14 +192,10 @@ class CellModel:
 
     def list_starts(self) -> list[Floats]:
         """Return the values at which a fit starts: with a free knee below, about and above the supply."""
-        start = np.array([each.start for each in self.parameters])
+        (start,) = super().list_starts()
         if STROKE not in self.index:
             return [start]
         return [np.where(np.arange(start.size) == 1, math.log(knee), start) for knee in KNEES]
-
-    def refine(self, free: Floats) -> bool:
-        """Return that a fit is final."""
-        return False
 
     def derive(self, free: Floats) -> list[Derived]:
         """Return the values for a scene; the stroke too if it is free, else the diameter with that stroke."""

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from types import MappingProxyType
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 from digiclay.core.base.arrays import Floats
@@ -59,26 +61,49 @@ class Derived(NamedTuple):
     log: bool
 
 
-class Model(Protocol):
-    """Prediction of all samples of some trials from free parameters."""
+class Model(ABC):
+    """Base of predictions of all samples of some trials from free parameters."""
 
+    trials: Sequence[Any]
     parameters: tuple[Parameter, ...]
-    index: dict[str, int]
     measured: Floats
-    held_first: tuple[int, ...]
+    held_first: tuple[int, ...] = ()
     """Indices of parameters that are held until the others are fitted, against other minima."""
     defaults: dict[int, float]
     """Values of the scene for the parameters that it has, by index."""
+    usual: Mapping[str, float] = MappingProxyType({})
+    """Values in SI of parameters that are not free, by key; of all others 0."""
+
+    @cached_property
+    def index(self) -> dict[str, int]:
+        """Places of the parameters, by key."""
+        return {each.key: place for place, each in enumerate(self.parameters)}
 
     def predict(self, free: Floats) -> tuple[Floats, Floats]:
         """Return the prediction (n,) and its Jacobian (n, p)."""
+        parts = [self.predict_trial(number, free) for number in range(len(self.trials))]
+        return np.concatenate([part[0] for part in parts]), np.vstack([part[1] for part in parts])
+
+    def read_value(self, free: Floats, key: str) -> float:
+        """Return a parameter in SI, or what it is where it is not free."""
+        if key not in self.index:
+            return self.usual.get(key, 0.0)
+        place = self.index[key]
+        return math.exp(free[place]) if self.parameters[place].log else float(free[place])
+
+    @abstractmethod
+    def predict_trial(self, number: int, free: Floats) -> tuple[Floats, Floats]:
+        """Return the prediction of a trial, and its Jacobian."""
 
     def list_starts(self) -> list[Floats]:
         """Return the values at which a fit starts; the best end counts."""
+        return [np.array([each.start for each in self.parameters])]
 
     def refine(self, free: Floats) -> bool:
         """Renew what the model takes from an earlier fit; return whether another fit is needed."""
+        return False
 
+    @abstractmethod
     def derive(self, free: Floats) -> list[Derived]:
         """Return the values of a scene that the parameters give."""
 

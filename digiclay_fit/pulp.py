@@ -16,7 +16,7 @@ from digiclay.core.base.errors import DigiclayError, ParameterError
 from digiclay.core.scene.schema import Scene
 from digiclay.core.session.plate import DEEPEST
 
-from .estimation import Derived, Parameter
+from .estimation import Derived, Model, Parameter
 from .records import Trial, estimate_noise
 
 #: Parts of a sample, and most points of the grid.
@@ -70,10 +70,8 @@ class PulpTrial:
         return np.einsum("jn,jnk->nk", w, near), np.einsum("jn,jn->n", d, near[..., 0]) / self.step
 
 
-class PulpModel:
+class PulpModel(Model):
     """Model of all samples of some trials; `law`: plate or pin; `groups`: what is free."""
-
-    held_first: tuple[int, ...] = ()
 
     def __init__(
         self, scene: Scene, trials: Sequence[Trial], groups: Sequence[str], law: str = "plate"
@@ -99,7 +97,6 @@ class PulpModel:
         self.follows = int(self.weights.argmax())
         self.groups = tuple(groups)
         self.parameters = (*self._list_wanted(contact), *self._list_zeros(trials))
-        self.index = {each.key: i for i, each in enumerate(self.parameters)}
         self.defaults = {i: each.start for i, each in enumerate(self.parameters) if each.wanted}
         self.fixed = math.log(contact.stiffness), math.log(contact.exponent)
         self.rounds = 0
@@ -145,11 +142,6 @@ class PulpModel:
             found.append(Parameter("compliance", "m/N", 2e-5, 0.0, 2e-3, wanted=False))
         return found
 
-    def _value(self, free: Floats, key: str, fixed: float) -> float:
-        """Return a parameter, or what it is where it is not free."""
-        place = self.index.get(key)
-        return fixed if place is None else float(free[place])
-
     def read(self, free: Floats) -> tuple[float, float, Floats, Floats]:
         """Return b, m, weights (k + 1,) and times (k,)."""
         weights, times = self.weights.copy(), self.times.copy()
@@ -181,15 +173,11 @@ class PulpModel:
         bend = grown - first / high
         return force, unit * m * bend, unit * (turn * bend + second) - 2.0 * force
 
-    def predict(self, free: Floats) -> tuple[Floats, Floats]:
-        """Return the forces (n,) at all samples and their Jacobian (n, p)."""
-        parts = [self._predict_trial(trial, free) for trial in self.trials]
-        return np.concatenate([part[0] for part in parts]), np.vstack([part[1] for part in parts])
-
-    def _predict_trial(self, trial: PulpTrial, free: Floats) -> tuple[Floats, Floats]:
+    def predict_trial(self, number: int, free: Floats) -> tuple[Floats, Floats]:
+        """Return the forces at the samples of a trial, and their Jacobian."""
         b, m, weights, times = self.read(free)
-        index = self.index
-        give = self._value(free, "compliance", 0.0)
+        trial, index = self.trials[number], self.index
+        give = self.read_value(free, "compliance")
         depth = trial.grid - give * trial.felt - free[index["zero of position"]]
         force, slope, stiffening = self.press(b, m, depth)
         slopes = {
@@ -210,12 +198,12 @@ class PulpModel:
         if "relaxation" in self.groups:
             self._add_relaxation(columns, states, weights)
         columns *= columns[:, :1] > 0.0
-        sampled, rate = trial.sample(columns, self._value(free, "lag", 0.0))
+        sampled, rate = trial.sample(columns, self.read_value(free, "lag"))
         predicted, jacobian = sampled[:, 0], sampled[:, 1:]
         added = {"zero of force": np.ones(len(rate)), "lag": -rate, "drift": trial.elapsed}
         for key in added.keys() & index.keys():
             jacobian[:, index[key]] = added[key]
-        drift = self._value(free, "drift", 0.0)
+        drift = self.read_value(free, "drift")
         return predicted + free[index["zero of force"]] + drift * trial.elapsed, jacobian
 
     def _add_relaxation(
@@ -229,10 +217,6 @@ class PulpModel:
                 columns[:, 1 + self.index[f"relaxation.weights.{number + 1}"]] = change
         for number, (_, by_time) in enumerate(states, 1):
             columns[:, 1 + self.index[f"relaxation.times.{number}"]] = -weights[number] * by_time
-
-    def list_starts(self) -> list[Floats]:
-        """Return the values at which a fit starts."""
-        return [np.array([each.start for each in self.parameters])]
 
     def refine(self, free: Floats) -> bool:
         """Take the fitted force as that which bends the frame; return whether it is to be fitted again."""
@@ -257,8 +241,8 @@ class PulpModel:
         for key in ("lag", "drift"):
             if key in self.index:
                 quiet[self.index[key]] = 0.0
-        for trial in self.trials:
-            predicted, _ = self._predict_trial(trial, quiet)
+        for number, trial in enumerate(self.trials):
+            predicted, _ = self.predict_trial(number, quiet)
             grid = np.arange(len(trial.grid)) * trial.step
             trial.felt = np.interp(grid, trial.time, predicted)
         return True
