@@ -153,7 +153,7 @@ def _needs_stroke(
 
 def _predict(other: Model, free: Floats, model: Model) -> Floats:
     """Return the prediction of held-out trials; only zeros that belong to a trial are fitted there."""
-    start = np.array([each.start for each in other.parameters])
+    start, *_ = other.list_starts()
     fixed = {}
     for number, each in enumerate(other.parameters):
         if each.key in model.index and not each.of_trial:

@@ -150,7 +150,7 @@ def list_bands(
     yield ["point", *(f"{name} {end} ({FIGURES[name].unit})" for name, end in ends)]
     for point in range(1, points + 1):
         first = points + 1 + (point - 1) * members
-        figures = [records[first + number].get("figures", {}) for number in range(members)]
+        figures = [records[index].get("figures", {}) for index in range(first, first + members)]
         row: list[Any] = [point]
         for name in names:
             values = [each[name] for each in figures if each.get(name) is not None]

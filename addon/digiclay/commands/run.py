@@ -39,7 +39,6 @@ from .stop import STOPPED, Stop
 
 if TYPE_CHECKING:
     from ..core.studies.omissions import Fitted
-    from ..core.studies.uncertainty import Members
 
 
 def within(scene: Scene, budget: float, *, quiet: bool) -> Fitted:
@@ -134,7 +133,11 @@ OPTIONS: dict[str, Any] = {
 )
 def carry_out(arguments: Namespace) -> int:
     """Run, write, and print a summary line."""
-    members = _read_members(arguments)
+    members = None
+    if arguments.uncertain:
+        from .uncertain import add_bands, read_members
+
+        members = read_members(arguments)
     scene, path = scene_of(arguments)
     out = arguments.out or Path(find_name(path))
     _refuse_early(arguments, scene)
@@ -149,28 +152,15 @@ def carry_out(arguments: Namespace) -> int:
                 result = replace(result, metrics={**result.metrics, "budget": noted(fit)})
             extras = _plan_extras(arguments, result)
             code = write_run(arguments, claim, result, extras, stop, *list_cautions(scene))
-            if not members:
-                return code
-            from .uncertain import add_bands
-
-            return add_bands(arguments, members, result, out, stop)
-
-
-def _read_members(arguments: Namespace) -> Members | None:
-    """Return the members that the options ask for; their scene gets the parts of the files."""
-    if arguments.uncertain:
-        from .uncertain import read_members
-
-        return read_members(arguments)
-    sizes = arguments.members, arguments.seed
-    if sizes != (MEMBERS, 1) or arguments.workers or arguments.scheduler:
-        rule = "must be given with --uncertain only"
-        raise OutputError(f"--members, --seed, --workers and --scheduler {rule}.")
-    return None
+            return add_bands(arguments, members, result, out, stop) if members else code
 
 
 def _refuse_early(arguments: Namespace, scene: Scene) -> None:
-    """Refuse before the session what is bound to fail after it."""
+    """Refuse before the session options that mean nothing, and what is bound to fail after it."""
+    of_members = arguments.workers, arguments.scheduler, arguments.members, arguments.seed
+    if not arguments.uncertain and of_members != (None, None, MEMBERS, 1):
+        rule = "must be given with --uncertain only"
+        raise OutputError(f"--members, --seed, --workers and --scheduler {rule}.")
     names = "export", "plots", "render", "uncertain"
     extras = [name for name in names if getattr(arguments, name)]
     for name in extras:
