@@ -58,6 +58,8 @@ FINGERS = "finger"
 BODIES = "body"
 #: Sections of a finger that are parts; the other one is its path.
 FINGER_PARTS = tuple(section for section in FINGER_SECTIONS if section in SECTIONS)
+#: Parts of which a file says that they are absent.
+NAMED = tuple(section for section in OPTIONAL if section not in LATER)
 TOP_LEVEL = (FORMAT, UNCERTAINTY, *TEXTS, *SECTIONS, "trajectory", FINGERS, BODIES)
 
 
@@ -82,7 +84,7 @@ def resolve(table: Table, name: str = "", cache: ReadParts | None = None) -> Sce
     bodies = _read_bodies(table.get(BODIES, []), cache)
     tables = _split_fingers(table)
     shared = {
-        section: _read_section(section, table.get(section, ABSENT if section in UNASKED else {}))
+        section: _read_section(section, table)
         for section in SECTIONS
         if section not in FINGER_PARTS
     }
@@ -180,7 +182,7 @@ def tabulate(scene: Scene) -> Record:
             if part is not None:
                 usual = import_parameters(section, scene.method)(**defaults.get(section, {}))
                 tables[section] = list_changed(part, usual)
-            elif section in OPTIONAL and section not in LATER:
+            elif section in NAMED:
                 tables[section] = ABSENT
         return tables
 
@@ -280,12 +282,7 @@ def _read_finger(
     owner: str, table: Table, defaults: Mapping[str, Table], rest_height: float, cache: ReadParts
 ) -> Finger:
     """Return a finger from its sections; `owner`: prefix of their names in messages."""
-    tables = {
-        section: _read_section(
-            section, table.get(section, ABSENT if section in UNASKED else {}), owner
-        )
-        for section in FINGER_PARTS
-    }
+    tables = {section: _read_section(section, table, owner) for section in FINGER_PARTS}
     parts = _read_parts(tables, defaults, cache, owner=owner)
     path = cache.read(_read_path, f"{owner}trajectory", table.get("trajectory", {}), rest_height)
     return Finger(**parts, trajectory=path)
@@ -301,8 +298,9 @@ def _check_text(key: str, value: object) -> str:
     return value
 
 
-def _read_section(section: str, value: object, owner: str = "") -> Record | None:
+def _read_section(section: str, table: Table, owner: str = "") -> Record | None:
     """Return the table of a section, or None for an omitted part."""
+    value = table.get(section, ABSENT if section in UNASKED else {})
     if isinstance(value, str) and value == ABSENT and section in OPTIONAL:
         return None
     if isinstance(value, dict):
@@ -363,31 +361,35 @@ def format_scene(scene: Scene) -> str:
 def _write_lines(scene: Scene) -> Iterator[str]:
     """Yield the lines of a scene file; a single finger is written as by versions without several."""
     alone = len(scene.fingers) == 1
-    sections = [name for name in SECTIONS if alone or name not in FINGER_SECTIONS]
+    sections = (name for name in SECTIONS if alone or name not in FINGER_SECTIONS)
+    parts = {name: scene.section(name) for name in sections}
     yield "# Every parameter of the scene, in SI units."
     yield from (f"{key} = {format_value(getattr(scene, key))}" for key in TEXTS)
-    optional = [name for name in OPTIONAL if name not in LATER]
-    absent = [name for name in sections if name in optional and scene.section(name) is None]
-    yield from (f'{name} = "{ABSENT}"' for name in absent)
+    yield from _write_absent(parts)
     if not scene.fingers:
         yield f"{FINGERS} = []"
-    for name in sections:
-        method = scene.method if name == "control" else ""
-        yield from _write_part(name, scene.section(name), method)
+    for name, part in parts.items():
+        yield from _write_part(name, part, scene.method if name == "control" else "")
     for finger in scene.fingers:
         if alone:
             yield from _write_part("trajectory", finger.trajectory)
             break
         yield f"\n[[{FINGERS}]]"
         parts = {name: getattr(finger, name) for name in FINGER_PARTS}
-        absent = [name for name in parts if name in optional and parts[name] is None]
-        yield from (f'{name} = "{ABSENT}"' for name in absent)
+        yield from _write_absent(parts)
         for name, part in parts.items():
             yield from _write_part(f"{FINGERS}.{name}", part)
         yield from _write_part(f"{FINGERS}.trajectory", finger.trajectory)
     for each in scene.bodies:
         yield from _write_part(f"[{BODIES}]", each.body)
         yield from _write_part(f"{BODIES}.trajectory", each.trajectory)
+
+
+def _write_absent(parts: Table) -> Iterator[str]:
+    """Yield the lines of parts that are absent."""
+    for name, part in parts.items():
+        if part is None and name in NAMED:
+            yield f'{name} = "{ABSENT}"'
 
 
 def _write_part(section: str, part: Parameters | Path | None, method: str = "") -> Iterator[str]:
