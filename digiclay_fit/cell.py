@@ -83,6 +83,8 @@ class CellTrial:
 class CellModel(Model):
     """Model of all samples of some trials; `groups`: what is free."""
 
+    held_first = STROKE, LAG, DELAY
+
     def __init__(self, scene: Scene, trials: Sequence[Trial], groups: Sequence[str]) -> None:
         self.trials, self.groups = [CellTrial(trial) for trial in trials], tuple(groups)
         self.measured = np.concatenate([trial.answer for trial in trials])
@@ -113,9 +115,6 @@ class CellModel(Model):
         self.defaults = {i: each.start for i, each in enumerate(shared)}
         if STROKE in self.index:
             self.defaults[self.index[STROKE]] = math.log(orifice.knee)
-        self.held_first = tuple(
-            self.index[key] for key in (STROKE, LAG, DELAY) if key in self.index
-        )
 
     def _list_shared(self, conductance: float) -> Iterator[Parameter]:
         """Give the parameters that all trials share, the conductance first, then the knee if it is free."""

@@ -67,8 +67,8 @@ class Model(ABC):
     trials: Sequence[Any]
     parameters: tuple[Parameter, ...]
     measured: Floats
-    held_first: tuple[int, ...] = ()
-    """Indices of parameters that are held until the others are fitted, against other minima."""
+    held_first: tuple[str, ...] = ()
+    """Keys of parameters that are held until the others are fitted, against other minima."""
     defaults: dict[int, float]
     """Values of the scene for the parameters that it has, by index."""
     usual: Mapping[str, float] = MappingProxyType({})
@@ -214,7 +214,9 @@ def estimate(model: Model) -> Estimate:
     """Fit a model to its measured samples, with intervals and a verdict for each parameter."""
     results = []
     for start in model.list_starts():
-        held = {index: start[index] for index in model.held_first}
+        held = {
+            place: start[place] for key, place in model.index.items() if key in model.held_first
+        }
         begun = minimize(model, start, held).whole if held else start
         results.append(minimize(model, begun))
     result = min(results, key=lambda each: float(each.cost))
