@@ -59,8 +59,8 @@ class Histories:
         if now.play.runs is not self._present:
             self._recording.flush()
             self._present = now.play.runs
-        self._recording.observe(now.play.state)
         state = now.play.state
+        self._recording.observe(state)
         if state.deflection and state.period % self._recording.every == 0:
             for run, rise in zip(self._present, state.deflection.rise[:, None], strict=True):
                 self._rises[run].append(rise)
@@ -70,8 +70,7 @@ class Histories:
 
         To allocate memory for each run would take longer than to write it.
         """
-        run = now.play.runs[index]
-        state = now.play.state
+        run, state = now.play.runs[index], now.play.state
         rows = self._write(self._recording, run, state.period) if self._recording else {}
         if state.deflection and rows:
             rises = [*self._rises.pop(run), state.deflection.rise[index, None]]
@@ -115,8 +114,8 @@ class Sums:
             self._following[(period - 1) // self._every, self._columns] = _count_following(active)
         if period % self._every == 0:
             self._sums[period // self._every, :, self._columns] = self._sum(active).T
-            if bent := now.play.state.deflection:
-                self._rises[period // self._every, self._columns] = bent.rise
+            if deflection := now.play.state.deflection:
+                self._rises[period // self._every, self._columns] = deflection.rise
 
     def finish(self, now: Instant, index: int) -> Result:
         """Return the result of a run at its end, without a history."""
@@ -126,8 +125,8 @@ class Sums:
         rows, following = self._sums[:count, :, column], self._following[:count, column].copy()
         if count > 1:
             rows[-1], following[-1] = self._sum(active)[:, index], _count_following(active)[index]
-            if bent := play.state.deflection:
-                self._rises[count - 1, column] = bent.rise[index]
+            if deflection := play.state.deflection:
+                self._rises[count - 1, column] = deflection.rise[index]
         # Contiguous, since they are read many times.
         total, x, y, height, strongest = np.ascontiguousarray(rows.T)
         first, last = self._first[:, column], play.state.row(0)[:, index]

@@ -50,7 +50,7 @@ class HandStep:
 
         force = solve_force(press, now.force)
         lost = ~np.isfinite(force)
-        # Not finite is found, with its time and its cell, after the period.
+        # A force that is not finite is refused after the period, with its time and its cell.
         active.block[active.rows.force][..., lost if active.cells.ndim > 1 else lost.any()] = np.inf
         return self.swing.move(now, path, force)[0]
 

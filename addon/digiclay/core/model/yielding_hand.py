@@ -91,9 +91,11 @@ class Swing(NamedTuple):
 
         `path`: intended heights at evenly spaced instants, m; `force` (c,): at the end, N.
         """
+        # Slope of the intended path at its end, per step: of the parabola through three instants.
         part = 1.0 / (len(path) - 1)
         chord, last = path[-1] - path[0], path[-1] - path[-2]
         slope = chord if part == 1.0 else (last / part - part * chord) / (1.0 - part)
+        # BDF2: a share of the changes in the last step goes on; the rest follows from the rates at the end.
         going = self.memory * before.climbed
         speed = self.mass * (before.speed + self.memory * before.gained)
         speed += self.damping * slope / self.time
@@ -103,6 +105,7 @@ class Swing(NamedTuple):
         after = Deflection(rise, speed, climbed, gained, force)
         still = (np.abs(after) < AT_REST) | (np.abs(chord) > JUMP * self.time)
         after = Deflection(*np.where(still, 0.0, after))
+        # Between both ends the heights are parabolas: the fingertip's, less the intended one.
         bend = np.where(self.push > 0.0, 0.5 * self.time * gained - (slope - chord), 0.0)
         at = np.linspace(0.0, 1.0, len(path))[:, None]
         return after, before.rise + at * (after.rise - before.rise) + at * (at - 1.0) * bend
@@ -112,12 +115,13 @@ def make_swing(hands: Sequence[Hand | None], time: float, last: float) -> Swing:
     """Return the constants of a step of a time after another, s, of some fingers; None: path prescribed."""
     ratio = time / last
     lasting = time * (1.0 + ratio) / (1.0 + 2.0 * ratio)
-    rows = []
-    for hand in hands:
-        mass, damping, pull, push = 0.0, 0.0, 1.0 / lasting, 0.0
-        if hand:
-            terms = hand.mass, hand.damping * lasting, hand.stiffness * lasting, lasting
-            whole = hand.mass + lasting * (hand.damping + hand.stiffness * lasting)
-            mass, damping, pull, push = (term / whole for term in terms)
-        rows.append([time, ratio**2 / (1.0 + 2.0 * ratio), lasting, mass, damping, pull, push])
-    return Swing(*np.array(rows).T)
+    memory = ratio**2 / (1.0 + 2.0 * ratio)
+
+    def list_constants(hand: Hand | None) -> list[float]:
+        if hand is None:
+            return [time, memory, lasting, 0.0, 0.0, 1.0 / lasting, 0.0]
+        whole = hand.mass + lasting * (hand.damping + hand.stiffness * lasting)
+        terms = hand.mass, hand.damping * lasting, hand.stiffness * lasting, lasting
+        return [time, memory, lasting, *(term / whole for term in terms)]
+
+    return Swing(*np.array([list_constants(hand) for hand in hands]).T)
