@@ -200,7 +200,7 @@ def roll():
 def write_track():
     """Return the scene of the ball."""
     lines = [
-        f"  {{ time = {time:.3f}, position = {place.round(5).tolist()},"
+        f"  {{ time = {time:.3f}, position = {(place.round(5) + 0.0).tolist()},"
         f" orientation = {(turn.round(4) + 0.0).tolist()} }},\n"
         for time, place, turn in zip(*roll(), strict=True)
     ]

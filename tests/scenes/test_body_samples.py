@@ -42,6 +42,6 @@ def test_the_meshes_of_the_samples_are_those_of_their_formulas():
     for name, (vertices, triangles) in make_bodies().items():
         stored = mesh_reader.read(BODY_SAMPLES / f"{name}.ply")
         assert np.array_equal(stored.faces, triangles)
-        # Written as 32-bit numbers, in mm.
-        assert np.abs(stored.vertices - vertices).max() < 1e-4
+        # Both are rounded to 1 µm, which another processor may do the other way.
+        assert np.abs(stored.vertices - vertices).max() < 1.1e-3
     assert find("ball_track").read_text(encoding="utf-8") == write_track()
