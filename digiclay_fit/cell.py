@@ -202,15 +202,11 @@ class CellModel(Model):
         drag = 8.0 * valve.knee_reynolds**2 * fluid.density * fluid.viscosity
         shape = math.log(math.pi * valve.discharge_slope)
         wide, gradient = 0.5 * (math.log(drag * valve.stroke) + free[0]), 0.5 * unit[0]
-        derived = []
+        derived = super().derive(free)
         if "stroke" in self.groups:
             wide = math.log(4.0 * math.sqrt(fluid.density / 2.0)) + free[0] + 0.5 * free[1]
             gradient = unit[0] + 0.5 * unit[1]
             stroke = 2.0 * wide - math.log(drag) - free[0]
-            derived.append(Derived(STROKE, "m", stroke, unit[0] + unit[1], True))
-        derived.insert(0, Derived(DIAMETER, "m", 0.5 * (wide - shape), 0.5 * gradient, True))
-        return derived + [
-            Derived(each.key, each.unit, float(free[i]), unit[i], each.log)
-            for i, each in enumerate(self.parameters)
-            if each.wanted and each.key not in (DIAMETER, STROKE)
-        ]
+            derived[1] = Derived(STROKE, "m", stroke, unit[0] + unit[1], True)
+        derived[0] = Derived(DIAMETER, "m", 0.5 * (wide - shape), 0.5 * gradient, True)
+        return derived

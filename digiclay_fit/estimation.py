@@ -103,9 +103,14 @@ class Model(ABC):
         """Renew what the model takes from an earlier fit; return whether another fit is needed."""
         return False
 
-    @abstractmethod
     def derive(self, free: Floats) -> list[Derived]:
-        """Return the values of a scene that the parameters give."""
+        """Return the values of a scene that the parameters give: those that are wanted, in their order."""
+        unit = np.eye(free.size)
+        return [
+            Derived(each.key, each.unit, float(free[i]), unit[i], each.log)
+            for i, each in enumerate(self.parameters)
+            if each.wanted
+        ]
 
 
 @dataclass(frozen=True)

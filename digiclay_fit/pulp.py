@@ -249,22 +249,16 @@ class PulpModel(Model):
 
     def derive(self, free: Floats) -> list[Derived]:
         """Return the values for a scene: all weights, of the sum 1, are given together."""
-        found = []
-        for place, each in enumerate(self.parameters):
-            if each.wanted:
-                gradient = np.zeros(free.size)
-                gradient[place] = 1.0
-                found.append(Derived(each.key, each.unit, float(free[place]), gradient, each.log))
+        derived = super().derive(free)
         if "relaxation" in self.groups:
             gradient = np.array(
                 [-1.0 * each.key.startswith("relaxation.weights") for each in self.parameters]
             )
             value = float(self.read(free)[2][self.follows])
-            at = self.follows + sum(each.key.startswith("contact") for each in found)
-            found.insert(
-                at, Derived(f"relaxation.weights.{self.follows + 1}", "", value, gradient, False)
-            )
-        return found
+            at = self.follows + sum(each.key.startswith("contact") for each in derived)
+            key = f"relaxation.weights.{self.follows + 1}"
+            derived.insert(at, Derived(key, "", value, gradient, False))
+        return derived
 
 
 def relax(columns: Floats, time: float, step: float) -> tuple[Floats, Floats]:
