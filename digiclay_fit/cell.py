@@ -29,7 +29,7 @@ WEIGHTS = np.array((5.0, 8.0, 5.0)) / 18.0
 KNEES = (1e4, 4e4, 1e7)
 DIAMETER, STROKE = "valve.orifice_diameter", "valve.stroke"
 HIGH, LOW = "supply.high", "supply.low"
-LAG, DELAY = "valve_lag.time_constant", "delay.dead_time"
+LAG, DELAY, ZERO = "valve_lag.time_constant", "delay.dead_time", "zero of height {}"
 
 
 class CellTrial:
@@ -105,19 +105,12 @@ class CellModel(Model):
         }
         #: Logarithm of knee times conductance: that of a stroke, at any diameter.
         self.knee = math.log(orifice.knee * orifice.laminar)
-        shared = list(self._list_shared(orifice.laminar))
-        zeros = []
-        for number, trial in enumerate(trials, 1):
-            rest, key = float(trial.answer[0]), f"zero of height {number}"
-            bounds = rest - 1.0, rest + 1.0
-            zeros.append(Parameter(key, "m", rest, *bounds, wanted=False, of_trial=True))
-        self.parameters, self.zeros = (*shared, *zeros), len(shared)
-        self.defaults = {i: each.start for i, each in enumerate(shared)}
+        self.parameters = tuple(self._list_parameters(orifice.laminar, trials))
         if STROKE in self.index:
             self.defaults[self.index[STROKE]] = math.log(orifice.knee)
 
-    def _list_shared(self, conductance: float) -> Iterator[Parameter]:
-        """Give the parameters that all trials share, the conductance first, then the knee if it is free."""
+    def _list_parameters(self, conductance: float, trials: Sequence[Trial]) -> Iterator[Parameter]:
+        """Give what is free: the conductance first, then the knee if it is; a zero of each trial last."""
         start, far = math.log(conductance), math.log(1e4)
         yield Parameter(DIAMETER, "m3/(s Pa)", start, start - far, start + far, log=True)
         if "stroke" in self.groups:
@@ -131,6 +124,9 @@ class CellModel(Model):
         if "delay" in self.groups:
             longest = max(float(trial.time[-1]) for trial in self.trials) / 2.0
             yield Parameter(DELAY, "s", min(self.usual[DELAY], longest / 2.0), 0.0, longest)
+        for number, trial in enumerate(trials, 1):
+            key, rest = ZERO.format(number), float(trial.answer[0])
+            yield Parameter(key, "m", rest, rest - 1.0, rest + 1.0, wanted=False, of_trial=True)
 
     def predict_trial(self, number: int, free: Floats) -> tuple[Floats, Floats]:
         """Return the heights at the samples of a trial, and their Jacobian."""
@@ -158,7 +154,7 @@ class CellModel(Model):
         for key in slopes.keys() & index.keys():
             rates[1 + index[key]] = slopes[key]
         risen = trial.sum_up(rates / self.area)
-        zero = self.zeros + number
+        zero = index[ZERO.format(number + 1)]
         risen[1 + zero] = 1.0
         return free[zero] + risen[0], risen[1:].T
 

@@ -69,8 +69,6 @@ class Model(ABC):
     measured: Floats
     held_first: tuple[str, ...] = ()
     """Keys of parameters that are held until the others are fitted, against other minima."""
-    defaults: dict[int, float]
-    """Values of the scene for the parameters that it has, by index."""
     usual: Mapping[str, float] = MappingProxyType({})
     """Values in SI of parameters that are not free, by key; of all others 0."""
 
@@ -78,6 +76,11 @@ class Model(ABC):
     def index(self) -> dict[str, int]:
         """Places of the parameters, by key."""
         return {each.key: place for place, each in enumerate(self.parameters)}
+
+    @cached_property
+    def defaults(self) -> dict[int, float]:
+        """Values of the scene for the parameters that it has, by index."""
+        return {place: each.start for place, each in enumerate(self.parameters) if each.wanted}
 
     def predict(self, free: Floats) -> tuple[Floats, Floats]:
         """Return the prediction (n,) and its Jacobian (n, p)."""

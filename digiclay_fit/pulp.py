@@ -97,7 +97,6 @@ class PulpModel(Model):
         self.follows = int(self.weights.argmax())
         self.groups = tuple(groups)
         self.parameters = (*self._list_wanted(contact), *self._list_zeros(trials))
-        self.defaults = {i: each.start for i, each in enumerate(self.parameters) if each.wanted}
         self.fixed = math.log(contact.stiffness), math.log(contact.exponent)
         self.rounds = 0
 
