@@ -88,7 +88,7 @@ INTERVAL = 15e-3
 MOST_FRAMES = 216_000
 
 
-class Path(NamedTuple):
+class AnimatedPath(NamedTuple):
     """Poses of animated fingertips (t + 1, f, 7), and undersides of pressers."""
 
     poses: Floats
@@ -223,17 +223,14 @@ def read_rate(scene: Scene) -> float:
 
 
 def sample_path(
-    scene: Scene, bed: Object, first: int, last: int, made: DeviceScene
-) -> Iterator[float | Path]:
-    """Read the paths of fingertips and pressers as animated; yield the share done, at last the `Path`.
-
-    `made`: the scene of the bed.
-    """
+    scene: Scene, bed: Object, first: int, last: int, device: DeviceScene
+) -> Iterator[float | AnimatedPath]:
+    """Read fingertips and pressers of a bed as animated; yield the share done, and their paths at last."""
     if not 0 < last - first <= MOST_FRAMES:
         rule = f"must have from 1 to {MOST_FRAMES} frames after its first"
         raise DigiclayError(f"The frames to bake {rule} (got {first} to {last}).")
     rate = read_rate(scene)
-    period, grid = made.simulation.control_period, make_grid(made.layout)
+    period, grid = device.simulation.control_period, make_grid(device.layout)
     count = int(np.floor((last - first) / rate / period + 1e-6))
     every, knots = max(1, int(INTERVAL / period)), []
     frame_before = scene.frame_current, scene.frame_subframe
@@ -246,14 +243,14 @@ def sample_path(
             whole, part = divmod(first + row * period * rate, 1.0)
             scene.frame_set(int(whole), subframe=part)
             poses[row] = bridge.poses(bed)
-            if made.bodies and (row % every == 0 or row == count):
-                under = pressers.read_undersides(bpy.context, bed, made, grid)
+            if device.bodies and (row % every == 0 or row == count):
+                under = pressers.read_undersides(bpy.context, bed, device, grid)
                 assert under is not None  # there are bodies
                 knots.append((row, under))
             yield row / count
     finally:
         scene.frame_set(frame_before[0], subframe=frame_before[1])
-    yield Path(poses, tuple(knots))
+    yield AnimatedPath(poses, tuple(knots))
 
 
 def _modifier(bed: Object) -> Modifier | None:

@@ -57,9 +57,8 @@ class Stretch(NamedTuple):
 
     def at(self, bodies: Cells | int, cells: Cells) -> Floats:
         """Return the undersides of bodies over cells (k,), (p, k), m."""
-        start, end = self.start[bodies, cells], self.end[bodies, cells]
-        parts, rise = (rows[bodies].T.reshape(rows.shape[1], -1) for rows in self[3:])
-        under: Floats = start + parts * (end - start) + rise
+        start, end, rows = self.start[bodies, cells], self.end[bodies, cells], np.atleast_1d(bodies)
+        under: Floats = start + self.parts[rows].T * (end - start) + self.rise[rows].T
         return under
 
 
@@ -141,9 +140,8 @@ class PathUndersides:
 
     def _join_undersides(self, numbers: tuple[int, ...]) -> Lines:
         """Return the lines from multiples of the bodies' periods to the next ones."""
-        bodies = list(enumerate(numbers))
-        start = np.stack([self._compute(body, at)[0] for body, at in bodies])
-        end = np.stack([self._compute(body, at + 1)[0] for body, at in bodies])
+        start = np.stack([self._compute(body, at)[0] for body, at in enumerate(numbers)])
+        end = np.stack([self._compute(body, at + 1)[0] for body, at in enumerate(numbers)])
         return start, end, np.minimum(start, end)
 
     def _compute(self, body: int, at: int) -> tuple[Floats, float]:
@@ -241,17 +239,16 @@ class BodyPairs(Pairs):
     def find_under(self, finger: BodyPeriod) -> Floats:
         """Return the undersides over the pairs in a period, (p, k), m, not below the cap."""
         height, bodies = self.rows[0, : self.cells.size], self._bodies
+        stretch = finger.undersides.find(finger.number)
         if bodies[0] >= 0:
-            under = finger.undersides.find(finger.number).at(bodies, self._cells)
-            return np.maximum(under, height - self._caps[bodies])
+            return np.maximum(stretch.at(bodies, self._cells), height - self._caps[bodies])
         assert finger.hand is not None
-        under = finger.hand.under(self.positions)
         # A fingertip on a pin that a body presses is capped too.
-        pressed, stretch = np.zeros(height.size, np.bool_), finger.undersides.find(finger.number)
+        pressed = np.zeros(height.size, np.bool_)
         for body in range(len(self._caps)):
             pressed |= (stretch.at(body, self._cells) < height).any(axis=0)
         floor = np.where(pressed, height - self._caps.min(), -np.inf)
-        return np.maximum(under, floor)
+        return np.maximum(finger.hand.under(self.positions), floor)
 
 
 @dataclass(frozen=True, eq=False)
