@@ -154,14 +154,14 @@ def _needs_stroke(
 def _predict(other: Model, free: Floats, model: Model) -> Floats:
     """Return the prediction of held-out trials; only zeros that belong to a trial are fitted there."""
     start, *_ = other.list_starts()
-    fixed = {}
-    for number, each in enumerate(other.parameters):
-        if each.key in model.index and not each.of_trial:
-            fixed[number] = free[model.index[each.key]]
+    fixed = {
+        number: free[model.index[each.key]]
+        for number, each in enumerate(other.parameters)
+        if each.key in model.index and not each.of_trial
+    }
+    start[list(fixed)] = list(fixed.values())
     if len(fixed) < start.size:
         start = minimize(other, start, fixed).whole
-    for number, value in fixed.items():
-        start[number] = value
     return other.predict(start)[0]
 
 
