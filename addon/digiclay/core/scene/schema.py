@@ -234,23 +234,28 @@ class Scene(Described):
         if self.blister and 2.0 * self.blister.radius > longer_side * (1.0 + 1e-9):
             rule = f"must be at most half the bed's longer side, {longer_side / 2:g} m"
             raise ParameterError("blister", "radius", rule, f"{self.blister.radius:g} m")
-        if self.bodies and self.control and find_method(self.method).blister is not None:
-            rule = f"must be left out: the method {self.method} follows a fingertip, not a surface"
-            hint = "Set control.method to plastic, elastic, viscous, push_pull or force_display."
-            raise ParameterError("body", "", rule, f"{len(self.bodies)} of them", hint)
+        if self.bodies:
+            self._refuse_beside_bodies()
         lasts = self.lasting
         if self.simulation.duration == 0.0:
             if lasts == 0.0:
                 rule = "must be above 0 s where no finger has a path with a duration"
                 raise ParameterError("simulation", "duration", rule, "0 s")
             object.__setattr__(self, "simulation", _set_duration(self.simulation, lasts))
-        if self.bodies and any(self.list_parts("hand")):
-            rule = "must be left out beside [[body]], where paths are prescribed"
-            raise ParameterError("hand", "", rule, "a hand")
         longest = MOST_STEPS * self.simulation.control_period
         if self.delay and self.delay.dead_time > longest:
             rule = f"must be at most {MOST_STEPS} control periods, {longest:g} s"
             raise ParameterError("delay", "dead_time", rule, f"{self.delay.dead_time:g} s")
+
+    def _refuse_beside_bodies(self) -> None:
+        """Refuse what cannot be where bodies press."""
+        if self.control and find_method(self.method).blister is not None:
+            rule = f"must be left out: the method {self.method} follows a fingertip, not a surface"
+            hint = "Set control.method to plastic, elastic, viscous, push_pull or force_display."
+            raise ParameterError("body", "", rule, f"{len(self.bodies)} of them", hint)
+        if any(self.list_parts("hand")):
+            rule = "must be left out beside [[body]], where paths are prescribed"
+            raise ParameterError("hand", "", rule, "a hand")
 
     def _refuse_wrong_parts(self) -> None:
         """Refuse parts that are not of the classes of their sections, or not of the control method.
