@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import repeat
@@ -102,28 +102,39 @@ class MovedMesh:
         return np.minimum(under, ceiling)
 
 
+class TracedMesh:
+    """Undersides of a mesh at every few control periods of its path; the last ones are remembered."""
+
+    def __init__(self, body: MovedMesh, grid: Grid, period: float, ceiling: float) -> None:
+        self.trajectory, self.stride = body.trajectory, body.count_periods(period)
+        self._time = self.stride * period
+        # Above its origin, what is no part of the body and stays above the ceiling.
+        beyond = ceiling - float(body.trajectory.positions[:, 2].min())
+        # By pose, since one that stands still has the same at any time.
+        remember = lru_cache(int(4 + AHEAD / self._time))
+        self._rasterize = remember(lambda pose: body.rasterize(np.frombuffer(pose), grid, beyond))
+
+    def compute(self, number: int) -> tuple[Floats, float]:
+        """Return the underside over its origin at a multiple of its periods, (n,), and that, m."""
+        (pose,) = self.trajectory.poses(np.array([number * self._time]))
+        height, pose[2] = float(pose[2]), 0.0
+        return self._rasterize(pose.tobytes()), height
+
+
 class PathUndersides:
     """Undersides of meshes along their paths, computed when they are needed."""
 
     def __init__(
         self, bodies: tuple[MovedMesh, ...], grid: Grid, instants: Floats, ceiling: float
     ) -> None:
-        self._bodies, self._instants, self._period = bodies, instants, float(instants[-1])
-        self._strides = [body.count_periods(self._period) for body in bodies]
+        self._instants, self._period = instants, float(instants[-1])
+        self._bodies = [TracedMesh(body, grid, self._period, ceiling) for body in bodies]
         self._make_lines = lru_cache(1)(self._join_undersides)
-
-        def remember(body: MovedMesh, stride: int) -> Callable[[bytes], Floats]:
-            # Above its origin, what is no part of the body and stays above the ceiling.
-            beyond = ceiling - float(body.trajectory.positions[:, 2].min())
-            last = int(4 + AHEAD / (stride * self._period))
-            return lru_cache(last)(lambda pose: body.rasterize(np.frombuffer(pose), grid, beyond))
-
-        self._rasterize = [*map(remember, bodies, self._strides)]
 
     def find(self, period: int) -> Stretch:
         """Return the undersides in a period."""
-        lines = self._make_lines(tuple(period // stride for stride in self._strides))
-        strides = np.array(self._strides)[:, None]
+        lines = self._make_lines(tuple(period // body.stride for body in self._bodies))
+        strides = np.array([[body.stride] for body in self._bodies])
         parts = (period % strides + self._instants / self._period) / strides
         moments = period * self._period + self._instants
         rise = [body.trajectory.poses(moments)[:, 2] for body in self._bodies]
@@ -132,24 +143,18 @@ class PathUndersides:
     def find_lowest(self, period: int) -> Floats:
         """Return the lowest undersides from a period on for the time `AHEAD`, (b, n), m."""
         lowest = []
-        for body, stride in enumerate(self._strides):
-            last = math.ceil((period + AHEAD / self._period) / stride)
-            each = [self._compute(body, at) for at in range(period // stride, last + 1)]
+        for body in self._bodies:
+            last = math.ceil((period + AHEAD / self._period) / body.stride)
+            each = map(body.compute, range(period // body.stride, last + 1))
             lowest.append(np.minimum.reduce([under + height for under, height in each]))
         return np.stack(lowest)
 
     def _join_undersides(self, numbers: tuple[int, ...]) -> Lines:
         """Return the lines from multiples of the bodies' periods to the next ones."""
-        start = np.stack([self._compute(body, at)[0] for body, at in enumerate(numbers)])
-        end = np.stack([self._compute(body, at + 1)[0] for body, at in enumerate(numbers)])
+        bodies = list(zip(self._bodies, numbers, strict=True))
+        start = np.stack([body.compute(number)[0] for body, number in bodies])
+        end = np.stack([body.compute(number + 1)[0] for body, number in bodies])
         return start, end, np.minimum(start, end)
-
-    def _compute(self, body: int, at: int) -> tuple[Floats, float]:
-        """Return the underside of a body at a multiple of its periods over its origin, (n,), and that, m."""
-        time = at * (self._strides[body] * self._period)
-        (pose,) = self._bodies[body].trajectory.poses(np.array([time]))
-        height, pose[2] = float(pose[2]), 0.0
-        return self._rasterize[body](pose.tobytes()), height
 
 
 #: Unit of given undersides, m: whole numbers of it are packed well, and all are exact.
