@@ -6,7 +6,7 @@ import digiclay
 import numpy as np
 import pytest
 from digiclay.cli import main
-from digiclay.commands import evaluation_pool
+from digiclay.commands import evaluation_pool, uncertain
 from digiclay.core.metrics.bands import find_band
 from digiclay.core.scene.scene_source import find, read_parts
 from digiclay.core.session.run_scene import Result
@@ -387,3 +387,46 @@ def test_a_run_outlives_the_processes_of_its_members(measured, here, monkeypatch
     assert call(told.partition("to have it: digiclay ")[2]) == 0
     again = (here / "first/uncertainty.json").read_bytes()
     assert again == (measured / "o/uncertainty.json").read_bytes()
+
+
+@table(
+    "scene, words, message",
+    {
+        "without a fitted file": (SCENE, "--speed", "must be given with --uncertain only"),
+        "a bed that is too narrow for the drag": (
+            SCENE,
+            "--speed --uncertain fitted.toml",
+            "at least as wide as the drag",
+        ),
+        "without a fingertip": (
+            "fingertip = 'absent'\n" + scene_text(5, 15, (0.0, 0.041), (0.1, 0.038)),
+            "--speed --uncertain fitted.toml",
+            "--speed needs a fingertip",
+        ),
+    },
+)
+def test_speeds_that_cannot_be_searched_are_refused_before_the_run(
+    scene, words, message, here, capsys
+):
+    (here / "my.toml").write_text(scene, encoding="utf-8")
+    fitted(here, (2,))
+    assert call(f"run my.toml {words} --out o") == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert message in line
+    assert not (here / "o").exists()
+
+
+def test_a_speed_beyond_the_range_of_the_search_is_no_number():
+    bands = {
+        "largest_drag_speed": {"value": 0.04, "ends": [0.021, 0.04], "integration": None},
+        "largest_lift_speed": {"value": 0.02, "ends": [0.0, 0.03], "integration": None},
+    }
+    members = [{}] * 40
+    content = {
+        "bands": {name: {**band, "members": 40} for name, band in bands.items()},
+        "members": members,
+        "notes": [],
+    }
+    _, _, drags, lifts = uncertain.describe(content)
+    assert "at least 40  21 to at least 40" in drags
+    assert "below 2 to 30" in lifts

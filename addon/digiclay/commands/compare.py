@@ -27,9 +27,8 @@ from ..core.studies.axes import Point
 from ..core.studies.speed_limits import (
     HIGH,
     LOW,
+    MOTIONS,
     Criterion,
-    Drag,
-    Lift,
     describe_end,
     find_largest_speed,
 )
@@ -254,8 +253,7 @@ def _speeds(scene: Scene) -> tuple[Metrics, list[str]]:
     """Measure the largest speeds, None where the slowest is too fast; return why others are absent too."""
     measured: Metrics = {}
     absent = []
-    ways: tuple[Drag | Lift, ...] = Drag(), Lift()
-    for name, motion in zip(SPEEDS, ways, strict=True):
+    for name, motion in MOTIONS.items():
         try:
             measured[name] = find_largest_speed(scene, motion, Criterion())
         except ParameterError as error:

@@ -158,9 +158,9 @@ def carry_out(arguments: Namespace) -> int:
 def _refuse_early(arguments: Namespace, scene: Scene) -> None:
     """Refuse before the session options that mean nothing, and what is bound to fail after it."""
     of_members = arguments.workers, arguments.scheduler, arguments.members, arguments.seed
-    if not arguments.uncertain and of_members != (None, None, MEMBERS, 1):
+    if not arguments.uncertain and (arguments.speed or of_members != (None, None, MEMBERS, 1)):
         rule = "must be given with --uncertain only"
-        raise OutputError(f"--members, --seed, --workers and --scheduler {rule}.")
+        raise OutputError(f"--members, --seed, --speed, --workers and --scheduler {rule}.")
     names = "export", "plots", "render", "uncertain"
     extras = [name for name in names if getattr(arguments, name)]
     for name in extras:

@@ -39,5 +39,6 @@ UNCERTAIN: Options = {
         "help": "take the parts of a fitted file, and add bands of 95 %% over its intervals",
     },
     "--members N": (whole_number(LEAST, MOST), f"runs for them; default: {MEMBERS}", MEMBERS),
+    "--speed": "with --uncertain: bands of the largest tracking speeds, too",
     "--seed N": (whole_number(1, 2**31), "of their random numbers; default: 1", 1),
 }

@@ -4,18 +4,26 @@ from __future__ import annotations
 
 from argparse import Namespace
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from ..core.base.errors import DigiclayError, OutputError
 from ..core.files.run_folder import format_json, write_whole
 from ..core.files.tables import Record
 from ..core.metrics.bands import LEAST, find_band
-from ..core.metrics.metric_table import FREE, METRICS
+from ..core.metrics.metric_table import FREE, METRICS, SPEEDS
 from ..core.scene.scene_source import find
 from ..core.session.run_scene import Result
 from ..core.studies.axes import Point
 from ..core.studies.evaluation import TIMES, explain_failed_batches, make_bundles
-from ..core.studies.speed_limits import find_free_speed
+from ..core.studies.speed_limits import (
+    LOW,
+    MOTIONS,
+    describe_end,
+    find_free_speed,
+    make_trial,
+    measure_speeds,
+)
 from ..core.studies.uncertainty import Members, draw_members
 from .arguments import say, settings_of
 from .evaluation_pool import Evaluation
@@ -30,7 +38,7 @@ BANDED: dict[str, tuple[str, float]] = {
     **dict.fromkeys(("rfd", "rfd_shaping", "max_total_force"), ("total_force_error", 1.0)),
     "height_range": ("height_error", 2.0),
     "ridge_error": ("height_error", 1.0),
-    **dict.fromkeys(("lag_mean", *FREE), ("", 1.0)),
+    **dict.fromkeys(("lag_mean", *FREE, *SPEEDS), ("", 1.0)),
 }
 HEAD = ("metric", "value", "95 % band", "half of it", "integration, at most")
 
@@ -41,7 +49,19 @@ def read_members(arguments: Namespace) -> Members:
     if arguments.budget is not None:
         raise OutputError("--uncertain must be given without --budget, which omits parts.")
     arguments.parts = [*arguments.parts, *files]
-    return draw_members(files, find(arguments.scene), settings_of(arguments), *sizes)
+    members = draw_members(files, find(arguments.scene), settings_of(arguments), *sizes)
+    if arguments.speed:
+        _refuse_motions(members)
+    return members
+
+
+def _refuse_motions(members: Members) -> None:
+    """Refuse beds on which the fingertip cannot move as the search for speeds moves it."""
+    scene = next(point.scene for point in members.points if point.scene)
+    if scene.bodies or not any(scene.list_parts("fingertip")):
+        raise OutputError("--speed needs a fingertip, and no bodies beside it.")
+    for motion in MOTIONS.values():
+        make_trial(scene, motion, LOW)
 
 
 def list_options(arguments: Namespace) -> list[str]:
@@ -57,7 +77,8 @@ def add_bands(arguments: Namespace, members: Members, result: Result, run: Path,
         content = measure(arguments, members, result, stop)
     finally:
         if content is None:  # also when the processes broke down
-            words = [*list_options(arguments), "--seed", str(arguments.seed)]
+            speed = ["--speed"] if arguments.speed else []
+            words = [*list_options(arguments), *speed, "--seed", str(arguments.seed)]
             tell_stopped_before(FILE, ["run", str(run), *words, "--out", str(run), "--overwrite"])
     if content is None:
         return STOPPED
@@ -78,10 +99,33 @@ def measure(arguments: Namespace, members: Members, result: Result, stop: Stop) 
         return None
     rows = [_make_row(members.keys, point, records[point.index]) for point in points]
     notes = [members.note, *bundles.describe(), *explain_failed_batches(records)]
-    if failed := [row["error"] for row in rows if "error" in row]:
-        notes.append(f"{len(failed)} of {len(rows)} members failed; the first: {failed[0]}")
-    bands = find_bands(result, [row["figures"] for row in rows if "figures" in row])
+    notes += _note_failed(rows, "failed")
+    nominal = {**result.metrics, "free_rise": find_free_speed(result.scene)}
+    if arguments.speed:
+        # Behind the members the scene itself.
+        every = [*points, Point(len(points), (), result.scene)]
+        searched = [replace(point, measure=measure_speeds) for point in every]
+        with Evaluation(arguments, "speeds", None, len(every), stop) as evaluation:
+            evaluation.finish([(point,) for point in searched], members.keys)
+            speeds = evaluation.collect()
+        if len(speeds) < len(every):
+            return None
+        nominal |= speeds[len(points)].get("figures", {})
+        for point, row in zip(points, rows, strict=True):
+            row["figures"] = row.get("figures", {}) | speeds[point.index].get("figures", {})
+        notes += _note_failed([speeds[point.index] for point in points], "have no largest speeds")
+    bands = find_bands(nominal, [row["figures"] for row in rows if "figures" in row])
     return {"bands": bands, "notes": notes, "members": rows}
+
+
+def _note_failed(records: Sequence[Record], what: str) -> list[str]:
+    """Return a line on the members that failed, if there are any."""
+    failed = [record["error"] for record in records if "error" in record]
+    return (
+        [f"{len(failed)} of {len(records)} members {what}; the first: {failed[0]}"]
+        if failed
+        else []
+    )
 
 
 def _make_row(keys: Sequence[str], point: Point, record: Record) -> Record:
@@ -93,12 +137,11 @@ def _make_row(keys: Sequence[str], point: Point, record: Record) -> Record:
     return row
 
 
-def find_bands(result: Result, figures: Sequence[Record]) -> dict[str, Record]:
-    """Return the band of each metric that is not 0, in SI; `figures`: of the members."""
+def find_bands(nominal: Record, figures: Sequence[Record]) -> dict[str, Record]:
+    """Return the band of each metric that is not 0, in SI; figures of the scene and of its members."""
     bands: dict[str, Record] = {}
-    nominal = {**result.metrics, "free_rise": find_free_speed(result.scene)}
     for name, (error, factor) in BANDED.items():
-        values = [member[name] for member in figures if member[name] is not None]
+        values = [member[name] for member in figures if member.get(name) is not None]
         ends = find_band(values)
         if nominal.get(name) and ends:
             bands[name] = {
@@ -114,16 +157,23 @@ def describe(content: Record) -> Iterator[str]:
     """Give the table of the bands, and lines on the members."""
     rows = []
     for name, band in content["bands"].items():
-        metric, count = {**METRICS, **FREE}[name], band["members"]
+        metric, count = {**METRICS, **FREE, **SPEEDS}[name], band["members"]
         few = f" of {count}" if count < len(content["members"]) else ""
-        value, low, high = (metric.factor * number for number in (band["value"], *band["ends"]))
+        numbers = (band["value"], *band["ends"])
+        value, low, high = (metric.factor * number for number in numbers)
         error = metric.factor * (band["integration"] or 0.0)
+        # Speeds are searched in a range: what is beyond its ends has no number.
+        beyond = [describe_end(number or None) if name in SPEEDS else "" for number in numbers]
+        shown = [
+            end or f"{number:.4g}" for end, number in zip(beyond, (value, low, high), strict=True)
+        ]
+        half = "–" if any(beyond) else f"± {50.0 * (high - low) / abs(value):.2g} %"
         rows.append(
             [
                 metric.title,
-                f"{value:.4g}",
-                f"{low:.4g} to {high:.4g}{few}",
-                f"± {50.0 * (high - low) / abs(value):.2g} %",
+                shown[0],
+                f"{shown[1]} to {shown[2]}{few}",
+                half,
                 f"± {error:.2g}" if error else "–",
             ]
         )

@@ -180,9 +180,19 @@ ERRORS: dict[str, Metric] = {
 #: Largest speeds at which a fingertip is followed.
 SPEEDS: dict[str, Metric] = {
     "largest_drag_speed": Metric(
-        "m/s", "lower", "fastest straight level drag of a ridge that is followed"
+        "m/s",
+        "lower",
+        "fastest straight level drag of a ridge that is followed",
+        "largest speed of drags",
+        "mm/s",
     ),
-    "largest_lift_speed": Metric("m/s", "lower", "fastest lift straight up that is followed"),
+    "largest_lift_speed": Metric(
+        "m/s",
+        "lower",
+        "fastest lift straight up that is followed",
+        "largest speed of lifts",
+        "mm/s",
+    ),
 }
 #: Speed limit of every lift.
 FREE: dict[str, Metric] = {

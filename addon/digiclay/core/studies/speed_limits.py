@@ -8,6 +8,9 @@ import numpy as np
 
 from ..base.errors import ParameterError
 from ..base.quantity import Parameters, quantity
+from ..engine.simulation import Stopped
+from ..files.tables import Record
+from ..metrics.metric_table import SPEEDS
 from ..metrics.summary import (
     compute_rfd,
     find_contact_ends,
@@ -116,6 +119,10 @@ class Lift(Parameters):
         return _through(points, "smooth"), start, end
 
 
+#: Motions of which the largest speeds are searched, by the names of these.
+MOTIONS: dict[str, Drag | Lift] = dict(zip(SPEEDS, (Drag(), Lift()), strict=True))
+
+
 def _through(points: tuple[tuple[float, float, float], ...], interpolation: str) -> Path:
     """Return a path through times, s, and x and z, m."""
     return Path(interpolation, tuple(Waypoint(time=t, position=(x, 0.0, z)) for t, x, z in points))
@@ -190,6 +197,16 @@ def find_largest_speed(
         return judged.meets(criterion)
 
     return bisect(holds, low, high, resolution)
+
+
+def measure_speeds(scene: Scene, stopped: Stopped = None) -> Record | None:
+    """Return the `SPEEDS` of a scene, m/s, 0 if even the lowest is too fast; None after a stop."""
+    speeds: dict[str, float] = {}
+    for name, motion in MOTIONS.items():
+        if stopped and stopped():
+            return None
+        speeds[name] = find_largest_speed(scene, motion, Criterion()) or 0.0
+    return {"figures": speeds}
 
 
 def describe_end(speed: float | None, low: float = LOW, high: float = HIGH) -> str:
