@@ -28,6 +28,8 @@ SVG = """<svg xmlns="http://www.w3.org/2000/svg" width="80mm" height="80mm" view
 
 #: The Object menu, pixels from the top left corner of the window, and half the height of an entry.
 OBJECT, HALF = (328, 41), 10
+#: Numbers of its entries from the end: the last one is *Add Presser*.
+ALONG, FILLED = 3, 2
 
 
 def script(blender):
@@ -40,7 +42,7 @@ def script(blender):
     yield from blender.rounds()
     yield from act(blender, to(on_the_screen(blender, 0.0, 0.0)), "key a sleep 0.5")
     blender.SEEN["selected"] = len([thing for thing in curves() if thing.select_get()])
-    yield from click_entry(blender, "along", 2)
+    yield from click_entry(blender, "along", ALONG)
     yield from blender.until(lambda: blender.session() is not None)
     blender.SEEN["queued"] = blender.session().begun_strokes
     blender.shot("curves_queued")
@@ -50,7 +52,7 @@ def script(blender):
     for thing in curves():
         filled = thing.type == "FONT" or thing.data.fill_mode != "NONE"
         thing.select_set(filled and thing.data.dimensions == "2D")
-    yield from click_entry(blender, "filled", 1)
+    yield from click_entry(blender, "filled", FILLED)
     yield from formed(blender, "stamped")
 
 
