@@ -36,8 +36,10 @@ def start_failing(blender, kind, action):
     failing = type("Failing", (kind,), {"bl_idname": name, "prepare": prepare, "needs": ()})
     bpy.utils.register_class(failing)
     area, _, verb = name.partition(".")
+    # Without a path it would open the file browser first, which is no part of its own start.
+    path = {"filepath": str(blender.OUT / "out.glb")} if "filepath" in kind.__annotations__ else {}
     try:
-        said = sorted(blender.call(getattr(getattr(bpy.ops, area), verb), "INVOKE_DEFAULT"))
+        said = sorted(blender.call(getattr(getattr(bpy.ops, area), verb), "INVOKE_DEFAULT", **path))
     except RuntimeError as error:
         said = [str(error)]
     left = list_modal(blender)
