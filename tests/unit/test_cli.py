@@ -17,7 +17,7 @@ from digiclay.core.control.virtual_master import VirtualMaster
 from digiclay.core.model.actuator import Actuator, Supply
 from digiclay.core.model.layout import Layout
 
-from tests.assemble import AWAY, one_cell, record, scripted
+from tests.assemble import AWAY, one_cell, path, record, scripted
 from tests.other_process import PROGRAM, finish, start
 from tests.scene_files import call, left, read_json
 
@@ -384,7 +384,7 @@ def numbers(text):
 UNLIKE = ("supply.high=0.4 bar", "supply.low=-0.6 bar", "layout.rows=12", "layout.columns=10")
 
 
-def test_speeds_hold_forces_and_refilling_are_those_of_a_pin_with_its_valve_wide_open(capsys):
+def test_speeds_stall_forces_and_refresh_are_those_of_a_pin_with_its_valve_wide_open(capsys):
     said, moved = described(capsys, *UNLIKE), []
     for command in (1.0, -1.0):
         one = one_cell(
@@ -397,12 +397,29 @@ def test_speeds_hold_forces_and_refilling_are_those_of_a_pin_with_its_valve_wide
     up, down = numbers(said["free speed"])
     assert [up, down] == pytest.approx(moved, rel=5e-3)
     forces = [pressure * Actuator().area for pressure in (0.4e5, 0.6e5)]
-    assert numbers(said["hold force"]) == pytest.approx(forces, rel=5e-3)
-    filled, emptied, volume = numbers(said["refill"])
+    assert numbers(said["stall"]) == pytest.approx(forces, rel=5e-3)
+    raised = scripted(lambda time, x, y: 1.0)
+    pressing = one_cell(supply=Supply(0.4e5, -0.6e5), control=raised, relaxation=None)
+    # The pin rises against a finger 10 mm above, and stops there.
+    stalled = record(pressing, path((0.0, 0.0, 0.0, 50.0)), 400).force[-1, 0]
+    assert numbers(said["stall"])[0] == pytest.approx(stalled, rel=5e-3)
+    assert numbers(said["valves"]) == [120]
+    filled, emptied, volume = numbers(said["refresh"])
     # 100 mm of stroke; three digits each.
     assert [filled * up, emptied * down] == pytest.approx([100.0, 100.0], rel=1e-2)
     assert volume == pytest.approx(120 * np.pi * 100.0 * 1e-3, rel=5e-3)
     # A reservoir that cannot lower a pin never empties the bed.
     said = described(capsys, "supply.low=0")
     assert ", 0 mm/s down" in said["free speed"]
-    assert "floor: never" in said["refill"]
+    assert "floor: never" in said["refresh"]
+
+
+def test_the_stiffness_felt_is_the_slope_of_a_quick_press_on_a_shut_pin(capsys):
+    first, pressed, force = numbers(described(capsys)["felt"])
+    # 5 µm a period, of a pulp that does not relax.
+    pulp = one_cell(relaxation=None)
+    down = path((0.0, 0.0, 0.0, 40.0), (1.0, 0.0, 0.0, 39.0), interpolation="linear")
+    history = record(pulp, down, 200)
+    stiffness = np.gradient(history.force[:, 0], 1e-3 * history.time)
+    assert np.interp(force, history.force[:, 0], stiffness) == pytest.approx(pressed, rel=0.02)
+    assert np.interp(1e-3, history.force[:, 0], stiffness) == pytest.approx(first, rel=0.05)

@@ -89,6 +89,8 @@ def test_what_cannot_be_is_refused(ask, words):
         ("hexagonal", 3, None, []),
         ("aligned", 4, None, ["± 1.3 % from place to place, 2 mm deep"]),
         ("aligned", 5, None, ["± 11 % from place to place, 2 mm deep"]),
+        ("aligned", 6, None, ["mm deep"]),
+        ("aligned", 7, None, ["the bed can show shapes, but cannot be sculpted"]),
         ("hexagonal", 4, None, []),
         ("aligned", 3, 0.34, []),
         ("aligned", 2, 0.34, ["contact.share 0.34 gives 2.25 of the finger's force"]),

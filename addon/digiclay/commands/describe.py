@@ -9,6 +9,7 @@ from typing import Any
 from ..core.base.quantity import Parameters, Quantity, list_quantities
 from ..core.control.virtual_master import make_master_cell
 from ..core.engine.system import System
+from ..core.model.laws import select_law
 from ..core.scene.assembly import assemble
 from ..core.scene.schema import LATER, SECTIONS, Scene
 from ..core.session.memory_limit import (
@@ -44,6 +45,8 @@ PLACES = (
     ("blister", "blister"),
     ("recorder", "recorder"),
 )
+#: Force on a pin at which the stiffness felt is told, N.
+FELT = 0.05
 #: Units people read: factor and name.
 READ = {
     "m": (1e3, "mm"),
@@ -159,21 +162,29 @@ def description(scene: Scene, system: System) -> Iterator[str]:
 
 def _pins(scene: Scene, system: System) -> Iterator[tuple[str, str]]:
     """Give what a pin can do, and how long the bed takes over it."""
-    actuator, supply = scene.actuator, scene.supply
+    actuator, supply = scene.actuator, system.cell.supply
     speed = make_master_cell(system.cell, system.period).speed
     up, down = speed(1.0), 0.0 - speed(-1.0)
+    yield "valves", f"{scene.cells}, one per pin"
     yield (
         "free speed",
         f"{up * 1e3:.3g} mm/s up, {down * 1e3:.3g} mm/s down, valve wide open and no load",
     )
     lift, pull = supply.high * actuator.area, (0.0 - supply.low) * actuator.area
-    yield (
-        "hold force",
-        f"{lift:.3g} N up through the open valve, {pull:.3g} N down; any load with the valve shut",
-    )
+    yield "stall", f"{lift:.3g} N up, {pull:.3g} N down, valve wide open"
+    yield "shut valve", "holds any load, rigid; 0 mm of leak per minute"
+    for fingers, contact in _list_parts(scene, "contact"):
+        if contact is not None:
+            law = select_law("contact", contact)
+            first = law.share * law.stiffness
+            yield (
+                f"felt {fingers}".strip(),
+                f"a held pin through the pulp: {first:.3g} N/m at first touch, "
+                f"{first + law.exponent * FELT:.3g} N/m at {FELT:g} N",
+            )
     volume = scene.cells * actuator.area * actuator.stroke
     yield (
-        "refill",
+        "refresh",
         f"all pins together, from the floor to the full stroke: {_lasting(actuator.stroke, up)}; "
         f"back to the floor: {_lasting(actuator.stroke, down)}; {volume * 1e6:.3g} ml",
     )

@@ -18,8 +18,9 @@ from ..scene.schema import Scene
 DEEPEST = 0.8
 #: Depth at which a lattice is judged, as a share of the height of the fingertip: 2 mm of the paper's.
 JUDGED = 0.25
-#: Places along a pitch and along two row spacings at which it is judged; spread that is tolerated.
-PLACES, COARSE = (8, 16), 0.01
+#: Places along a pitch and along two row spacings at which it is judged; spread that is tolerated, and
+#: spread from which every method loses the force of the finger, or the finger (7 mm for the paper's).
+PLACES, COARSE, LOST = (8, 16), 0.01, 0.5
 
 
 def integrate_law(tip: Fingertip, law: ExponentialLaw, indentation: Floats) -> Floats:
@@ -108,5 +109,6 @@ def list_cautions(scene: Scene) -> list[str]:
                 f"pins {plan.pitch * 1e3:g} mm apart are coarse for this finger: "
                 f"its force changes by ± {100 * spread:.2g} % from place to place, "
                 f"{JUDGED * tip.height * 1e3:g} mm deep"
+                + (": the bed can show shapes, but cannot be sculpted" if spread > LOST else "")
             )
     return lines
