@@ -50,6 +50,7 @@ def imported(*settings):
         ((), ("simulation.stepper=heun",), {"steppers.explicit"}),
         ((), ("sensors.delay=1",), {"model.sensors"}),
         ((), ("hand.mass=5 g",), {"model.yielding_hand"}),
+        ((), ("drive.sections=4",), {"model.matrix_drive"}),
         (("sensors.delay=1",), ("sensors.observer=valve",), {"model.observer"}),
     ],
 )  # fmt: skip

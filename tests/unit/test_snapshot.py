@@ -54,18 +54,24 @@ def packed_parts(state):
     )
     rest = (state.period, state.peak, held.near, held.reach, held.control, held.peak, held.until)
     kept = []
-    memory = flatten(state.memory, kept)
+    memory = flatten(state.memory, kept), flatten(state.addressing, kept)
     locks = None if state.locks is None else state.locks.tobytes()
     return [*(array.tobytes() for array in (*arrays, *kept)), *rest, memory, locks]
 
 
 RISING = {"shape": {"file": "ripple", "rise": "10 mm"}}
+MATRIX = {"drive": {"sections": 3, "slot": "20 ms", "share": True}}  # kept in mid-slot
 SENSORS = {"sensors": {"delay": 3, "observer": "valve", "height_noise": "1 um"}}  # that remember
 
 
 @pytest.mark.parametrize(
     "method, tables",
-    [*((method, {}) for method in METHODS), ("virtual_master", SENSORS), ("viscous", RISING)],
+    [
+        *((method, {}) for method in METHODS),
+        ("virtual_master", SENSORS),
+        ("viscous", RISING),
+        ("virtual_master", MATRIX),
+    ],
     ids=str,
 )
 def test_a_session_goes_on_from_a_kept_state_bit_for_bit(method, tables):
@@ -195,7 +201,18 @@ def test_pins_at_their_ends_are_taken_up_and_a_memory_of_no_number_of_the_world_
     state.rows[system.cell.lag_rows, :2] = state.rows[system.rows.commands, :2] = -1.0, 1.0
     assert same(load(system, dump(system, state)), state)
     # A field that is added to a state must be added to what is kept, and to `packed_parts`.
-    fields = {"period", "rows", "modes", "aged", "peak", "active", "memory", "locks", "deflection"}
+    fields = {
+        "period",
+        "rows",
+        "modes",
+        "aged",
+        "peak",
+        "active",
+        "memory",
+        "locks",
+        "deflection",
+        "addressing",
+    }
     assert set(State._fields) == fields
     system = system_of("hybrid")
     state = run(system, begin(system), 70)

@@ -40,6 +40,7 @@ PLACES = (
     ("conduit", "conduit"),
     ("valve lag", "valve_lag"),
     ("dead time", "delay"),
+    ("drive", "drive"),
     ("sensors", "sensors"),
     ("controller", "control"),
     ("blister", "blister"),

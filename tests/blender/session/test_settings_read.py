@@ -30,7 +30,8 @@ def parameters():
     for method in METHODS:
         for section in SECTIONS if method == "virtual_master" else ("control",):
             for field in dataclasses.fields(import_parameters(section, method)):
-                yield method, section, field.name
+                if len(field.metadata["quantity"].choices) != 1:
+                    yield method, section, field.name
 
 
 def change(group, name):

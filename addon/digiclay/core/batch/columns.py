@@ -199,6 +199,7 @@ def make_batch(systems: Sequence[System]) -> Batch:
         cell=cell,
         sensors=merge_values([system.sensors for system in systems]),
         controller=join_controllers([system.controller for system in systems], by_set=first.by_set),
+        drive=first.drive,
         stepper=first.stepper,
         plan=merge_parts([system.plan for system in systems]),
         period=period,

@@ -123,6 +123,8 @@ def begin_play(scenes: Mapping[int, Scene], systems: Mapping[int, System]) -> Pl
     """Return a batch before its first control period; `scenes`: by the numbers of the runs."""
     if any(scene.bodies for scene in scenes.values()):
         raise ParameterError("Batch", "scenes", "must have no bodies: run them alone", "some")
+    if any(scene.drive for scene in scenes.values()):
+        raise ParameterError("Batch", "scenes", "must have no drive: run them alone", "some")
     batch = make_batch([systems[run] for run in scenes])
     trajectories = {run: require_one(scene.trajectories()) for run, scene in scenes.items()}
     return Play(trajectories, tuple(scenes), batch, begin(batch))

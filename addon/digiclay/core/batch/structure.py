@@ -43,8 +43,8 @@ def describe_structure(scene: Scene, system: System | None = None) -> Any:
     Other steppers have no axis of runs: all cells must be alike. Raises ParameterError if parts of
     the scene are not compatible.
     """
-    if len(scene.fingers) != 1 or scene.bodies:
-        return "one by one", len(scene.fingers), len(scene.bodies)
+    if len(scene.fingers) != 1 or scene.bodies or scene.drive:
+        return "one by one", len(scene.fingers), len(scene.bodies), scene.drive is None
     physics = tuple(scene.section(name) for name in PHYSICS)
     fingertips = tuple(finger.fingertip for finger in scene.fingers)
     sensors = scene.sensors and replace(scene.sensors, seed=0)

@@ -141,6 +141,8 @@ class Selection:
         moving |= active.block[rows.force] > 0.0
         # Locked pins do not move.
         moving |= (active.mode > HOLD) & (active.mode != LOCKED)
+        if state.addressing is not None:
+            moving |= np.isin(active.cells, state.addressing.waiting)
         return moving
 
     def take(self, state: State, chosen: ActiveSet) -> ActiveSet:

@@ -36,6 +36,7 @@ def begin(system: System) -> State:
     """Return the state before a session."""
     rest = system.cell.actuator.rest_height
     state = make_initial_state(system.rows, system.grid.count, rest, system.controller.begin())
+    state = state._replace(addressing=system.drive.begin())
     return state._replace(deflection=system.hands[0].swing.rest()) if system.hands else state
 
 
@@ -79,15 +80,16 @@ def simulate_period(
     memory, disc = controller.locate(state.memory, touched)
     finger = lower_reach(system.hands, state, finger)
     state = system.selection.update(state, finger, disc)
-    active = state.active
+    active, addressing = state.active, state.addressing
     if active.cells.size:
         measured = sensors.read(active.all, state.period)
         memory, orders = controller.command(memory, measured)
+        addressing, orders = system.drive.serve(addressing, state.period, measured, orders)
         active.follow(orders)
     deflection = move(system, state, finger)
     if active.cells.size:
         sensors.note(active.all, state.period + 1)
-    return state.end_period(memory, deflection)
+    return state.end_period(memory, deflection, addressing)
 
 
 def move(system: System, state: State, finger: FingerPeriod | None) -> Deflection | None:
@@ -113,7 +115,7 @@ def repeat_period(
         state = state._replace(active=system.selection.take(state, leader.active))
     if state.active.cells.size:
         state.active.queue_commands(leader.active.all.command)
-    return state.end_period(state.memory, move(system, state, finger))
+    return state.end_period(state.memory, move(system, state, finger), state.addressing)
 
 
 def find_divergence(

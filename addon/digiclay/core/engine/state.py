@@ -21,6 +21,7 @@ from ..model.control_interface import Commands, Measurement
 from ..model.layout import Discs
 
 if TYPE_CHECKING:
+    from ..model.matrix_drive import Addressing
     from ..model.yielding_hand import Deflection
 
 
@@ -209,8 +210,12 @@ class State(NamedTuple):
     """(n,): Shares below 1 by which pins are locked in part, 0 of all others; None: no pin is."""
     deflection: Deflection | None = None
     """Of the hands that hold the fingertips; None: the paths are prescribed."""
+    addressing: Addressing | None = None
+    """Of the drive; None: a valve per cell."""
 
-    def end_period(self, memory: Any, deflection: Deflection | None) -> State:
+    def end_period(
+        self, memory: Any, deflection: Deflection | None, addressing: Addressing | None
+    ) -> State:
         """Return the state one control period later, with the memory of the controller."""
         return State(
             self.period + 1,
@@ -222,6 +227,7 @@ class State(NamedTuple):
             memory,
             self.locks,
             deflection,
+            addressing,
         )
 
     def row(self, index: int) -> Floats:

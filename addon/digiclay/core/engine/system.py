@@ -11,7 +11,7 @@ import numpy as np
 from ..base.arrays import Floats
 from ..model.control_interface import Controller
 from ..model.fingertip import require_one
-from ..model.interfaces import Movement, Segment, Sensors, Stepper
+from ..model.interfaces import Drive, Movement, Segment, Sensors, Stepper
 from ..model.layout import Grid
 from ..model.physics import Cell
 from ..model.touch import FingerPeriod, trace_finger
@@ -28,6 +28,7 @@ class System:
     cell: Cell
     sensors: Sensors
     controller: Controller
+    drive: Drive
     stepper: Stepper
     plan: object
     """The stepper's constants of all periods."""

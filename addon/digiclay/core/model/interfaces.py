@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 from ..base.arrays import Floats
-from .control_interface import Measurement
+from .control_interface import Commands, Measurement
 from .delay import Queue
 
 #: Moves a block of cells by one control period, in place. It takes the underside of the fingertip
@@ -98,6 +98,18 @@ class Sensors(Protocol):
 
     def note(self, seen: Measurement, period: int) -> None:
         """Update `seen.sensed`, in place, at the end of a period."""
+
+
+class Drive(Protocol):
+    """Valves between a controller's commands and the cells; its state is an argument and a result."""
+
+    def begin(self) -> Any:
+        """Return the state before a session."""
+
+    def serve(
+        self, state: Any, period: int, seen: Measurement, orders: Commands
+    ) -> tuple[Any, Commands]:
+        """Return the state and the commands that act in a control period."""
 
 
 class Stepper(Protocol):

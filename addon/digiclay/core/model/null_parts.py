@@ -78,6 +78,19 @@ class PerfectSensors(Alike, Sensors):
         """Nothing to remember."""
 
 
+class DirectDrive(Alike):
+    """A valve per cell: every command acts."""
+
+    def begin(self) -> None:
+        """Nothing to remember."""
+
+    def serve(
+        self, state: None, period: int, seen: Measurement, orders: Commands
+    ) -> tuple[None, Commands]:
+        """Return the commands as they are."""
+        return None, orders
+
+
 class Uncontrolled:
     """No control method: every valve stays shut."""
 

@@ -21,10 +21,16 @@ from ..engine.system import System, make_segments
 from ..model.control_interface import Controller
 from ..model.delay import Queue, split_delay
 from ..model.fingertip import Fingertip, require_one
-from ..model.interfaces import Flow, Segment, Sensors, Stepper
+from ..model.interfaces import Drive, Flow, Segment, Sensors, Stepper
 from ..model.laws import import_part, select_law
 from ..model.layout import Grid, make_grid
-from ..model.null_parts import InstantValve, PerfectSensors, Uncontrolled, Unrelaxed
+from ..model.null_parts import (
+    DirectDrive,
+    InstantValve,
+    PerfectSensors,
+    Uncontrolled,
+    Unrelaxed,
+)
 from ..model.physics import Cell, find_speeds
 from ..model.touch import Touch
 from ..model.valve import Orifice
@@ -90,6 +96,7 @@ def assemble(scene: Scene) -> System:
         cell=cell,
         sensors=sensors,
         controller=controller,
+        drive=_make_drive(scene),
         stepper=motion.stepper,
         period=period,
         plan=motion.plan,
@@ -298,6 +305,16 @@ def _make_sensors(scene: Scene, cell: Cell, line: Queue) -> Sensors:
     if sensing.delay:
         sensors = Delayed(sensors, sensing.delay, scene.actuator.rest_height)
     return sensors
+
+
+def _make_drive(scene: Scene) -> Drive:
+    """Return the valves between the controller and the cells."""
+    if scene.drive is None:
+        return DirectDrive()
+    from ..model.matrix_drive import make_addressing
+
+    floor = scene.sensors.force_floor if scene.sensors else 0.0
+    return make_addressing(scene.drive, scene.layout, scene.simulation.control_period, floor)
 
 
 def _make_controller(scene: Scene, bed: Grid, cells: tuple[Cell, ...]) -> Controller:

@@ -25,6 +25,7 @@ if TYPE_CHECKING:  # a part that is left out is never imported, see `import_part
     from ..model.fingertip import Fingertip
     from ..model.lag import ValveLag
     from ..model.layout import Layout
+    from ..model.matrix_drive import MatrixDrive
     from ..model.relaxation import Relaxation
     from ..model.sensors import Sensing
     from ..model.valve import Fluid, Valve
@@ -43,6 +44,7 @@ PARTS: dict[str, tuple[str, str]] = {
     "conduit": ("model.conduit", "Conduit"),
     "valve_lag": ("model.lag", "ValveLag"),
     "delay": ("model.delay", "Delay"),
+    "drive": ("model.matrix_drive", "MatrixDrive"),
     "fingertip": ("model.fingertip", "Fingertip"),
     "relaxation": ("model.relaxation", "Relaxation"),
     "hand": ("model.yielding_hand", "Hand"),
@@ -62,6 +64,7 @@ SECTIONS = (
     "conduit",
     "valve_lag",
     "delay",
+    "drive",
     "fingertip",
     "contact",
     "relaxation",
@@ -79,9 +82,9 @@ OPTIONAL = tuple(name for name in SECTIONS if name not in REQUIRED)
 #: Sections of a finger.
 FINGER_SECTIONS = ("fingertip", "contact", "relaxation", "hand", "trajectory")
 #: Optional parts that a scene has only if it names them.
-UNASKED = ("hand", "sensors", "shape")
+UNASKED = ("drive", "hand", "sensors", "shape")
 #: Parts of which a file that is written says nothing if they are absent: older versions read it.
-LATER = ("hand",)
+LATER = ("drive", "hand")
 #: Parts that are omitted together with another one.
 NEEDS = {
     "contact": "fingertip",
@@ -221,6 +224,7 @@ class Scene(Described):
     sensors: Sensing | None = None
     shape: Shape | None = None
     bodies: tuple[Presser, ...] = ()
+    drive: MatrixDrive | None = None
 
     def __post_init__(self) -> None:
         self._refuse_wrong_parts()
@@ -246,6 +250,9 @@ class Scene(Described):
         if self.delay and self.delay.dead_time > longest:
             rule = f"must be at most {MOST_STEPS} control periods, {longest:g} s"
             raise ParameterError("delay", "dead_time", rule, f"{self.delay.dead_time:g} s")
+        if self.drive:
+            dead_time = self.delay.dead_time if self.delay else 0.0
+            self.drive.check_device(plan, self.simulation.control_period, dead_time)
 
     def _refuse_beside_bodies(self) -> None:
         """Refuse what cannot be where bodies press."""

@@ -21,6 +21,7 @@ from ..engine.state import State
 from ..engine.system import System
 from ..model.control_interface import Commands, Measurement
 from ..model.layout import Disc, Grid
+from ..model.null_parts import DirectDrive
 from ..model.trajectory import Path, interpolate_poses, sample_poses
 from ..scene.assembly import assemble
 from ..scene.schema import MOST_CUT, MOST_STEPS, Scene, Simulation
@@ -164,7 +165,8 @@ def estimate_errors(
 ) -> Errors | None:
     """Estimate the errors of a run with every command; None when `stopped`; see `run_scene.run`."""
     system = assemble(make_reference(scene))
-    system = replace(system, controller=Replay(system.grid, history["command"]))
+    replay = Replay(system.grid, history["command"])
+    system = replace(system, controller=replay, drive=DirectDrive())
     done, largest = len(history["time"]) - 1, np.zeros(3)
     most = max(1, TOGETHER // system.grid.count)
     reference = np.empty((2, most, system.grid.count))

@@ -129,6 +129,8 @@ def dump(system: System, state: State) -> bytes:
         "hands": state.deflection and np.array(state.deflection),
     }
     given = {name: flatten(array, arrays) for name, array in optional.items() if array is not None}
+    if state.addressing is not None:
+        given["addressing"] = flatten(state.addressing, arrays)
     values = state.rows, state.modes, state.aged, active.cells, active.block, active.mode
     body = [
         np.ascontiguousarray(array, kind)
@@ -198,10 +200,15 @@ def load(system: System, data: bytes) -> State:
     memory = rebuild(system.controller.begin(), header["memory"], stored.memory)
     bed = arrays["rows"], arrays["modes"], arrays["aged"]
     locks = stored.arrays.get("locks")
-    deflection = begin(system).deflection
+    begun = begin(system)
+    deflection, addressing = begun.deflection, begun.addressing
+    if addressing is not None and "addressing" in header:
+        addressing = rebuild(addressing, header["addressing"], stored.memory)
+        _check_same("lines of the drive", addressing.last.size, system.drive.begin().last.size)
     if deflection and "hands" in stored.arrays:
         deflection = type(deflection)(*stored.arrays["hands"])
-    return State(header["period"], *bed, header["peak"], active, memory, locks, deflection)
+    peak = header["peak"]
+    return State(header["period"], *bed, peak, active, memory, locks, deflection, addressing)
 
 
 def count_fingers(data: bytes) -> int:
@@ -413,7 +420,12 @@ def change_fingers(
         for row, before in zip(fresh.deflection, state.deflection, strict=True):
             _take_fingers(row, before, former.fingers, origins)
     taken = system.selection.take(bed, chosen)
-    return bed._replace(active=taken, locks=state.locks, deflection=fresh.deflection)
+    return bed._replace(
+        active=taken,
+        locks=state.locks,
+        deflection=fresh.deflection,
+        addressing=state.addressing,
+    )
 
 
 def _take_fingers(into: Floats, of: Floats, former: int, origins: Sequence[int | None]) -> None:

@@ -178,6 +178,8 @@ def _find_reason(scene: Scene) -> str:
         return "they have several fingers"
     if scene.bodies:
         return "they have bodies"
+    if scene.drive:
+        return "they have a drive"
     return (
         ""
         if find_method(scene.method).batched

@@ -1,0 +1,209 @@
+"""Matrix drive: valves for the lines and columns of a bed, in place of one per cell.
+
+A cell opens if its line is addressed, and then as its column commands. The lines are divided into
+k interleaved sets with column valves of their own: line i belongs to set i mod k. A bed of n lines
+of m cells has n + k m valves, and in a slot a set addresses one line, or several that share the
+column commands. The valves of all other cells stay shut.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from ..base.arrays import TIE, Cells, Flags, Floats, settle
+from ..base.errors import ParameterError
+from ..base.quantity import Parameters, quantity
+from .control_interface import Commands, Measurement
+from .layout import Layout
+
+#: Urgency (n,) of lines, by the effort of each and whether it is addressed. Of equally urgent lines
+#: the one that has waited longest is addressed.
+Urgency = Callable[[Floats, Flags], Floats]
+POLICIES: dict[str, Urgency] = {
+    "pressed": lambda effort, served: effort,
+    "largest": lambda effort, served: effort,
+    "needed": lambda effort, served: np.sign(effort),
+    "one_time": lambda effort, served: np.sign(effort) * (1.0 + served),
+    "round_robin": lambda effort, served: 0.0 * effort,
+}
+#: Weight of a cell under the fingertip in the effort of its line, with the policy *pressed*.
+PRESSED = 5.0
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class MatrixDrive(Parameters):
+    """Valves for lines and columns of cells."""
+
+    kind: str = quantity("matrix", "how valves belong to cells", choices=("matrix",))
+    sections: int = quantity(
+        4,
+        "interleaved sets of column valves; one per line: a valve per cell",
+        symbol="k",
+        at_least=1,
+    )
+    axis: str = quantity(
+        "rows", "lines that are addressed: rows or columns of cells", choices=("rows", "columns")
+    )
+    slot: float = quantity(
+        0.0,
+        "time for which lines stay addressed, whole control periods; 0: one of them",
+        unit="s",
+        symbol="s",
+        at_least=0.0,
+    )
+    policy: str = quantity(
+        "pressed",
+        "lines addressed first: those with the largest sum of commands, where cells under the "
+        "fingertip count five times (pressed) or once (largest); those that need it, in turn "
+        "(needed) or each until it has arrived (one_time); all in turn (round_robin)",
+        choices=tuple(POLICIES),
+    )
+    share: bool = quantity(
+        False,
+        "whether lines of a set are addressed together, with the commands they have in common",
+    )
+
+    def count_lines(self, layout: Layout) -> int:
+        """Return the number n of lines of a bed."""
+        return layout.rows if self.axis == "rows" else layout.columns
+
+    def count_valves(self, layout: Layout) -> int:
+        """Return the number of valves, n + k m."""
+        lines = self.count_lines(layout)
+        return lines + self.sections * (layout.rows * layout.columns // lines)
+
+    def count_periods(self, period: float) -> int:
+        """Return the control periods, of `period` s, of a slot."""
+        return max(1, round(self.slot / period))
+
+    def check_device(self, layout: Layout, period: float, dead_time: float) -> None:
+        """Refuse more sections than lines, and slots that do not fit the control period or dead time, s."""
+        lines = self.count_lines(layout)
+        if self.sections > lines:
+            rule = f"must be at most the number of layout.{self.axis}, {lines}"
+            raise ParameterError("drive", "sections", rule, str(self.sections))
+        slot = self.slot or period
+        whole = self.count_periods(period) * period
+        if abs(slot - whole) > TIE * whole:
+            rule = f"must be a whole number of control periods, {period:g} s, or 0"
+            raise ParameterError("drive", "slot", rule, f"{self.slot:g} s")
+        if slot < dead_time:
+            rule = f"must be at least delay.dead_time, {dead_time:g} s"
+            raise ParameterError("drive", "slot", rule, f"{slot:g} s")
+
+
+class Addressing(NamedTuple):
+    """State of the drive."""
+
+    served: Flags
+    last: Cells
+    """(n,): Whether a line is addressed, and the control period in which it last was; -1: never."""
+    waiting: Cells
+    """(w,): Numbers of cells whose commands did not act, or only in part, in the last period."""
+
+
+@dataclass(frozen=True, eq=False)
+class MatrixAddressing:
+    """Drive of a bed by lines and columns."""
+
+    parameters: MatrixDrive
+    layout: Layout
+    slot: int
+    """Control periods."""
+    floor: float
+    """Largest force of a cell that is not touched, N."""
+
+    @property
+    def lines(self) -> int:
+        """Number of lines."""
+        return self.parameters.count_lines(self.layout)
+
+    def begin(self) -> Addressing:
+        """Return the state before a session: each set addresses its first line."""
+        lines = self.lines
+        return Addressing(
+            np.arange(lines) < self.parameters.sections,
+            np.full(lines, -1, np.intp),
+            np.empty(0, np.intp),
+        )
+
+    def locate(self, cells: Cells) -> tuple[Cells, Cells]:
+        """Return the lines of cells (m,), and their places along them."""
+        row, column = np.divmod(cells, self.layout.columns)
+        return (row, column) if self.parameters.axis == "rows" else (column, row)
+
+    def serve(
+        self, state: Addressing, period: int, seen: Measurement, orders: Commands
+    ) -> tuple[Addressing, Commands]:
+        """Return the commands that act in a control period: 0 for cells whose line is not addressed."""
+        line, place = self.locate(seen.cells)
+        table = np.zeros((self.lines, seen.cells.size and int(place.max()) + 1))
+        table[line, place] = orders.command
+        served = state.served
+        if period % self.slot == 0:
+            served = self.choose(state, period, self.measure_effort(line, seen, orders), table)
+        command = np.where(served[line], orders.command, 0.0)
+        if self.parameters.share:
+            common = self.find_common(table, served)
+            command = np.where(served[line], common[line % self.parameters.sections, place], 0.0)
+        waiting = seen.cells[command != orders.command]
+        last = np.where(served, period, state.last)
+        return Addressing(served, last, waiting), orders._replace(command=command)
+
+    def measure_effort(self, line: Cells, seen: Measurement, orders: Commands) -> Floats:
+        """Return the efforts of all lines, (n,): the sums of their commands' amounts."""
+        effort = np.abs(orders.command)
+        if self.parameters.policy == "pressed":
+            effort[seen.force > self.floor] *= PRESSED
+        total: Floats = settle(np.bincount(line, effort, self.lines))
+        return total
+
+    def choose(self, state: Addressing, period: int, effort: Floats, table: Floats) -> Flags:
+        """Return which lines are addressed in the slot that begins, (n,)."""
+        sections = self.parameters.sections
+        urgency = POLICIES[self.parameters.policy](effort, state.served)
+        order = np.lexsort((-np.arange(self.lines), period - state.last, urgency))[::-1]
+        _, first = np.unique(order % sections, return_index=True)
+        served = np.zeros(self.lines, np.bool_)
+        served[order[first]] = True
+        if self.parameters.share:
+            for leader in order[first]:
+                served[self.join(leader, order[order % sections == leader % sections], table)] = (
+                    True
+                )
+        return served
+
+    def join(self, leader: int, lines: Cells, table: Floats) -> list[int]:
+        """Return the lines of a set that are addressed with its leader, as long as all get more done."""
+        joined, common = [leader], table[leader]
+        for line in lines:
+            closer = np.clip(0.0, *np.sort((common, table[line]), axis=0))
+            more = np.abs(closer).sum() * (len(joined) + 1)
+            if line != leader and more > np.abs(common).sum() * len(joined) + TIE:
+                joined, common = [*joined, line], closer
+        return joined
+
+    def find_common(self, table: Floats, served: Flags) -> Floats:
+        """Return the column commands of each set, (k, m): what all its addressed lines command at least."""
+        sections = self.parameters.sections
+        sets = -(-self.lines // sections)
+        padded = np.zeros((sets * sections, table.shape[1]))
+        padded[: self.lines] = table
+        addressed = np.zeros(sets * sections, np.bool_)
+        addressed[: self.lines] = served
+        by_set = padded.reshape(sets, sections, -1)
+        where = addressed.reshape(sets, sections, 1)
+        low = by_set.min(axis=0, initial=np.inf, where=where)
+        high = by_set.max(axis=0, initial=-np.inf, where=where)
+        return np.clip(0.0, low, high)
+
+
+def make_addressing(
+    drive: MatrixDrive, layout: Layout, period: float, floor: float
+) -> MatrixAddressing:
+    """Put the drive of a bed together; control period, s; noise floor of a cell's force, N."""
+    return MatrixAddressing(drive, layout, drive.count_periods(period), max(floor, TIE))

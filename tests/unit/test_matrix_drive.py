@@ -1,0 +1,170 @@
+"""A matrix drive: which lines it addresses, what their cells command, and what it leaves as it is."""
+
+import numpy as np
+import pytest
+from digiclay.core.base.errors import ParameterError
+from digiclay.core.control.methods import METHODS
+from digiclay.core.engine.simulation import begin, periods
+from digiclay.core.model.control_interface import Commands, Measurement
+from digiclay.core.model.layout import Layout
+from digiclay.core.model.matrix_drive import POLICIES, MatrixDrive, make_addressing
+from digiclay.core.scene.assembly import assemble
+from digiclay.core.scene.toml_table import format_scene, resolve
+from digiclay.core.session.run_scene import run
+
+from tests.assemble import over_middle, refused_in_a_line, table
+
+BED = {"layout": {"rows": 11, "columns": 13}}
+WAY = {"waypoints": over_middle((0, 42e-3), (0.1, 37e-3), (0.25, 37e-3), (0.5, 46e-3))}
+
+
+def scene(drive=None, **tables):
+    drives = {} if drive is None else {"drive": drive}
+    return resolve({**BED, "trajectory": WAY, **drives, **tables})
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize(
+    "drive", [{"sections": 11, "slot": 0.02}, {"sections": 13, "axis": "columns"}]
+)
+def test_as_many_sections_as_lines_are_a_valve_per_cell_bit_for_bit(method, drive):
+    control = {"control": {"method": method}}
+    driven, direct = (run(scene(given, **control)).history for given in (drive, None))
+    assert driven.keys() == direct.keys()
+    for name, values in direct.items():
+        assert driven[name].tobytes() == values.tobytes(), name
+
+
+def serve(drive, command, force=(), state=None, period=0):
+    """Return state and acting commands of a bed, from a table of commands."""
+    command = np.array(command, float)
+    layout = Layout(*command.shape)
+    matrix = make_addressing(MatrixDrive(**drive), layout, 5e-3, 0.0)
+    size, none = command.size, np.zeros(command.size)
+    pressing = none if not len(force) else np.array(force, float).ravel()
+    seen = Measurement(
+        np.zeros((6, size)), none, pressing, none, none, np.zeros((0, size)), np.arange(size)
+    )
+    orders = Commands(none, none, command.ravel())
+    state, acting = matrix.serve(state or matrix.begin(), period, seen, orders)
+    return state, acting.command.reshape(command.shape)
+
+
+#: Lines, as rows of commands, that are addressed first; two sets of two lines.
+ROWS = [[0.0, 0.1], [0.3, 0.0], [0.2, 0.2], [-0.2, 0.2]]
+
+
+@table(
+    "drive, force, lines",
+    {
+        "the largest sums of commands of each set": ({"policy": "largest"}, (), [[2, 3]]),
+        "cells under the fingertip count five times": (
+            {"policy": "pressed"},
+            [[0, 1], [1, 0], [0, 0], [0, 0]],
+            [[0, 1]],
+        ),
+        "who needs it, in turn": ({"policy": "needed"}, (), [[0, 1], [2, 3], [0, 1]]),
+        "all in turn": ({"policy": "round_robin"}, (), [[0, 1], [2, 3], [0, 1]]),
+        "each until it has arrived": ({"policy": "one_time"}, (), [[0, 1], [0, 1]]),
+        "they stay for a slot": ({"policy": "needed", "slot": 10e-3}, (), [[0, 1], [0, 1], [2, 3]]),
+        "of one set": ({"policy": "largest", "sections": 1}, (), [[2]]),
+    },
+)
+def test_lines_are_addressed_by_policy(drive, force, lines):
+    state = None
+    for period, wanted in enumerate(lines):
+        state, acting = serve({"sections": 2, **drive}, ROWS, force, state, period)
+        assert state.served.nonzero()[0].tolist() == wanted
+        np.testing.assert_array_equal(acting[wanted], np.array(ROWS)[wanted])
+        assert not np.delete(acting, wanted, axis=0).any()
+        assert state.last[wanted].tolist() == [period] * len(wanted)
+        # Who waits has a command, and it does not act.
+        assert state.waiting.tolist() == np.flatnonzero(np.ravel(ROWS) != acting.ravel()).tolist()
+
+
+@table(
+    "rows, acting",
+    {
+        "alike: both act in full": ([[1, 0, -0.5]] * 2, [[1, 0, -0.5]] * 2),
+        "the nearest to 0 of each column": (
+            [[1, 0.5, -0.5], [0.6, 1, -1]],
+            [[0.6, 0.5, -0.5]] * 2,
+        ),
+        "no column moves a pin that rests": ([[1, 1, 1], [1, 1, 0]], [[1, 1, 0]] * 2),
+        "together they would get less done": ([[1, 1, 0], [0, 0, 0.5]], [[1, 1, 0], [0, 0, 0]]),
+        "no column moves a pin away from its height": (
+            [[1, 1, 0.2], [1, 1, -0.2]],
+            [[1, 1, 0]] * 2,
+        ),
+    },
+)
+def test_lines_that_share_command_what_they_have_in_common(rows, acting):
+    _, found = serve({"sections": 1, "share": True}, rows)
+    np.testing.assert_array_equal(found, acting)
+    # Columns are lines as well as rows are.
+    _, found = serve({"sections": 1, "share": True, "axis": "columns"}, np.transpose(rows))
+    np.testing.assert_array_equal(found.T, acting)
+
+
+@pytest.mark.parametrize("policy", POLICIES)
+def test_no_line_waits_for_ever(policy):
+    # A pin that is served arrives after some slots; the others wait until then.
+    command, state = np.full((6, 3), 1.0), None
+    for period in range(40):
+        state, acting = serve({"sections": 2, "policy": policy}, command, (), state, period)
+        command = np.maximum(command - 0.25 * acting, 0.0) * (command > 0.1)
+    assert not command.any()
+
+
+@table(
+    "drive, words",
+    {
+        "no section": ({"sections": 0}, "sections must be at least 1"),
+        "more sections than rows": (
+            {"sections": 12},
+            "must be at most the number of layout.rows, 11",
+        ),
+        "more than columns": ({"sections": 14, "axis": "columns"}, "layout.columns, 13"),
+        "half a section": ({"sections": 2.5}, "sections must be a whole number"),
+        "a slot below the control period": (
+            {"slot": 2e-3},
+            "slot must be a whole number of control",
+        ),
+        "a slot of one and a half": ({"slot": 7.5e-3}, "slot must be a whole number of control"),
+        "a negative slot": ({"slot": -5e-3}, "slot must be at least 0"),
+        "a slot of nothing known": ({"slot": float("nan")}, "slot must be a finite number"),
+        "a policy misspelt": ({"policy": "presed"}, "policy must be one of pressed, largest"),
+        "another kind": ({"kind": "motor"}, "kind must be one of matrix"),
+        "lines across": ({"axis": "diagonal"}, "axis must be one of rows, columns"),
+        "an unknown key": ({"section": 4}, "section"),
+        "a share of lines": ({"share": 0.5}, "share must be true or false"),
+        "no table": ("matrix", "drive must be a section"),
+    },
+)
+def test_a_drive_that_cannot_be_is_refused(drive, words):
+    with refused_in_a_line(ParameterError, words) as caught:
+        scene(drive)
+    assert "drive" in str(caught.value)
+
+
+def test_a_slot_is_at_least_the_dead_time():
+    with refused_in_a_line(ParameterError, "drive.slot must be at least delay.dead_time, 0.006 s"):
+        scene({}, delay={"dead_time": 6e-3})
+    assert scene({"slot": 10e-3}, delay={"dead_time": 6e-3}).drive.slot == 10e-3
+
+
+def test_a_file_without_a_drive_says_nothing_of_one():
+    assert "drive" not in format_scene(scene())
+    written = format_scene(scene({"sections": 3}))
+    assert "[drive]" in written
+    assert scene({"sections": 3}).drive.count_valves(scene().layout) == 11 + 3 * 13
+
+
+def test_pins_that_wait_for_their_lines_arrive():
+    # One set: while the finger presses and leaves, most lines wait, also after sets of active cells
+    # end.
+    method = {"control": {"method": "elastic"}, "simulation": {"duration": 6.0}}
+    system = assemble(made := scene({"sections": 1}, **method))
+    *_, state = periods(system, made.trajectories(), begin(system), made.periods)
+    assert np.abs(state.row(0) - 40e-3).max() <= made.control.dead_band
+    assert not state.addressing.waiting.size
