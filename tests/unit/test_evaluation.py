@@ -196,6 +196,14 @@ TRIGGERS = ("control.blister_trigger=0.01,0.03", "control.spring_trigger=0.02,0.
             [[3]],
             None,
         ),
+        "values at which a pin would swing": (
+            ("control.damping=0.1,3,5,10,20",),
+            "control.method=force_display",
+            False,
+            [[1, 2, 3, 4]],
+            [[0]],
+            None,
+        ),
     },
 )
 def test_points_of_one_structure_run_together_and_others_alone(

@@ -145,11 +145,12 @@ def make_bundles(points: Sequence[Point]) -> Bundles:
             why[reason] += 1
             continue
         try:
+            structure = describe_structure(point.scene)
             judge = describe_structure(make_reference(point.scene)) if point.errors else None
         except ParameterError:  # reported when the point runs
             alone.append(point)
         else:
-            alike.setdefault((describe_structure(point.scene), judge), []).append(point)
+            alike.setdefault((structure, judge), []).append(point)
     batches: list[tuple[Point, ...]] = []
     for group in alike.values():
         most = _limit_runs(group[0].scene)
