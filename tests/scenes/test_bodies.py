@@ -231,6 +231,10 @@ def test_a_body_and_a_finger_are_felt_apart():
     )
     for name in ("max_cell_force", "max_total_force", "contact_share"):
         assert both.metrics[name] == pytest.approx(finger_alone.metrics[name], rel=1e-5)
+    (felt,) = both.metrics["bodies"]
+    said = f"body 1 at most {felt['max_total_force']:.2g} N on {felt['pressed_pins']} pins"
+    assert said in both.summary()
+    assert both.describe()["bodies"] == said
 
 
 def test_a_fingertip_on_a_pin_that_a_body_presses_is_capped_too():
@@ -381,7 +385,8 @@ def stl(folder, triangles):
         (change(mesh="abc"), "body #1.mesh must be a mesh packed as text"),
         (change(mesh="", file="none.stl"), "body #1.file must be the file of a mesh"),
         (change(mesh="", file="note.txt"), "body #1.file must be the file of a mesh"),
-        (change(mesh="", file="empty.stl"), "body #1.file must"),
+        (change(mesh="", file="empty.stl"), "cut off (got empty.stl: 0 of at least 84 bytes)"),
+        (change(mesh="", file="lines.obj"), "body #1.file must be triangles"),
         (change(mesh="", file="many.stl"), "body #1.file must have at most 1,000,000 triangles"),
         (change(trajectory={}), "body #1.trajectory must be a path with waypoints"),
         (
@@ -411,6 +416,7 @@ def test_what_cannot_press_is_refused_in_one_line(given, words, tmp_path, monkey
     monkeypatch.chdir(tmp_path)
     (tmp_path / "note.txt").write_text("no mesh", encoding="utf-8")
     (tmp_path / "empty.stl").write_bytes(b"")
+    (tmp_path / "lines.obj").write_text("v 0 0 0\nv 1 1 1\nl 1 2\n", encoding="utf-8")
     if "many.stl" in str(given["body"][:1]):
         stl(tmp_path, 2_000_000)
     with pytest.raises(DigiclayError) as raised:

@@ -67,6 +67,7 @@ def test_the_closed_form_is_the_integral_of_the_law_and_no_multiple_of_it():
         (lambda scene: digiclay.plate_force(scene, 7e-3), "at most 0.0064 m .got 0.007 m"),
         (lambda scene: digiclay.plate_force(scene, np.nan), "must be finite"),
         (lambda scene: digiclay.plate_force(digiclay.scene("pinch_crease"), 1e-3), "must be one"),
+        (lambda scene: digiclay.plate_force("tap", 1e-3), "scene must be a Scene"),
         (
             lambda scene: digiclay.plate_force(
                 digiclay.scene(scene, {"fingertip": "absent"}), 1e-3

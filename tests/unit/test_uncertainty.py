@@ -142,8 +142,8 @@ SOME = [[1e-2, 2e-3], [2e-3, 1e-2]]
 @table(
     "changed, said",
     {
-        "no key": ({"keys": []}, "uncertainty.keys must be"),
-        "keys that are no list": ({"keys": 3}, "uncertainty.keys must be"),
+        "no key": ({"keys": []}, "uncertainty.keys must be a list of at least 1 text (got [])"),
+        "keys that are no list": ({"keys": 3}, "uncertainty.keys must be a list of at least"),
         "keys that are no texts": ({"keys": [1, 2]}, "uncertainty.keys must be 2 texts"),
         "a key twice": ({"keys": ["contact.stiffness"] * 2}, "must not name a parameter twice"),
         "a misspelt key": ({"keys": ["contact.stifness", "contact.exponent"]}, "contact.stifness"),

@@ -82,10 +82,12 @@ def _read_text_stl(text: bytes, name: str) -> Floats:
 
 def _read_binary_stl(data: bytes, count: int, name: str) -> Floats:
     """Return the corners (3 f, 3) of a binary STL whose head names so many triangles."""
-    whole, rest = divmod(max(0, len(data) - HEAD), TRIANGLE.itemsize)
+    if len(data) < HEAD:
+        raise make_refusal(WHOLE, name, f"{len(data)} of at least {HEAD} bytes")
+    whole, rest = divmod(len(data) - HEAD, TRIANGLE.itemsize)
     # Some programs leave the count at its largest.
     counted = rest or count < 2**32 - 1
-    if len(data) < HEAD or (whole < count and counted):
+    if whole < count and counted:
         if count > MOST_TRIANGLES:
             raise ValueError(f"it begins with {data[:8]!r}")
         raise make_refusal(WHOLE, name, f"{whole:,} of its {count:,} triangles")

@@ -12,6 +12,7 @@ from ..model.contact import ExponentialLaw
 from ..model.fingertip import LEVEL, Fingertip, compute_forms, compute_underside
 from ..model.layout import Layout, make_grid
 from ..scene.schema import Scene
+from .probes import require_scene
 
 #: Deepest indentation of the closed form, as a share of the height of the fingertip: from there on the
 #: underside is not that of the ellipsoid, see `fingertip.JOIN`.
@@ -57,10 +58,10 @@ def plate_force(scene: Scene, indentation: Floats | float) -> Floats:
     Raises
     ------
     DigiclayError
-        Without a fingertip or with several; for an indentation that is not finite, or is deeper than 0.8
-        of the semi-axis ``fingertip.height``.
+        When the scene is none, without a fingertip or with several; for an indentation that is not
+        finite, or is deeper than 0.8 of the semi-axis ``fingertip.height``.
     """
-    tip, law = scene.section("fingertip"), scene.section("contact")
+    tip, law = require_scene(scene).section("fingertip"), scene.section("contact")
     if tip is None or law is None:
         raise ParameterError("fingertip", "", "must be given to press a plate", "absent")
     depth = np.asarray(indentation, np.float64)

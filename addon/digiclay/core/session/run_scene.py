@@ -134,6 +134,7 @@ class Result(Described):
             "time": describe_time(self.metrics)
             + (", stopped before its end" if self.incomplete else ""),
             "force": self._describe_force() or reached,
+            **({"bodies": bodies} if (bodies := self._describe_bodies()) else {}),
             "errors": describe_errors(self.metrics),
             **({"caution": cautions} if cautions else {}),
             "history": f"{rows} rows of {pins} pins: {', '.join(self.history)}" if rows else "none",
@@ -142,11 +143,11 @@ class Result(Described):
 
     def summary(self) -> str:
         """Return the session in one line."""
-        felt = f", {force}" if (force := self._describe_force()) else ""
+        felt = self._describe_force(), self._describe_bodies(), describe_errors(self.metrics)
         end = " (incomplete: stopped)" if self.incomplete else ""
         beyond = self.metrics.get("beyond_a_finger")
         warning = f"; {beyond}" if beyond else ""
-        return f"{describe_time(self.metrics)}{felt}, {describe_errors(self.metrics)}{end}{warning}"
+        return ", ".join(filter(None, (describe_time(self.metrics), *felt))) + end + warning
 
     def _describe_force(self) -> str:
         """Return the deviation of the force, and the losses, or ``""``."""
@@ -159,6 +160,14 @@ class Result(Described):
                 f" ({self.metrics['rfd_jnd_least']:.2g} to {self.metrics['rfd_jnd_most']:.2g} JND)"
             )
         return ", ".join(filter(None, (felt, describe_losses(self.metrics))))
+
+    def _describe_bodies(self) -> str:
+        """Return the largest force on each body, and the most pins that it pressed, or ``""``."""
+        bodies = enumerate(self.metrics.get("bodies", ()), 1)
+        return ", ".join(
+            f"body {number} at most {felt['max_total_force']:.2g} N on {felt['pressed_pins']} pins"
+            for number, felt in bodies
+        )
 
     def _name_worst(self) -> str:
         """Return which of several fingers has the largest RFD."""

@@ -127,13 +127,13 @@ def _read_file(body: Body, owner: str) -> Mesh:
         raise ParameterError(owner, "file", rule, body.file)
     try:
         read = mesh_reader.read(path)
+        if len(read.faces) > MOST_TRIANGLES:
+            rule = f"must have at most {MOST_TRIANGLES:,} triangles"
+            raise ParameterError(owner, "file", rule, f"{len(read.faces):,}")
+        turned = turn_up(read.vertices, read.up if body.up == AUTO else body.up)
+        return check_mesh(turned * find_length(body.unit, read.length), read.faces, owner)
     except OSError as error:
         rule = "must be a file that can be read"
         raise ParameterError(owner, "file", rule, f"{path}: {error.strerror}") from None
     except ParameterError as error:
         raise ParameterError(owner, "file", error.rule, error.value, error.hint) from None
-    if len(read.faces) > MOST_TRIANGLES:
-        rule = f"must have at most {MOST_TRIANGLES:,} triangles"
-        raise ParameterError(owner, "file", rule, f"{len(read.faces):,}")
-    turned = turn_up(read.vertices, read.up if body.up == AUTO else body.up)
-    return check_mesh(turned * find_length(body.unit, read.length), read.faces, owner)

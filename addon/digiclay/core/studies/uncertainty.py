@@ -90,8 +90,9 @@ def _read(table: Any, scene: Scene, again: Scene) -> Fitted:
     _require("", isinstance(table, dict), "must be a table, as digiclay fit writes it", table)
     refuse_unknown(UNCERTAINTY, table, ("keys", "logarithms", "covariance"))
     given = table.get("keys")
-    size = len(given) if isinstance(given, list) else 0
-    keys = _read_array(table, "keys", "U", "texts, at least 1", size)
+    _require("keys", given and isinstance(given, list), "must be a list of at least 1 text", given)
+    size = len(given)
+    keys = _read_array(table, "keys", "U", "texts", size)
     flags = _read_array(table, "logarithms", "b", "of true and false", size)
     covariance = _read_array(table, "covariance", "if", "numbers", size, size)
     center = np.empty(size)
