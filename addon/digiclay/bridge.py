@@ -5,6 +5,7 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .compat import Context, Mesh, Object, bpy
 from .core.base.arrays import Array, Cells, Floats
@@ -231,17 +232,21 @@ def _judge_scale(rows: tuple[tuple[float, ...], ...]) -> tuple[float, str]:
     return largest, ""
 
 
-def read_triangles(bed: Object, thing: Object, mesh: Mesh) -> tuple[Floats, Cells]:
-    """Return vertices (v, 3), m, in a bed's space, and triangles (t, 3) of an object's mesh."""
+def read_place(bed: Object, thing: Object) -> NDArray[np.float32]:
+    """Return the matrix (3, 4) from an object's own space to a bed's, m."""
     uniform(bed)
+    matrix = np.array(bed.matrix_world.inverted() @ thing.matrix_world)
+    return (matrix[:3] / SCALE).astype(np.float32)
+
+
+def read_triangles(mesh: Mesh) -> tuple[Floats, Cells]:
+    """Return vertices (v, 3), in the mesh's own space, and triangles (t, 3) of a mesh."""
     mesh.calc_loop_triangles()
     places = np.empty(3 * len(mesh.vertices), np.float32)
     faces = np.empty(3 * len(mesh.loop_triangles), np.int32)
     mesh.vertices.foreach_get("co", places)
     mesh.loop_triangles.foreach_get("vertices", faces)
-    matrix = np.array(bed.matrix_world.inverted() @ thing.matrix_world)
-    points = places.reshape(-1, 3) @ matrix[:3, :3].T + matrix[:3, 3]
-    return points / SCALE, faces.reshape(-1, 3).astype(np.intp)
+    return places.reshape(-1, 3).astype(np.float64), faces.reshape(-1, 3).astype(np.intp)
 
 
 def project(context: Context, bed: Object, points: Floats) -> Floats:

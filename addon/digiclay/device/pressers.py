@@ -1,15 +1,14 @@
-"""Mesh objects that press a bed: the undersides of their evaluated meshes over its pins."""
+"""Mesh objects that press a bed: their evaluated meshes and places."""
+
+from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .. import bridge
 from ..compat import Context, Object
 from ..core.base.errors import DigiclayError
-from ..core.engine.bodies import UNIT
-from ..core.model.layout import Grid
-from ..core.model.underside import Mesh, check_vertices, rasterize, refuse_flat
-from ..core.scene.schema import Scene
+from ..core.engine.bodies import Given, PlacedMesh
+from ..core.model.underside import Mesh, check_vertices, refuse_flat
 from ..core.shapes.body import MOST_TRIANGLES
 from ..roles import list_pressers
 from ..ui_text import localize
@@ -26,30 +25,35 @@ def find_fault(context: Context, presser: Object) -> str:
     return ""
 
 
-def read_undersides(
-    context: Context, bed: Object, scene: Scene, grid: Grid
-) -> NDArray[np.int32] | None:
-    """Return the undersides of all pressers over the pins, (b, n), in `UNIT`; None without any."""
-    rows = []
-    for presser, each in zip(list_pressers(bed), scene.bodies, strict=True):
-        samples, tip_radius = each.body.samples, each.body.tip_radius
-        cage = read_cage(context, bed, presser)
-        under = rasterize(*cage, grid, samples, tip_radius, scene.ceiling)
-        rows.append(np.rint(np.minimum(under, scene.ceiling) / UNIT).astype(np.int32))
-    return np.stack(rows) if rows else None
+def read_pressers(
+    context: Context, bed: Object, former: Sequence[Given] | None = None
+) -> tuple[PlacedMesh, ...] | None:
+    """Return the meshes of all pressers and their places; None without any; see `read_cage`."""
+    pressers = list_pressers(bed)
+    before = former if former and len(former) == len(pressers) else [None] * len(pressers)
+    pairs = zip(pressers, before, strict=True)
+    return tuple(read_cage(context, bed, presser, given) for presser, given in pairs) or None
 
 
-def read_cage(context: Context, bed: Object, presser: Object) -> Mesh:
-    """Return the mesh of a presser as it is now, in the space of a bed; DigiclayError if it cannot press.
+def read_cage(
+    context: Context, bed: Object, presser: Object, former: Given | None = None
+) -> PlacedMesh:
+    """Return mesh and place of a presser now; DigiclayError if it cannot press.
 
-    Modifiers that are off in the viewport have no part in it: Subdivision, say.
+    Modifiers that are off in the viewport have no part in it: Subdivision, say. `former`: as it was
+    read before; a mesh, or all of it, that is equal is the former one.
     """
     posed = presser.evaluated_get(context.evaluated_depsgraph_get())
-    cage = Mesh(*bridge.read_triangles(bed, posed, posed.data))
-    count = len(cage.triangles)
+    mesh, place = Mesh(*bridge.read_triangles(posed.data)), bridge.read_place(bed, posed)
+    if isinstance(former, PlacedMesh) and all(map(np.array_equal, mesh, former.mesh)):
+        if np.array_equal(place, former.matrix):
+            return former
+        mesh = former.mesh
+    count = len(mesh.triangles)
     if not 0 < count <= MOST_TRIANGLES:
         rule = "must have from 1 to {:,} triangles to press the pins (got {:,})"
         raise DigiclayError(presser.name + " " + localize(rule, MOST_TRIANGLES, count))
-    check_vertices(cage.vertices, presser.name)
-    refuse_flat(cage, presser.name)
+    cage = PlacedMesh(mesh, place)
+    vertices = check_vertices(cage.vertices, presser.name)
+    refuse_flat(mesh._replace(vertices=vertices), presser.name)
     return cage

@@ -8,9 +8,11 @@ import numpy as np
 from .. import bridge
 from ..compat import Depsgraph, Object
 from ..core.base.errors import DigiclayError, ParameterError
+from ..core.engine.bodies import PlacedMesh
 from ..core.engine.simulation import begin, periods
 from ..core.model.layout import make_grid
 from ..core.model.trajectory import make_level
+from ..core.model.underside import Mesh
 from ..core.scene.assembly import assemble
 from ..core.scene.forming import compute_display_time, find_display, find_touch_height
 from ..core.scene.schema import Scene
@@ -45,10 +47,10 @@ def read_relief(thing: Object, bed: Object, depsgraph: Depsgraph) -> ShapeMesh:
     if mesh is None:
         raise ParameterError("shape", "file", "must be an object with a surface", thing.name)
     try:
-        vertices, triangles = bridge.read_triangles(bed, thing, mesh)
+        placed = PlacedMesh(Mesh(*bridge.read_triangles(mesh)), bridge.read_place(bed, thing))
     finally:
         evaluated.to_mesh_clear()
-    return make_shape_mesh(thing.name, vertices, triangles, "z", 1.0)
+    return make_shape_mesh(thing.name, placed.vertices, placed.mesh.triangles, "z", 1.0)
 
 
 def show_relief(bed: Object, relief: Relief, shape: Shape) -> tuple[Fitted, float]:

@@ -13,6 +13,7 @@ from .. import bridge, preferences
 from ..compat import Context, Object
 from ..core.base.arrays import Floats
 from ..core.base.errors import DigiclayError, DivergenceError, MethodError
+from ..core.engine.bodies import find_given
 from ..device import pressers, repair, view
 from ..device.instant import find_ellipsoids
 from ..recorded import takes
@@ -78,8 +79,7 @@ def start(context: Context, bed: Object) -> list[Note]:
         base,
     )
     begun = stored.add_strokes(begun, lines)
-    aim = pressers.read_undersides(context, bed, begun.scene, begun.system.grid)
-    show(bed, replace(begun, settings=settings, aim=aim))
+    show(bed, replace(begun, settings=settings, aim=pressers.read_pressers(context, bed)))
     if lines:
         place_fingers(context, bed, begun)
     damaged = len(lines) - len(begun.strokes)
@@ -294,7 +294,11 @@ def _read_changes(context: Context, bed: Object, session: Running) -> tuple[str,
             if session.recording is not None and back.recording is None:
                 words = localize("The recording ended: undo or redo left what was recorded")
             session = back
-        aim = pressers.read_undersides(context, bed, session.scene, session.system.grid)
+        aim, given = pressers.read_pressers(context, bed, session.aim), find_given(session.system)
+        if aim and given:
+            given.measure(
+                aim
+            )  # not in the time of the periods, by which the clock limits their number
         session = replace(session, aim=aim)
     except DigiclayError as error:
         return str(error), session, words

@@ -22,9 +22,10 @@ from ..compat import (
 )
 from ..core.base.arrays import Cells, Floats, Modes
 from ..core.base.errors import DigiclayError
-from ..core.engine.bodies import Knot
+from ..core.engine.bodies import Knot, find_given
 from ..core.model.fingertip import Fingertip
 from ..core.model.layout import make_grid
+from ..core.scene.assembly import assemble
 from ..core.scene.schema import Scene as DeviceScene
 from ..core.session.take import Take, play
 from ..device import pressers, view
@@ -82,14 +83,14 @@ def playback_nodes(bake: Object, moments: int) -> NodeTree:
 
 #: Name of the modifier.
 MODIFIER = "Baked session"
-#: Longest time between two readings of the undersides of pressers, s.
+#: Longest time between two readings of pressers, s.
 INTERVAL = 15e-3
 #: Frame ranges longer than this are a slip of the hand: an hour at 60 frames a second.
 MOST_FRAMES = 216_000
 
 
 class AnimatedPath(NamedTuple):
-    """Poses of animated fingertips (t + 1, f, 7), and undersides of pressers."""
+    """Poses of animated fingertips (t + 1, f, 7), and pressers."""
 
     poses: Floats
     knots: tuple[Knot, ...]
@@ -230,9 +231,10 @@ def sample_path(
         rule = f"must have from 1 to {MOST_FRAMES} frames after its first"
         raise DigiclayError(f"The frames to bake {rule} (got {first} to {last}).")
     rate = read_rate(scene)
-    period, grid = device.simulation.control_period, make_grid(device.layout)
+    period, given = device.simulation.control_period, find_given(assemble(device))
     count = int(np.floor((last - first) / rate / period + 1e-6))
-    every, knots = max(1, int(INTERVAL / period)), []
+    knots: list[Knot] = []
+    every, aim = max(1, int(INTERVAL / period)), None
     frame_before = scene.frame_current, scene.frame_subframe
     tips = len(fingertips_of(bed))
     if not tips:
@@ -243,10 +245,10 @@ def sample_path(
             whole, part = divmod(first + row * period * rate, 1.0)
             scene.frame_set(int(whole), subframe=part)
             poses[row] = bridge.poses(bed)
-            if device.bodies and (row % every == 0 or row == count):
-                under = pressers.read_undersides(bpy.context, bed, device, grid)
-                assert under is not None  # there are bodies
-                knots.append((row, under))
+            if given and (row % every == 0 or row == count):
+                aim = pressers.read_pressers(bpy.context, bed, aim)
+                assert aim is not None  # there are bodies
+                knots.append((row, given.condense(aim, knots[0][1] if knots else aim)))
             yield row / count
     finally:
         scene.frame_set(frame_before[0], subframe=frame_before[1])

@@ -350,7 +350,7 @@ def change_scene(
         running = replace(
             running, stroke_start=running.stroke_start and change(running.stroke_start)
         )
-    names = ["clock", "paused", "blocking_reason", "stale", "under", "aim"]
+    names = ["clock", "paused", "blocking_reason", "stale", "reached", "aim"]
     names += ["begun_strokes", "finished_strokes", "last_place", "correction"]
     names += [] if lost else ["gestures", "undone", "strokes", "stroke_start"]
     if lost:

@@ -139,7 +139,7 @@ def test_subdivision_is_off_while_a_mesh_presses_and_on_in_renders(bed, ball, cl
     bpy.ops.digiclay.add_presser()
     assert (finer.show_viewport, finer.show_render) == (False, True)
     looked()
-    assert len(read_cage(bpy.context, bed, ball)[1]) == len(ball.data.polygons)
+    assert len(read_cage(bpy.context, bed, ball).mesh.triangles) == len(ball.data.polygons)
 
 
 def test_undo_copies_deletion_and_saving_leave_a_session_and_its_pressers_in_order(

@@ -29,6 +29,7 @@ from ..model.trajectory import Trajectory
 from ..model.underside import Mesh, rasterize
 from .pairs import HandSelection, HandSystem, Pairs
 from .state import State
+from .system import System
 
 #: Longest time between two computed undersides, s.
 LONGEST = 0.1
@@ -159,32 +160,72 @@ class PathUndersides:
 
 #: Unit of given undersides, m: whole numbers of it are packed well, and all are exact.
 UNIT = 2.0**-20
-#: Number of a control period, and the undersides when it begins, (b, n), in `UNIT`.
-Knot = tuple[int, NDArray[np.int32]]
+
+
+@dataclass(frozen=True, eq=False)
+class PlacedMesh:
+    """Mesh in axes of its own, and its place over a bed."""
+
+    mesh: Mesh
+    matrix: NDArray[np.float32]
+    """(3, 4): From its axes to those of the bed, m."""
+
+    @property
+    def vertices(self) -> Floats:
+        """Its vertices in the axes of the bed, (v, 3), m."""
+        x, y, z = self.mesh.vertices.T
+        # Not a product of matrices, whose last bits depend on the number of threads.
+        rows = self.matrix.astype(np.float64)
+        return np.stack([a * x + b * y + c * z + d for a, b, c, d in rows], axis=1)
+
+
+#: Body at one time: its mesh and place, or its underside, (n,), in `UNIT`.
+Given = PlacedMesh | NDArray[np.int32]
+#: Number of a control period, and the bodies when it begins.
+Knot = tuple[int, Sequence[Given]]
 
 
 class GivenUndersides:
-    """Undersides that others give at certain times, at most the ceiling: Blender, or a recording.
+    """Undersides of bodies that others give at certain times: Blender, or a recording.
 
     Before the first and after the last of these times they stand still.
     """
 
-    def __init__(self, instants: Floats, ceiling: float) -> None:
+    def __init__(
+        self, ends: Sequence[tuple[int, float]], grid: Grid, instants: Floats, ceiling: float
+    ) -> None:
+        """`ends`: samples and radius of the pins' ends under each body; see `shapes.body.Body`."""
+        self._ends, self._grid = ends, grid
         self._shares, self._ceiling = instants / instants[-1], ceiling
         self._knots: Sequence[Knot] = ()
         self._make_lines = lru_cache(1)(self._join_knots)
+        self._remember = lru_cache(2 * len(ends))(self._rasterize)
 
     def give(self, knots: Sequence[Knot]) -> None:
-        """Take other undersides, by ascending periods."""
+        """Take other bodies, by ascending periods."""
         self._knots = knots
         self._make_lines.cache_clear()
+
+    def measure(self, bodies: Sequence[Given]) -> list[NDArray[np.int32]]:
+        """Return the undersides of bodies, (n,) each, in `UNIT`; the last are remembered."""
+        return [
+            self._remember(number, body) if isinstance(body, PlacedMesh) else body
+            for number, body in enumerate(bodies)
+        ]
+
+    def condense(self, bodies: Sequence[Given], first: Sequence[Given]) -> tuple[Given, ...]:
+        """Return bodies for a recording: those whose mesh is not the first one any more as undersides."""
+        return tuple(
+            body if _find_mesh(body) is _find_mesh(begun) else under
+            for body, under, begun in zip(bodies, self.measure(bodies), first, strict=True)
+        )
 
     def find(self, period: int) -> Stretch:
         """Return the undersides in a period."""
         at = max(bisect_right(self._knots, period, key=itemgetter(0)) - 1, 0)
-        (first, under), (last, _) = self._knots[at], self._knots[at : at + 2][-1]
+        (first, bodies), (last, _) = self._knots[at], self._knots[at : at + 2][-1]
         part = ((period - first + self._shares) / max(last - first, 1)).clip(0.0, 1.0)
-        parts = np.tile(part, (len(under), 1))
+        parts = np.tile(part, (len(bodies), 1))
         return Stretch(*self._make_lines(at), parts, np.zeros_like(parts))
 
     def find_lowest(self, period: int) -> Floats:
@@ -193,10 +234,30 @@ class GivenUndersides:
 
     def _join_knots(self, at: int) -> Lines:
         """Return the lines from a time to the next one."""
-        start, end = self._knots[at][1] * UNIT, self._knots[at : at + 2][-1][1] * UNIT
+        start, end = (
+            np.stack(self.measure(bodies)) * UNIT
+            for _, bodies in (self._knots[at], self._knots[at : at + 2][-1])
+        )
         low = np.minimum(start, end)
         low[low >= self._ceiling - UNIT] = np.inf
         return start, end, low
+
+    def _rasterize(self, number: int, body: PlacedMesh) -> NDArray[np.int32]:
+        """Return the underside of a body, (n,), in `UNIT`."""
+        ends, ceiling = self._ends[number], self._ceiling
+        under = rasterize(body.vertices, body.mesh.triangles, self._grid, *ends, ceiling)
+        return np.rint(np.minimum(under, ceiling) / UNIT).astype(np.int32)
+
+
+def _find_mesh(body: Given) -> Mesh | None:
+    """Return the mesh of a body; None: its underside is given."""
+    return body.mesh if isinstance(body, PlacedMesh) else None
+
+
+def find_given(system: System) -> GivenUndersides | None:
+    """Return the undersides that a system expects to be given; None: it expects none."""
+    undersides = system.undersides if isinstance(system, BodySystem) else None
+    return undersides if isinstance(undersides, GivenUndersides) else None
 
 
 @dataclass(frozen=True, eq=False)

@@ -156,7 +156,8 @@ def _assemble_bodies(scene: Scene) -> System:
     tips = any(scene.list_parts("fingertip"))
     fingers = scene.fingers if tips else tuple(pressing[:1] * len(scene.fingers))
     system = _assemble_hands(replace(scene, fingers=(*fingers, *pressing), bodies=()))
-    undersides: Undersides = GivenUndersides(system.instants, scene.ceiling)
+    ends = [(body.samples, body.tip_radius) for body in bodies]
+    undersides: Undersides = GivenUndersides(ends, system.grid, system.instants, scene.ceiling)
     if not any(body.given for body in bodies):
         undersides = _trace_meshes(scene, system)
     touches = [cell.touch for cell in system.cells[: len(scene.fingers)] if cell.touch]

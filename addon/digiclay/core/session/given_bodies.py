@@ -1,52 +1,115 @@
-"""Undersides of a take's bodies as arrays of its file: differences from time to time, packed."""
+"""Bodies of a take as arrays of its file: a mesh once and its places, or undersides; differences, packed."""
 
 from __future__ import annotations
 
 import json
-import math
 import zlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..base.arrays import Array
+from ..engine.bodies import Given, Knot, PlacedMesh
 from ..files.formats import inflate
 from ..model.laws import import_part
+from ..model.underside import Mesh, check_mesh
 from ..scene.schema import BODY, Presser, Scene
 
-if TYPE_CHECKING:
-    from ..engine.bodies import Knot
+#: Arrays: parameters of the bodies, as JSON, the periods of the knots, and undersides, of all knots
+#: in version 5.
+BODIES, KNOTS, PACKED = "bodies", "knots", "undersides"
+#: Number of each knot's and body's mesh, `NONE`: it has an underside; vertices and triangles of each
+#: mesh, and their numbers; places of all meshes, body by body, like the undersides.
+NUMBERS, VERTICES, TRIANGLES, SIZES, PLACES = "meshes", "vertices", "triangles", "sizes", "places"
+GIVEN = BODIES, KNOTS, PACKED, NUMBERS, VERTICES, TRIANGLES, SIZES, PLACES
+NONE = -1
 
-#: Arrays: parameters of the bodies, as JSON, the periods of the knots, and their undersides.
-UNDERSIDES = BODIES, KNOTS, PACKED = "bodies", "knots", "undersides"
 
-
-def pack_bodies(scene: Scene, knots: tuple[Knot, ...]) -> dict[str, Array]:
-    """Return the arrays of the bodies of a scene and their undersides; none without bodies."""
+def pack_bodies(scene: Scene, knots: Sequence[Knot]) -> dict[str, Array]:
+    """Return the arrays of the bodies of a scene at some times; none without bodies."""
     if not scene.bodies:
         return {}
     parameters = json.dumps([vars(each.body) for each in scene.bodies])
-    changes = np.diff([under for _, under in knots], axis=0, prepend=0)
-    # All lowest bytes, then all higher ones: those repeat.
-    packed = zlib.compress(changes.astype("<i4").view(np.uint8).reshape(-1, 4).T.tobytes())
+    given = [
+        body for bodies in zip(*(bodies for _, bodies in knots), strict=True) for body in bodies
+    ]
+    placed = [body for body in given if isinstance(body, PlacedMesh)]
+    meshes = list({id(body.mesh): body.mesh for body in placed}.values())
+    known = {id(mesh): number for number, mesh in enumerate(meshes)}
+    numbers = [known[id(body.mesh)] if isinstance(body, PlacedMesh) else NONE for body in given]
     return {
         BODIES: np.frombuffer(parameters.encode(), np.uint8),
         KNOTS: np.array([period for period, _ in knots], np.int64),
-        PACKED: np.frombuffer(packed, np.uint8),
+        NUMBERS: _pack([np.array(numbers)[:, None]]),
+        SIZES: np.array([[len(part) for part in mesh] for mesh in meshes], np.int64).reshape(-1, 2),
+        VERTICES: _pack([mesh.vertices.astype("<f4").view("<i4") for mesh in meshes]),
+        TRIANGLES: _pack([mesh.triangles for mesh in meshes]),
+        PLACES: _pack([body.matrix.astype("<f4").view("<i4").reshape(1, -1) for body in placed]),
+        PACKED: _pack([body[None] for body in given if not isinstance(body, PlacedMesh)]),
     }
 
 
 def unpack_bodies(scene: Scene, arrays: Mapping[str, Array]) -> tuple[Scene, tuple[Knot, ...]]:
-    """Return a scene with its bodies, and their undersides, from `pack_bodies`; ValueError if damaged."""
-    given, periods = json.loads(arrays[BODIES].tobytes()), arrays[KNOTS]
-    if not len(periods) or np.any(np.diff(periods) < 0):
-        raise ValueError("its undersides must have times that do not decrease")
+    """Return a scene with its bodies, and the knots, from `pack_bodies`; ValueError if damaged."""
+    parameters, periods = json.loads(arrays[BODIES].tobytes()), arrays[KNOTS].tolist()
+    if not periods or np.any(np.diff(periods) < 0):
+        raise ValueError("its bodies must have times that do not decrease")
     path = scene.fingers[0].trajectory
-    bodies = tuple(Presser(import_part(*BODY)(**parameters), path) for parameters in given)
-    shape = len(periods), len(bodies), scene.cells
-    data = inflate(arrays[PACKED].tobytes(), 4 * math.prod(shape))
+    bodies = tuple(Presser(import_part(*BODY)(**each), path) for each in parameters)
+    given = _unpack_given(arrays, len(periods), len(bodies), scene.cells)
+    knots = zip(periods, zip(*given, strict=True), strict=True)
+    return replace(scene, bodies=bodies), tuple(knots)
+
+
+def _unpack_given(
+    arrays: Mapping[str, Array], knots: int, bodies: int, cells: int
+) -> list[list[Given]]:
+    """Return each body at all knots."""
+    if NUMBERS not in arrays:
+        rows = _unpack(arrays[PACKED], knots, bodies * cells)
+        return [list(under) for under in rows.reshape(knots, bodies, cells).swapaxes(0, 1)]
+    numbers = _unpack(arrays[NUMBERS], knots * bodies, 1).reshape(bodies, knots)
+    loose = int(np.count_nonzero(numbers == NONE))
+    unders = iter(_unpack(arrays[PACKED], loose, cells))
+    places = _unpack(arrays[PLACES], numbers.size - loose, 12).view("<f4").reshape(-1, 3, 4)
+    if not np.isfinite(places).all():
+        raise ValueError("its meshes must have finite places")
+    meshes, matrices = _unpack_meshes(arrays), iter(places)
+    return [
+        [
+            next(unders) if number == NONE else PlacedMesh(meshes[number], next(matrices))
+            for number in row
+        ]
+        for row in numbers
+    ]
+
+
+def _unpack_meshes(arrays: Mapping[str, Array]) -> list[Mesh]:
+    """Return the meshes of bodies."""
+    sizes = arrays[SIZES].reshape(-1, 2)
+    vertices = _unpack(arrays[VERTICES], int(sizes[:, 0].sum()), 3).view("<f4").astype(np.float64)
+    triangles = _unpack(arrays[TRIANGLES], int(sizes[:, 1].sum()), 3)
+    ends = np.cumsum(sizes, axis=0)
+    starts = ends - sizes
+    return [
+        check_mesh(vertices[a:b], triangles[c:d])
+        for (a, c), (b, d) in zip(starts.tolist(), ends.tolist(), strict=True)
+    ]
+
+
+def _pack(parts: Sequence[Array]) -> Array:
+    """Return rows (k, m) of whole numbers of 32 bits as packed differences from row to row."""
+    rows = np.concatenate(parts) if parts else np.zeros((0, 1))
+    changes = np.diff(rows, axis=0, prepend=0).astype("<i4")
+    # All lowest bytes, then all higher ones: those repeat.
+    return np.frombuffer(zlib.compress(changes.view(np.uint8).reshape(-1, 4).T.tobytes()), np.uint8)
+
+
+def _unpack(packed: Array, count: int, width: int) -> NDArray[np.int32]:
+    """Return rows (count, width) from `_pack`; ValueError if damaged."""
+    data = inflate(packed.tobytes(), 4 * count * width)
     changes = np.frombuffer(data, np.uint8).reshape(4, -1).T.tobytes()
-    under = np.cumsum(np.frombuffer(changes, "<i4").reshape(shape), axis=0, dtype=np.int32)
-    return replace(scene, bodies=bodies), tuple(zip(periods.tolist(), under, strict=True))
+    rows = np.frombuffer(changes, "<i4").reshape(count, width)
+    return np.cumsum(rows, axis=0, dtype=np.int32)

@@ -6,15 +6,15 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import repeat
+from operator import is_
 from typing import TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..base.arrays import Floats
 from ..base.modes import BLISTER, LOCKED
 from ..control.orders import ORDER, SURFACED, LockingControl, Orders, order_periods
-from ..engine.bodies import BodySystem, GivenUndersides, Knot
+from ..engine.bodies import Given, Knot, find_given
 from ..engine.simulation import advance
 from ..engine.state import State
 from ..engine.system import System
@@ -208,7 +208,7 @@ class Recording:
     surfaces: tuple[Floats, ...] = ()
     """(n,) each: Heights to which orders move pins, m."""
     knots: tuple[Knot, ...] = ()
-    """Undersides of bodies, where they are given."""
+    """Bodies, where these are given."""
 
     @classmethod
     def begin(
@@ -329,10 +329,10 @@ class LiveSession:
     monitor: accuracy.ErrorMonitor | None = None
     errors: accuracy.Errors | None = None
     """Estimate so far."""
-    under: NDArray[np.int32] | None = None
-    """(b, n): Undersides of bodies that the session has reached, in `bodies.UNIT`; None: no path yet."""
-    aim: NDArray[np.int32] | None = None
-    """Those to which the next path leads; None: there are none."""
+    reached: Sequence[Given] | None = None
+    """Bodies where the session has them; None: no path yet."""
+    aim: Sequence[Given] | None = None
+    """Where the next path leads them; None: there are none."""
 
     @property
     def tips(self) -> Floats:
@@ -384,28 +384,24 @@ def follow_path(
     )
 
 
-def give_undersides(system: System, knots: Sequence[Knot]) -> None:
-    """Give a system the undersides of its bodies, if it expects any."""
-    if isinstance(system, BodySystem) and isinstance(system.undersides, GivenUndersides):
-        system.undersides.give(knots)
-
-
 def _lead_bodies(session: Session, count: int) -> Session:
-    """Give the undersides along a path of `count` periods to the system; return the session at its end."""
-    aim, under, first = session.aim, session.under, session.state.period
-    if aim is None:
+    """Give the bodies along a path of `count` periods to the system; return the session at its end."""
+    aim, reached, first = session.aim, session.reached, session.state.period
+    given = find_given(session.system)
+    if aim is None or given is None:
         return session
-    if under is None or len(under) != len(aim):  # others than before begin where they are
-        under = aim
-    begin, end = (first, under), (first + count, aim)
-    give_undersides(session.system, (begin, end))
+    if reached is None or len(reached) != len(aim):  # others than before begin where they are
+        reached = aim
+    knots: list[Knot] = [(first, reached), (first + count, aim)]
+    given.give(knots)
     recording = session.recording
     if recording:
-        last, last_under = recording.knots[-1] if recording.knots else (None, None)
-        goes_on = last == first and last_under is under
-        more = (end,) if goes_on else (begin, end)
-        recording = replace(recording, knots=(*recording.knots, *more))
-    return replace(session, under=aim, recording=recording)
+        known = recording.knots or knots[:1]
+        knots = [(period, given.condense(bodies, known[0][1])) for period, bodies in knots]
+        last, bodies = known[-1]
+        goes_on = bool(recording.knots) and last == first and all(map(is_, bodies, knots[0][1]))
+        recording = replace(recording, knots=(*recording.knots, *knots[goes_on:]))
+    return replace(session, reached=aim, recording=recording)
 
 
 def start_recording(session: Session, now: bytes, tick: int = 0, room: int = 255) -> Session:

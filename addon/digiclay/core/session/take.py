@@ -16,7 +16,7 @@ import numpy as np
 from ..base.arrays import Array, Floats
 from ..base.errors import OutputError, ParameterError
 from ..control.orders import FARTHEST, STRONGEST, Orders, add_verbs, find_fault
-from ..engine.bodies import Knot
+from ..engine.bodies import Knot, find_given
 from ..engine.simulation import begin
 from ..engine.state import State
 from ..engine.system import System
@@ -27,8 +27,8 @@ from ..scene.assembly import assemble
 from ..scene.schema import Scene
 from ..scene.toml_table import format_scene, resolve
 from . import snapshot
-from .given_bodies import BODIES, UNDERSIDES, pack_bodies, unpack_bodies
-from .live_session import AWAY, Recording, give_undersides, simulate_path
+from .given_bodies import BODIES, GIVEN, pack_bodies, unpack_bodies
+from .live_session import AWAY, Recording, simulate_path
 
 #: Waypoints this close to the straight line between their neighbors are left out, m and 1.
 STRAIGHT = 1e-12
@@ -36,9 +36,9 @@ STRAIGHT = 1e-12
 PARTS = ("scene", "start", "poses", "end")
 #: Versions of the format: 1, which is not written down, has poses (t + 1, 7) of one finger; 2 has
 #: (t + 1, f, 7); 3 also has the array `SMOOTHING` (t, 4), orders that smooth; 4 has orders (t, 5)
-#: and their surfaces (s, n) instead; 5 has more fingers than the scene. A take with neither is
-#: written as 2, which older releases read.
-PLAIN, ORDERED, VERSION = 2, 4, 5
+#: and their surfaces (s, n) instead; 5 has more fingers than the scene; 6 has bodies. A take with
+#: none of these is written as 2, which older releases read.
+PLAIN, ORDERED, SEVERAL, VERSION = 2, 4, 5, 6
 SMOOTHING, ORDERS, SURFACES, BASE = "smoothing", "orders", "surfaces", "base"
 #: Most parts of a physics step in a replay.
 MOST_PARTS = 64
@@ -66,7 +66,7 @@ class Take:
     base: Floats | None = None
     """(n,): Heights that strokes count from at the end, m; None: of a session without strokes."""
     knots: tuple[Knot, ...] = ()
-    """Undersides of the scene's bodies, if it has any."""
+    """The scene's bodies, if it has any."""
 
     def __post_init__(self) -> None:
         fingers = len(self.scene.fingers)
@@ -128,7 +128,9 @@ def play(take: Take, scene: Scene | None = None) -> Iterator[tuple[System, State
 
     def prepare(count: int) -> System:
         system = assemble(scene.with_fingers(count))
-        give_undersides(system, take.knots)
+        given = find_given(system)
+        if given:
+            given.give(take.knots)
         return system
 
     def change(system: System, state: State, count: int) -> tuple[System, State]:
@@ -215,6 +217,7 @@ def to_bytes(take: Take) -> bytes:
     orders = take.orders
     several = take.poses.shape[1] > len(take.scene.fingers)
     ordered = {} if orders is None else {ORDERS: orders.rows, SURFACES: np.array(orders.surfaces)}
+    version = SEVERAL if several else ORDERED if ordered else PLAIN
     based = {} if take.base is None else {BASE: take.base}
     np.savez(
         written,
@@ -222,9 +225,7 @@ def to_bytes(take: Take) -> bytes:
         start=np.frombuffer(take.start, np.uint8),
         poses=take.poses,
         end=np.frombuffer(take.end, np.uint8),
-        version=np.array(
-            VERSION if several or take.scene.bodies else ORDERED if ordered else PLAIN
-        ),
+        version=np.array(VERSION if take.scene.bodies else version),
         **ordered,
         **based,
         **pack_bodies(take.scene, take.knots),
@@ -237,7 +238,7 @@ def from_bytes(data: bytes) -> Take:
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             stored = archive.namelist()
-            optional = ("version", SMOOTHING, ORDERS, SURFACES, BASE, *UNDERSIDES)
+            optional = ("version", SMOOTHING, ORDERS, SURFACES, BASE, *GIVEN)
             names = [*PARTS, *(name for name in optional if f"{name}.npy" in stored)]
             heads = read_heads(archive, names)
             # `to_bytes` does not compress: a take unpacks to at most its own size.
