@@ -6,6 +6,7 @@ import pytest
 from digiclay import bridge
 from digiclay.compat import curves
 from digiclay.core.base.modes import COLORS
+from digiclay.core.engine.bodies import PlacedMesh
 from digiclay.core.session import snapshot
 from digiclay.core.session.take import from_bytes, play, to_bytes
 from digiclay.device import view
@@ -236,12 +237,31 @@ def test_with_an_odd_presser_the_session_waits_and_says_why(bed, ball, clock, wh
     goes_on(clock)
 
 
-@pytest.mark.parametrize("lift", [True, False])
-def test_a_take_of_a_mesh_is_replayed_to_the_bit_and_baked(bed, ball, clock, lift):
+def swell(ball, clock):
+    """Press a ball that is deformed on its way."""
+    key = [ball.shape_key_add(name=name) for name in ("Basis", "Wide")][1]
+    for point in key.data:
+        point.co *= 1.1
+    looked()
+    press(ball, clock, lift=False)
+    key.value = 1.0
+    clock.tick(3)
+
+
+PRESSED = {
+    "lifted": (lambda ball, clock: press(ball, clock), True),
+    "held": (lambda ball, clock: press(ball, clock, lift=False), True),
+    "deformed": (swell, False),
+}
+
+
+@pytest.mark.parametrize("how", PRESSED)
+def test_a_take_of_a_mesh_is_replayed_to_the_bit_and_baked(bed, ball, clock, how):
     started(bed)
     clock.tick()
     running.put(sculpting.set_recording(running.find(bed), True))
-    press(ball, clock, lift=lift)
+    move, rigid = PRESSED[how]
+    move(ball, clock)
     place(ball, ABOVE, x=5e-3)
     clock.tick(2)
     session = running.find(bed)
@@ -249,6 +269,10 @@ def test_a_take_of_a_mesh_is_replayed_to_the_bit_and_baked(bed, ball, clock, lif
     entry = takes.add(bed, take, session=session)
     read = takes.read(bed)
     assert read.scene.bodies == take.scene.bodies
+    # Of one that deforms the take has the undersides from then on.
+    placed = [isinstance(bodies[0], PlacedMesh) for _, bodies in read.knots]
+    assert placed[0]
+    assert all(placed) == rigid
     tick.stop(bed.session_uid)
     looked()
     formed = exact(bed)

@@ -68,7 +68,7 @@ def _unpack_given(
 ) -> list[list[Given]]:
     """Return each body at all knots."""
     if NUMBERS not in arrays:
-        rows = _unpack(arrays[PACKED], knots, bodies * cells)
+        rows = _add_up(_read_numbers(arrays[PACKED], knots, bodies * cells).view("<i4"))
         return [list(under) for under in rows.reshape(knots, bodies, cells).swapaxes(0, 1)]
     numbers = _unpack(arrays[NUMBERS], knots * bodies, 1).reshape(bodies, knots)
     loose = int(np.count_nonzero(numbers == NONE))
@@ -100,16 +100,28 @@ def _unpack_meshes(arrays: Mapping[str, Array]) -> list[Mesh]:
 
 
 def _pack(parts: Sequence[Array]) -> Array:
-    """Return rows (k, m) of whole numbers of 32 bits as packed differences from row to row."""
-    rows = np.concatenate(parts) if parts else np.zeros((0, 1))
-    changes = np.diff(rows, axis=0, prepend=0).astype("<i4")
-    # All lowest bytes, then all higher ones: those repeat.
-    return np.frombuffer(zlib.compress(changes.view(np.uint8).reshape(-1, 4).T.tobytes()), np.uint8)
+    """Return rows (k, m) of whole numbers of 32 bits as packed changes of the differences from row to row."""
+    rows = np.concatenate(parts).astype("<i4") if parts else np.zeros((0, 1), "<i4")
+    changes = np.diff(rows, n=2, axis=0, prepend=np.zeros((2, rows.shape[1]), "<i4"))
+    # The sign last, then all lowest bytes, then all higher ones: those are 0.
+    numbers = (changes << 1) ^ (changes >> 31)
+    return np.frombuffer(zlib.compress(numbers.view(np.uint8).reshape(-1, 4).T.tobytes()), np.uint8)
 
 
 def _unpack(packed: Array, count: int, width: int) -> NDArray[np.int32]:
     """Return rows (count, width) from `_pack`; ValueError if damaged."""
+    numbers = _read_numbers(packed, count, width)
+    changes = (numbers >> 1).view("<i4") ^ -(numbers & 1).view("<i4")
+    return _add_up(_add_up(changes))
+
+
+def _read_numbers(packed: Array, count: int, width: int) -> NDArray[np.uint32]:
+    """Return packed numbers (count, width), all lowest bytes first; ValueError if damaged."""
     data = inflate(packed.tobytes(), 4 * count * width)
-    changes = np.frombuffer(data, np.uint8).reshape(4, -1).T.tobytes()
-    rows = np.frombuffer(changes, "<i4").reshape(count, width)
-    return np.cumsum(rows, axis=0, dtype=np.int32)
+    numbers = np.frombuffer(data, np.uint8).reshape(4, -1).T.tobytes()
+    return np.frombuffer(numbers, "<u4").reshape(count, width)
+
+
+def _add_up(changes: Array) -> NDArray[np.int32]:
+    """Return rows (k, m) from their differences."""
+    return np.cumsum(changes, axis=0, dtype=np.int32)
