@@ -211,7 +211,7 @@ def rows_with(at, **columns):
         ({"surfaces": np.array(0.04)}, "damaged and cannot be read"),
         ({"surfaces": np.empty((0, 121))}, "got row"),
         ({"surfaces": None}, "damaged and cannot be read"),
-        ({"version": np.array(6)}, "its version must be at most 5"),
+        ({"version": np.array(7)}, "its version must be at most 6"),
     ],
 )
 def test_hostile_orders_and_a_version_yet_to_come_are_refused_in_one_line(parts, said):
