@@ -92,8 +92,11 @@ class CellModel(Model):
         if longest >= scene.actuator.stroke:
             rule = f"must change by less than actuator.stroke, {scene.actuator.stroke:g} m"
             raise DigiclayError(f"height {rule} (got {longest:g} m).")
+        law = getattr(scene.valve, "law", "orifice")
+        if law != "orifice":
+            raise DigiclayError(f"valve.law must be orifice to be fitted (got {law}).")
         self.valve, self.fluid, self.area = scene.valve, scene.fluid, scene.actuator.area
-        orifice = select_law("valve", scene.valve).flow_law(scene.fluid)
+        orifice = select_law("valve", scene.valve).flow_law(scene.fluid, scene.actuator.area)
         self.power = orifice.power
         self.resistance = scene.conduit.resistance(scene.fluid) if scene.conduit else 0.0
         absent = 1e-3 if "lag" in groups else 1e-9

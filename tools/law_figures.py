@@ -42,7 +42,7 @@ def draw_curves(
     """Draw the curves of each law into its panel."""
     scene = digiclay.scene({"sensors": {"force_noise": STEP, "force_step": STEP}})
     system, limit = assemble(scene), {"color": "k", "linestyle": "--"}
-    law = scene.valve.flow_law(scene.fluid)
+    law = scene.valve.flow_law(scene.fluid, scene.actuator.area)
     high = scene.supply.high
     sizes = np.array([1.0, 0.5, 0.25])
     drops, knees = np.logspace(3, 7.5)[:, None], law.knee / sizes**2

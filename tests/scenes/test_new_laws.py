@@ -27,7 +27,7 @@ class EqualPercentage(Parameters):
     stroke: float = quantity(30e-6, "lift of the fully open valve", unit="m", above=0.0)
     rangeability: float = quantity(20.0, "lift when open over lift when just open", symbol="R", above=1.0)
 
-    def flow_law(self, fluid):
+    def flow_law(self, fluid, area):
         open_ = make_orifice(Valve(self.orifice_diameter, self.stroke), fluid)
         return ExponentialOrifice(open_.laminar, open_.turbulent, open_.power, self.rangeability)
 

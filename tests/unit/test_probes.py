@@ -40,7 +40,7 @@ def test_a_held_bed_has_the_law_of_the_contact():
 def test_a_pin_moves_as_the_equations_of_valve_and_cylinder_say():
     plain = digiclay.scene("tap", {"conduit": "absent", "valve_lag": "absent", "delay": "absent"})
     speeds = digiclay.free_speed(plain)
-    law, area = plain.valve.flow_law(plain.fluid), plain.actuator.area
+    law, area = plain.valve.flow_law(plain.fluid, plain.actuator.area), plain.actuator.area
     assert (
         speeds.rise
         == -speeds.fall

@@ -363,7 +363,7 @@ def build(parameters: CellStates, device: DeviceInfo) -> CellStatesControl:
         device.blister,
         device.cell.actuator,
         device.rim,
-        device.lift,
+        device.overload,
         device.period,
         floor,
     )

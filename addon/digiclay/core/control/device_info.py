@@ -57,6 +57,11 @@ class DeviceInfo:
         """Largest force that the high reservoir lifts, ``P_high A_a``, N."""
         return self.cell.supply.high * self.cell.actuator.area
 
+    @property
+    def overload(self) -> float:
+        """Force from which on a pin that is to rise is locked, N; infinite if no command locks it."""
+        return self.lift if self.cell.supply.locks else math.inf
+
 
 def suppress_noise(force: Floats, floor: Any) -> Floats:
     """Return forces (m[, b]), N, with 0 for those below the noise floor (b,), N."""

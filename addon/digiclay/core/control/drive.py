@@ -91,6 +91,14 @@ class Drive:
         return mark_formed(target, rest, self.dead_band)
 
 
+class BalancingDrive(Drive):
+    """Drive of back-drivable motors, which balance the load."""
+
+    def command(self, speed: Floats, force: Floats) -> Floats:
+        """Return motor commands for speeds, m/s, under forces, N: ``K = v / v0 + F / F_stall``."""
+        return np.clip(self.open_for(speed) + force / self.lift, -1.0, 1.0)
+
+
 @dataclass(frozen=True, eq=False)
 class CellwiseControl(BatchControl):
     """Controller without memory: the orders for a cell depend on that cell alone."""
@@ -117,9 +125,13 @@ def _look_up(speed: Floats, speeds: Floats) -> Floats:
     return np.stack([np.interp(speeds, table, OPENINGS) for speeds, table in runs], axis=-1)
 
 
-def find_free_speeds(cell: Cell, pressure: float) -> Floats:
-    """Return speeds (129,), m/s, of a free pin at `OPENINGS`, to a reservoir of a pressure, Pa; growing."""
-    free = cell.flow.flow(OPENINGS, np.full(OPENINGS.size, pressure)) / cell.actuator.area
+def find_free_speeds(cell: Cell, way: float) -> Floats:
+    """Return speeds (129,), m/s, of a free pin at `OPENINGS`, up (`way` 1) or down (-1); growing.
+
+    With another `way` the pressure is that share of the reservoir's.
+    """
+    drop = way * cell.supply.pressure(np.copysign(OPENINGS, way))
+    free = cell.flow.flow(OPENINGS, drop) / cell.actuator.area
     # A reservoir that cannot move a pin gets the valve wide open.
     return np.maximum(free, 0.0) + 1e-12 * OPENINGS
 
@@ -130,11 +142,12 @@ def make_drive(parameters: DriveParameters, cell: Cell, period: float) -> Drive:
         rule = f"must be at least two control periods, {2.0 * period:g} s"
         raise ParameterError("control", "settling_time", rule, f"{parameters.settling_time:g} s")
     supply = cell.supply
-    return Drive(
+    kind = Drive if supply.locks else BalancingDrive
+    return kind(
         parameters.settling_time,
         parameters.dead_band,
-        find_free_speeds(cell, supply.high),
-        find_free_speeds(cell, -supply.low),
+        find_free_speeds(cell, 1.0),
+        find_free_speeds(cell, -1.0),
         supply.high * cell.actuator.area,
     )
 

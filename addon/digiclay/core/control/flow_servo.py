@@ -122,19 +122,28 @@ class FlowServo:
         return command
 
 
+class BalancingServo(FlowServo):
+    """Servo of back-drivable motors, which balance the load."""
+
+    def _refine(self, command: Floats, speed: Floats, force: Floats) -> Floats:
+        """Return commands for speeds, m/s, under forces, N: ``K = v / v0 + F / F_stall``."""
+        return np.clip(speed / self.rise + force / self.lift, -1.0, 1.0)
+
+
 def make_flow_servo(cell: Cell, period: float, dead_time: float, dead_band: float) -> FlowServo:
     """Return a servo that aims two periods ahead, plus the whole periods of the dead time, s."""
     area, supply = cell.actuator.area, cell.supply
-    up, down = find_free_speeds(cell, supply.high), find_free_speeds(cell, -supply.low)
+    up, down = find_free_speeds(cell, 1.0), find_free_speeds(cell, -1.0)
     ratios = np.concatenate((-down[::-1] / down[-1], up[1:] / up[-1]))
     openings = np.concatenate((-OPENINGS[::-1], OPENINGS[1:]))
-    half = find_free_speeds(cell, 0.5 * supply.high)
+    half = find_free_speeds(cell, 0.5)
     delay = dead_time + _measure_lag(cell, period)
     whole = math.ceil(delay / period - 1e-9)
     left = tuple(min(delay - number * period, period) for number in range(whole))
     ahead = 2.0 * period + math.floor(delay / period + 1e-9) * period
-    exact = bool(np.allclose(2.0 * half, up, rtol=1e-6, atol=1e-12))
-    return FlowServo(
+    exact = supply.locks and bool(np.allclose(2.0 * half, up, rtol=1e-6, atol=1e-12))
+    kind = FlowServo if supply.locks else BalancingServo
+    return kind(
         cell,
         ratios,
         openings,

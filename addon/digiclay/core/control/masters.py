@@ -108,7 +108,7 @@ def gather(memory: Sequence[Master]) -> Masters:
 
 def _find_speed(cell: MasterCell, opening: Floats) -> Floats:
     """Return the speeds of unloaded pins, (b,), m/s; see `MasterCell.speed`."""
-    drive = np.where(opening > 0.0, cell.up, cell.down)
+    drive = cell.supply.pressure(opening) / cell.area
     conductance: Floats = cell.flow.laminar_conductance(opening)
     if not np.all(cell.laminar):
         turbulent = cell.flow.conductance(opening, drive * cell.area)

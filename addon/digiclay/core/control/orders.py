@@ -242,7 +242,7 @@ class LockingControl(Around):
     A locked pin is commanded to its height, so that it stays there when unlocked.
     """
 
-    actuator: Actuator
+    cell: Cell
     verb: Verb
     disc: Disc | None = None
     """Pins to be locked or unlocked; None: locked pins do not change."""
@@ -255,14 +255,15 @@ class LockingControl(Around):
         return memory, disc if self.disc is None else add_disc(disc, self.disc)
 
     def command(self, memory: Memory, seen: Measurement) -> tuple[Memory, Commands]:
-        """Shut the valves of locked pins; the method commands all others. See `Controller`."""
+        """Shut the valves of locked pins, or balance their loads; the method commands all others."""
         locked = self._choose(seen)
         memory, orders = self.method.command(memory, self._mask(seen))
         if not any_true(locked):
             return memory, orders
         target = np.where(locked, seen.height, orders.target)
         mode = np.where(locked, LOCKED, orders.mode)
-        return memory, Commands(target, mode, np.where(locked, 0.0, orders.command))
+        held = self.cell.supply.balance(self.cell.actuator.pressure(seen.force))
+        return memory, Commands(target, mode, np.where(locked, held, orders.command))
 
     def _choose(self, seen: Measurement) -> Flags:
         """Return which pins are locked after the period, (m,)."""
@@ -293,7 +294,9 @@ class LockingControl(Around):
         locked = seen.mode == LOCKED
         if not any_true(locked):
             return seen
-        formed = mark_formed(seen.target, self.actuator.rest_height, DriveParameters().dead_band)
+        formed = mark_formed(
+            seen.target, self.cell.actuator.rest_height, DriveParameters().dead_band
+        )
         return seen._replace(mode=np.where(locked, formed, seen.mode))
 
 
@@ -326,7 +329,7 @@ def order_periods(
     for x, y, radius, strength, number in orders.rows.tolist():
         verb, disc = Verb(int(number)), (x, y, radius)
         locked |= radius > 0.0 and verb in LOCKING
-        held = LockingControl(method, actuator, verb) if locked else method
+        held = LockingControl(method, cell, verb) if locked else method
         if verb is Verb.PLACE:
             surface = orders.surfaces[int(x)]
             if int(x) not in circles:
@@ -338,7 +341,7 @@ def order_periods(
             yield held
         elif verb in LOCKING:
             shares = orders.surfaces[int(x)] if verb is Verb.SHARE else None
-            yield LockingControl(method, actuator, verb, disc, shares)
+            yield LockingControl(method, cell, verb, disc, shares)
         elif verb is Verb.ERASE:
             change = partial(
                 erase, strength * period / ERASING, actuator.rest_height, exact.dead_band

@@ -21,7 +21,7 @@ import numpy as np
 from ..base.arrays import Constants, Floats, Modes, count_true
 from ..base.modes import FORCE_FOLLOW, SPRING
 from ..base.quantity import quantity
-from ..model.actuator import Actuator
+from ..model.actuator import Actuator, Supply
 from ..model.control_interface import Commands, Measurement, Memory, SetPoint
 from ..model.delay import Queue
 from ..model.interfaces import Flow
@@ -133,10 +133,9 @@ class MasterCell:
     flow: Flow
     laminar: bool
     """Law of valve and conduit; whether the flow without load is always laminar."""
-    up: float
-    down: float
+    supply: Supply
     area: float
-    """Pressures of the reservoirs over the area of a pin, Pa/m²; that area, m²."""
+    """Area of a pin, m²."""
     stroke: float
     period: float
     """Upper end stop, m; control period, s."""
@@ -150,7 +149,7 @@ class MasterCell:
 
     def speed(self, opening: float) -> float:
         """Return the speed of the unloaded pin, m/s."""
-        drive = self.up if opening > 0.0 else self.down
+        drive = self.supply.select(opening) / self.area
         if self.laminar:
             return self.flow.laminar_conductance(opening) * drive
         return float(self.flow.conductance(np.array(opening), np.array(drive * self.area))) * drive
@@ -163,8 +162,7 @@ def make_master_cell(cell: Cell, period: float) -> MasterCell:
     openings = tuple((row[0] if cell.lag.rows else 0.0, row[-1]) for row in nodes.tolist())
     laminar = cell.flow.knee > cell.supply.largest
     area, stroke = cell.actuator.area, cell.actuator.stroke
-    up, down = cell.supply.high / area, cell.supply.low / area
-    return MasterCell(openings, cell.flow, laminar, up, down, area, stroke, period)
+    return MasterCell(openings, cell.flow, laminar, cell.supply, area, stroke, period)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -449,4 +447,4 @@ def build(parameters: VirtualMaster, device: DeviceInfo) -> VirtualMasterControl
     model = make_master_cell(device.cell, device.period)
     parts = parameters, device.blister, device.cell.actuator, model, device.rim
     ground = GROUNDS[parameters.ground]
-    return VirtualMasterControl(*parts, device.period, device.lift, device.force_floor, ground)
+    return VirtualMasterControl(*parts, device.period, device.overload, device.force_floor, ground)

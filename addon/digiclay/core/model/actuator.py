@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -29,6 +30,9 @@ class Supply(Parameters):
         source="P",
     )
 
+    #: Whether a shut valve locks its pin.
+    locks: ClassVar[bool] = True
+
     def check(self) -> None:
         """Refuse a high pressure that is not above the low one."""
         if not self.high > self.low:
@@ -43,6 +47,18 @@ class Supply(Parameters):
     def pressure(self, opening: Floats) -> Floats:
         """Return the pressure of the reservoir behind the valve, Pa, for openings K, (n,)."""
         return np.where(opening > 0.0, self.high, self.low)
+
+    def select(self, opening: float) -> float:
+        """Return the pressure of the reservoir behind a valve of opening K, Pa."""
+        return self.high if opening > 0.0 else self.low
+
+    def balance(self, load: Floats) -> Any:
+        """Return the commands that hold pins under loads, Pa."""
+        return 0.0
+
+    def steer(self, conductance: Floats, opening: Floats, out: Floats) -> None:
+        """Compute conductances with the sign of the openings, into `out`."""
+        np.copysign(conductance, opening, out)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 from ..base.arrays import Floats
+from .actuator import Supply
 from .control_interface import Commands, Measurement
 from .delay import Queue
 
@@ -35,6 +36,10 @@ class Flow(Protocol):
     def flow(self, opening: Floats, drop: Floats) -> Floats:
         """Return the flow into the cylinder with the sign of `drop`, m3/s, of openings K under drops, Pa."""
         return self.conductance(opening, drop) * drop
+
+    def source(self, supply: Supply) -> Supply:
+        """Return the pressures that drive the flow: those of the reservoirs, unless it has its own."""
+        return supply
 
 
 class Lag(Protocol):

@@ -15,11 +15,12 @@ from ..base.errors import ParameterError
 from ..base.quantity import Parameters, quantity
 
 #: By section: name of a law, its module within the core, and the class of its parameters there. The
-#: first is the default. A valve law has a method ``flow_law(fluid)``, see `valve.Valve`; a contact
-#: law is a `contact.ExponentialLaw`. Scene files have only the keys of the selected law.
+#: first is the default. A valve law has a method ``flow_law(fluid, area)``, see `valve.Valve`; a
+#: contact law is a `contact.ExponentialLaw`. Scene files have only the keys of the selected law.
 LAWS: dict[str, dict[str, tuple[str, str]]] = {
     "valve": {
         "orifice": ("model.valve", "Valve"),
+        "motor": ("model.motor", "Motor"),
     },
     "contact": {
         "exponential": ("model.contact", "Contact"),

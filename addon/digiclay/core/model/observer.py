@@ -77,7 +77,7 @@ class ValveObserver(Sensors):
     def _estimate(self, opening: Floats, before: Floats, after: Floats, last: Floats) -> Floats:
         """Return the forces, N, from openings (nodes, m[, b]) and the heights before and after, m."""
         actuator = self.cell.actuator
-        moving = self._average(opening**2) > SHUT**2
+        moving = self._average(opening**2) > (SHUT**2 if self.cell.supply.locks else -1.0)
         moving &= (after > 0.0) & (after < actuator.stroke)
         flow = actuator.area * (after - before) / self.period
         pressure, force = self.cell.supply.pressure(opening), last

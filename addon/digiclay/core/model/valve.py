@@ -67,8 +67,8 @@ class Valve(Parameters):
         choices=("stroke", "opening"),
     )
 
-    def flow_law(self, fluid: Fluid) -> Orifice:
-        """Return the valve's flow law in a fluid."""
+    def flow_law(self, fluid: Fluid, area: float) -> Orifice:
+        """Return the valve's flow law in a fluid; `area`: of the cylinder, m², has no effect."""
         return make_orifice(self, fluid)
 
 

@@ -33,7 +33,6 @@ from ..model.null_parts import (
 )
 from ..model.physics import Cell, find_speeds
 from ..model.touch import Touch
-from ..model.valve import Orifice
 from .schema import STEPPERS, Finger, Scene
 
 if TYPE_CHECKING:
@@ -68,7 +67,8 @@ def make_motion(scene: Scene) -> Motion:
     kind, period = import_part(*STEPPERS[simulation.stepper]), simulation.control_period
     stepper: Stepper = kind(simulation.tolerance) if simulation.stepper == "adaptive" else kind()
     lag = scene.valve_lag or InstantValve()
-    cell = Cell(scene.actuator, _make_flow(scene), scene.supply, lag, _make_touch(scene))
+    flow = _make_flow(scene)
+    cell = Cell(scene.actuator, flow, flow.source(scene.supply), lag, _make_touch(scene))
     line = split_delay(scene.delay, period) if scene.delay else Queue()
     # At the next command an opening with lag has a kink, and one without a jump.
     cut = 0.0 if stepper.bridges and cell.lag.rows else line.cut
@@ -267,13 +267,13 @@ def _pad_relaxations(fingers: tuple[Finger, ...]) -> tuple[Finger, ...]:
 
 
 def _make_flow(scene: Scene) -> Flow:
-    """Return the flow law of the valve, with the conduit if there is one."""
-    valve: Orifice = select_law("valve", scene.valve).flow_law(scene.fluid)
+    """Return the flow law of the valve, with the conduit if there is one, or of the motor."""
+    law: Any = select_law("valve", scene.valve).flow_law(scene.fluid, scene.actuator.area)
     if scene.conduit is None:
-        return valve
+        return law
     from ..model.conduit import OrificeAndConduit
 
-    return OrificeAndConduit(valve, scene.conduit.resistance(scene.fluid))
+    return OrificeAndConduit(law, scene.conduit.resistance(scene.fluid))
 
 
 def _make_touch(scene: Scene) -> Touch | None:

@@ -13,7 +13,7 @@ from ..control.methods import ControlParameters, find_method, list_methods
 from ..files.tables import Described, refuse_unknown
 from ..model.control_interface import SetPoint
 from ..model.fingertip import require_one
-from ..model.laws import LAWS, import_part, law_parameters
+from ..model.laws import LAWS, import_part, law_parameters, select_law
 from ..model.trajectory import Path, Trajectory
 
 if TYPE_CHECKING:  # a part that is left out is never imported, see `import_part`
@@ -240,6 +240,8 @@ class Scene(Described):
             raise ParameterError("blister", "radius", rule, f"{self.blister.radius:g} m")
         if self.bodies:
             self._refuse_beside_bodies()
+        if getattr(self.valve, "law", "") == "motor":
+            self._refuse_beside_motors()
         lasts = self.lasting
         if self.simulation.duration == 0.0:
             if lasts == 0.0:
@@ -263,6 +265,23 @@ class Scene(Described):
         if any(self.list_parts("hand")):
             rule = "must be left out beside [[body]], where paths are prescribed"
             raise ParameterError("hand", "", rule, "a hand")
+
+    def _refuse_beside_motors(self) -> None:
+        """Refuse what motors do not have, and a force that is no pressure on a pin."""
+        if self.conduit:
+            rule = "must be absent with valve.law = motor: a motor has no fluid"
+            raise ParameterError("conduit", "", rule, "a conduit", 'Set conduit = "absent".')
+        for section in ("supply", "fluid"):
+            part = getattr(self, section)
+            if part != type(part)():
+                rule = (
+                    "must be left out with valve.law = motor, which has neither pressure nor fluid"
+                )
+                raise ParameterError(section, "", rule, str(part))
+        force, most = select_law("valve", self.valve).stall_force, 1e10 * self.actuator.area
+        if force > most:
+            rule = f"must be at most {most:.3g} N on this actuator.bore"
+            raise ParameterError("valve", "stall_force", rule, f"{force:g} N")
 
     def _refuse_wrong_parts(self) -> None:
         """Refuse parts that are not of the classes of their sections, or not of the control method.

@@ -315,13 +315,13 @@ class StepWorkspace:
         return self.force
 
     def _conduct(self) -> None:
-        """Compute the conductances of the valves without load; the sign selects the reservoir."""
+        """Compute the conductances of the valves without load, and what steers them."""
         cell, opening, size = self.plan.cell, self.opening, self.size
         if self.plan.laminar:
             cell.flow.laminar_conductance(opening, size)
         else:
             size[:] = cell.flow.conductance(opening, cell.supply.pressure(opening))
-        np.copysign(size, opening, self.signed)
+        cell.supply.steer(size, opening, self.signed)
 
     def _press(self) -> None:
         """Move the block step by step, with the pulp over its first k cells, those under the fingertip."""
@@ -396,7 +396,7 @@ class StepWorkspace:
     def _find_near_overflow(self, s: int, beyond: Flags) -> Flags:
         """Clear the cells (5, k[, b]) beyond the limits of step s if their limit is that of laminar flow."""
         # A shut valve has no flow: its pin is locked at any load that does not overflow.
-        shut = ~self.opening[self.plan.nodes[s], : len(self.near)].any(axis=0)
+        shut = ~self.size[self.plan.nodes[s], : len(self.near)].any(axis=0)
         beyond[:3] &= ~shut | (self.guarded[:3] >= 0.5 * LARGE)
         return beyond
 

@@ -85,9 +85,9 @@ class TogetherPlan:
         openings = plan.response[: len(plan.weights)].dot(valves)
         pressure = cell.supply.pressure(openings)
         size = cell.flow.conductance(openings, pressure)
-        free = plan.moves[count : 3 * count].dot(
-            np.concatenate([size, np.copysign(size, openings)])
-        )
+        steered = np.empty_like(size)
+        cell.supply.steer(size, openings, steered)
+        free = plan.moves[count : 3 * count].dot(np.concatenate([size, steered]))
         openings, pressure = (
             rows[:, None].repeat(len(fingers) + 1, axis=1) for rows in (openings, pressure)
         )
