@@ -9,6 +9,7 @@ import pytest
 from digiclay.core.base.errors import DigiclayError
 from digiclay.core.base.modes import Mode
 from digiclay.core.batch.run_together import run_together
+from digiclay.core.control.device_info import DeviceInfo
 from digiclay.core.control.orders import Orders, Verb, repeat_order
 from digiclay.core.engine.simulation import begin, periods
 from digiclay.core.model.laws import law_parameters
@@ -100,7 +101,7 @@ def test_a_motor_stalls_at_its_command_s_share_of_the_stall_force_or_at_all_of_i
 @pytest.mark.parametrize("hold", ["back_drivable", "braked"])
 def test_without_a_command_a_load_moves_only_the_back_drivable_pin(hold, depth):
     finger = path((0.0, 0.0, 0.0, 41.0), (0.5, 0.0, 0.0, 40.0 - depth))
-    for stepper, step in (("bernoulli", PERIOD), ("runge_kutta_4", 0.1e-3)):
+    for stepper, step in (("bernoulli", PERIOD), ("runge_kutta_4", 0.5e-3)):
         if stepper == "runge_kutta_4" and (hold, depth) == ("braked", 30.0):
             continue  # a force of 1e24 N
         system = one_cell(stepper=stepper, step=step, **motor(hold))
@@ -172,19 +173,32 @@ def test_heights_tell_the_force_at_every_command_also_at_none():
     assert np.abs(np.array(read[1:]) - 0.5 * np.add(force[1:], force[:-1])).max() < 1e-3
 
 
-@pytest.mark.parametrize("method", ["virtual_master", "hybrid", "elastic"])
-@pytest.mark.parametrize("hold", ["back_drivable", "braked"])
-def test_runs_of_different_motors_are_the_same_alone_and_in_a_batch(hold, method):
+@table(
+    "method, hold, count",
+    {
+        "two runs of a behavior": ("elastic", "back_drivable", 2),
+        "two runs of Method III": ("hybrid", "back_drivable", 2),
+        "masters one by one": ("virtual_master", "braked", 2),
+        "masters in arrays": ("virtual_master", "back_drivable", 64),
+    },
+)
+def test_runs_of_different_motors_are_the_same_alone_and_in_a_batch(method, hold, count):
     first = pressed(hold, control={"method": method})
     scenes = [
-        first.with_sections(valve=replace(first.valve, stall_force=stall, free_speed=speed))
-        for stall, speed in ((0.3, 24e-3), (0.2, 30e-3), (0.4, 20e-3))
+        first.with_sections(valve=replace(first.valve, free_speed=speed))
+        for speed in np.linspace(30e-3, 20e-3, count).tolist()
     ]
-    alone = [run(scene).history["height"] for scene in scenes]
-    assert np.abs(alone[0] - alone[1]).max() > 1e-6
+    alone = {number: run(scenes[number]).history["height"] for number in (0, count - 1)}
+    assert np.abs(alone[0] - alone[count - 1]).max() > 1e-6
     for number, result in run_together(scenes):
-        # Sums in another order.
-        assert_near(result.history["height"], alone[number], 1e-9)
+        if number in alone:  # sums in another order
+            assert_near(result.history["height"], alone[number], 1e-9)
+
+
+@pytest.mark.parametrize("hold, limit", [("back_drivable", math.inf), ("braked", STALL)])
+def test_only_a_braked_pin_is_locked_when_its_load_is_more_than_the_stall_force(hold, limit):
+    system = one_cell(**motor(hold))
+    assert DeviceInfo(system.grid, system.cell, PERIOD).overload == pytest.approx(limit)
 
 
 def test_pins_under_two_fingers_yield_as_much_as_under_one():

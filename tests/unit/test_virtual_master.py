@@ -19,6 +19,7 @@ from digiclay.core.control.virtual_master import (
 )
 from digiclay.core.model.conduit import Conduit
 from digiclay.core.model.control_interface import Measurement
+from digiclay.core.model.laws import law_parameters
 from digiclay.core.model.layout import Layout, make_grid
 from digiclay.core.model.valve import Fluid, Valve
 
@@ -202,6 +203,7 @@ CELLS = {
     "a thin conduit": {"conduit": Conduit(diameter=0.3e-3)},
     "a gap as wide as the opening": {"valve": Valve(gap="opening")},
     "turbulent": {"valve": Valve(orifice_diameter=2e-3), "fluid": Fluid(viscosity=1e-6)},
+    "a motor": {"valve": law_parameters("valve")(law="motor"), "conduit": None},
 }
 
 
@@ -210,8 +212,8 @@ CELLS = {
 def test_the_speed_is_that_of_the_valve_s_flow_law(name, opening):
     one = make_system(**CELLS[name]).cell
     assert (one.flow.knee <= one.supply.largest) == (name == "turbulent")
-    supply = one.supply.high if opening > 0.0 else one.supply.low
-    flow = one.flow.flow(np.array([opening]), np.array([supply]))[0]
+    openings = np.array([opening])
+    flow = one.flow.flow(openings, one.supply.pressure(openings))[0]
     # Another order of the same few products: rounding.
     assert make_master_cell(one, 5e-3).speed(opening) == pytest.approx(
         flow / one.actuator.area, rel=1e-14
