@@ -173,7 +173,10 @@ def _pins(scene: Scene, system: System) -> Iterator[tuple[str, str]]:
     )
     lift, pull = supply.high * actuator.area, (0.0 - supply.low) * actuator.area
     yield "stall", f"{lift:.3g} N up, {pull:.3g} N down, valve wide open"
-    yield "shut valve", "holds any load, rigid; 0 mm of leak per minute"
+    if supply.locks:
+        yield "shut valve", "holds any load, rigid; 0 mm of leak per minute"
+    else:
+        yield "command 0", f"yields {1e3 * up / lift:.3g} mm/s per N"
     for fingers, contact in _list_parts(scene, "contact"):
         if contact is not None:
             law = select_law("contact", contact)
