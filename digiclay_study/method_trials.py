@@ -16,7 +16,7 @@ from digiclay.core.metrics.summary import compute_metrics, perceive
 from digiclay.core.model.trajectory import Path, Waypoint
 from digiclay.core.scene.recorder import Recorder
 from digiclay.core.scene.schema import Scene
-from digiclay.core.session.run_scene import run, select_rows
+from digiclay.core.session.run_scene import Result, run, select_rows
 from digiclay.core.studies.nominal_relief import measure_relief
 from digiclay.core.studies.speed_limits import (
     Criterion,
@@ -302,19 +302,25 @@ def measure_trial(
     estimated = done.estimate_errors(stopped=stopped) if errors else done
     if done.incomplete or estimated is None:
         return None
-    figures = {**done.figures, **{name: estimated.metrics.get(name) for name in ERRORS}}
+    figures = judge_trial(done, phase)
+    figures |= {name: estimated.metrics.get(name) for name in ERRORS}
+    figures["period_cost"] = spent / done.periods
+    return {"figures": {name: figures.get(name) for name in OUTCOMES}}
+
+
+def judge_trial(done: Result, phase: tuple[float, float] | None) -> Record:
+    """Return the figures of a finished trial; of a drag or lift those of its phase: start, end, s."""
+    figures = dict(done.figures)
     figures["losses"] = float(len(find_unintended_losses(done)))
     if phase is not None:
         judged, part = judge(done, *phase, 0.0), select_rows(done.history, *phase)
-        metrics = compute_metrics(part, scene.set_point)
+        metrics = compute_metrics(part, done.scene.set_point)
         figures |= {name: metrics[name] for name in ("lag_mean", "lag_max", "max_total_force")}
         figures |= {"rfd": metrics["rfd_session"], "losses": float(judged.losses)}
         figures["contact_loss_share"] = judged.loss_share
         figures |= perceive(figures["rfd"], figures["set_point"], figures["ridge_unevenness"])
-    relief = measure_relief(scene, done.history, figures["ridge_offset"])
-    figures |= {"relief_rms": relief.rms, "relief_largest": relief.largest}
-    figures["period_cost"] = spent / done.periods
-    return {"figures": {name: figures.get(name) for name in OUTCOMES}}
+    relief = measure_relief(done.scene, done.history, figures["ridge_offset"])
+    return {**figures, "relief_rms": relief.rms, "relief_largest": relief.largest}
 
 
 def search_limit(scene: Scene, stopped: Stopped = None, *, way: Drag | Lift) -> Record | None:

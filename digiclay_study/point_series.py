@@ -205,9 +205,9 @@ class Subject:
         write_whole(path, format_table(varied, rows, results, list(names)).encode())
 
 
-def add_subject(parser: argparse.ArgumentParser, metrics: str) -> None:
+def add_subject(parser: argparse.ArgumentParser, metrics: str, *, required: bool = True) -> None:
     """Add the options of `read_subject`, and the seed. `metrics`: default of --metric."""
-    add_series(parser, "LOW:HIGH, LOW:HIGH:log or A,B,C", metrics)
+    add_series(parser, "LOW:HIGH, LOW:HIGH:log or A,B,C", metrics, required=required)
     add_options(parser, {"--seed N": (whole_number(1, 2**31), "default: 1", 1)})
 
 

@@ -26,6 +26,7 @@ from digiclay.core.studies.sweep_plan import format_csv, hash_points
 from digiclay.core.studies.uncertainty import Members, draw_members
 from digiclay.plots.sweep import read_unit
 
+from .case_study import run_cases
 from .indices import (
     ALLOWED,
     CONFIDENCE,
@@ -49,6 +50,8 @@ examples:
 A design of N x (parameters + 2) runs, with --second N x (2 parameters + 2). The folder holds study.md
 (start there), indices.csv, indices.png, points.csv with every run, and points/, a small file for each
 finished run; with --uncertain bands.csv, 95 % bands of each point. After Ctrl-C the same command continues.
+
+Without --vary the argument is a STUDY file, with [cases]: the least device that meets limits in all cases.
 """
 METRICS = "rfd,lag,oscillation,relief"
 PICTURE = "indices.png"
@@ -63,7 +66,7 @@ def add(commands: Any) -> None:
     )
     purpose = "find which parameters matter for which metric"
     parser = add_command(commands, "study", purpose, EXAMPLES, description, carry_out=carry_out)
-    add_subject(parser, METRICS)
+    add_subject(parser, METRICS, required=False)
     add_options(
         parser,
         {
@@ -86,6 +89,10 @@ def _read_samples(text: str) -> int:
 
 def carry_out(arguments: Namespace) -> int:
     """Run what is not done yet, and write tables, page and plot."""
+    if not arguments.vary:
+        if arguments.second or arguments.uncertain or arguments.metric != METRICS:
+            raise OutputError("--metric, --second and --uncertain are for a study with --vary.")
+        return run_cases(arguments)
     refuse_without("digiclay study", "study", "SALib", "matplotlib")
     arguments.parts = [*arguments.parts, *arguments.uncertain]
     subject = read_subject(arguments)

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from digiclay.core.base.arrays import Cells, Flags, Floats
+from digiclay.core.metrics.metric_table import Metric
 from digiclay.core.metrics.summary import find_weber_fractions
 from digiclay.core.studies.evaluation import FIGURES
-from digiclay.plots.figure import INK, LINES, SHADE, STYLE, empty
+from digiclay.plots.figure import DASHES, INK, LINES, SHADE, STYLE, empty
 from digiclay.plots.sweep import read_unit
 
 from .indices import CONFIDENCE, Indices
@@ -261,4 +262,35 @@ def draw_measures(league: Sequence[Row], methods: Sequence[str]) -> Figure:
                 panel.annotate(show_digits(mean.mean * factor), right, **beside)
             name_rows(panel, [row.method for row in league])
             panel.set(title=MEASURES[name].title, xlim=(0.0, 1.3 * max(panel.get_xlim()[1], 1e-9)))
+    return figure
+
+
+#: Share of a limit below which an axis shows nothing.
+NEGLIGIBLE = 0.02
+
+
+def draw_limits(
+    minimized: str, limits: Mapping[Metric, float], curves: Mapping[str, Floats]
+) -> Figure:
+    """Draw the worst figures of candidates, a panel for each limit.
+
+    `curves`: (candidates, 1 + limits), what is minimized and the figures, SI, by name.
+    """
+    from matplotlib.ticker import LogLocator, NullLocator
+
+    size = 1.0 + 5.4 * len(limits), 5.2
+    with panels("Worst cases", *size, 1, len(limits)) as (figure, axes):
+        for column, (panel, (metric, most)) in enumerate(zip(axes, limits.items(), strict=True), 1):
+            for number, (name, curve) in enumerate(curves.items()):
+                rows = curve[np.isfinite(curve[:, column])]
+                look = {"color": LINES[number % len(LINES)], "marker": MARKS[number % len(MARKS)]}
+                panel.plot(rows[:, 0], metric.factor * rows[:, column], label=name, **look)
+            limit = metric.factor * most
+            panel.axhline(limit, color=INK, linestyle=DASHES, linewidth=1.2, label="limit")
+            panel.set(xlabel=minimized, ylabel=metric.title, yscale="log")
+            panel.set_ylim(bottom=max(panel.get_ylim()[0], NEGLIGIBLE * limit))
+            panel.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+            panel.yaxis.set_minor_locator(NullLocator())
+            panel.yaxis.set_major_formatter("{x:g}")
+        figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower right", ncols=4)
     return figure

@@ -22,10 +22,17 @@ from .stop import STOPPED, Stop
 from .worker import count_cores
 
 
-def add_series(parser: ArgumentParser, syntax: str, metrics: str, varied: str = "RANGE") -> None:
+def add_series(
+    parser: ArgumentParser,
+    syntax: str,
+    metrics: str,
+    varied: str = "RANGE",
+    *,
+    required: bool = True,
+) -> None:
     """Add SCENE and the options of what varies, by its `syntax`, what is measured, where, and how."""
     add_scene(parser)
-    several = {"action": "append", "required": True, "help": f"{syntax}; may be repeated"}
+    several = {"action": "append", "required": required, "help": f"{syntax}; may be repeated"}
     add_options(
         parser,
         {

@@ -112,7 +112,7 @@ def read_parts(path: Path) -> list[Setting]:
 
 def write_word(value: object) -> str:
     """Return a value as the word of a `Setting`; a text without quotes where these are not needed."""
-    return value if isinstance(value, str) and _read_value(value) == value else format_value(value)
+    return value if isinstance(value, str) and read_value(value) == value else format_value(value)
 
 
 def load(path: Path, settings: Sequence[Setting] = ()) -> Scene:
@@ -210,7 +210,7 @@ def _override(table: Table, settings: Sequence[Setting]) -> Record:
     """Return the tables of a scene file, overridden by settings."""
     whole = dict(table)
     for key, text, _ in settings:
-        keys, value = split_key(key), _read_value(text)
+        keys, value = split_key(key), read_value(text)
         if keys[0] == FINGERS and len(keys) > 1 and FINGERS not in whole:
             rule = f"must begin with {', '.join(FINGER_SECTIONS[:-1])} or {FINGER_SECTIONS[-1]}"
             raise ParameterError(key, "", f"{rule}: the scene has one fingertip", text)
@@ -245,7 +245,7 @@ def _replace(table: Any, keys: Sequence[str], value: Any, above: str = "") -> An
 
 
 @lru_cache(maxsize=1024)
-def _read_value(text: str) -> Any:
+def read_value(text: str) -> Any:
     """Return the value of a setting: TOML, or else a bare text."""
     try:
         read = parse_tables(f"value = {text}")

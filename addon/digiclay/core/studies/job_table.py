@@ -147,7 +147,7 @@ def read_jobs(path: Path, more: Sequence[str] = ()) -> JobSeries:
         count = len(words) * len(methods) * len(changes)
         if count > MOST:
             raise ParameterError("scenes", "", f"must come to {MOST} jobs at most", f"{count} jobs")
-        files = [_find_scene(path, word) for word in words]
+        files = [find_scene(path, word) for word in words]
         for file in files:
             load(file)  # reports an error of the file itself first
         _refuse_twice("scenes", words, [os.path.abspath(file) for file in files])
@@ -236,7 +236,7 @@ def _flatten(table: Table, above: str = "") -> list[tuple[str, Any]]:
     return pairs
 
 
-def _find_scene(jobs: Path, word: str) -> Path:
+def find_scene(jobs: Path, word: str) -> Path:
     """Return the file of a scene: beside the JOBS file, or as `scene_source.find`."""
     beside = jobs.parent / word
     return find(str(beside)) if os.path.exists(beside) else find(word)

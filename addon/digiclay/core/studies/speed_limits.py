@@ -98,6 +98,32 @@ class Drag(Parameters):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
+class Stroke(Drag):
+    """Drag in any direction, anywhere on the bed."""
+
+    speed: float = quantity(10e-3, "of the drag", unit="m/s", above=0.0)
+    direction: float = quantity(
+        0.0, "from the x axis to the y axis, degrees", at_least=-360.0, at_most=360.0
+    )
+    x: float = quantity(0.0, "middle of the drag", unit="m")
+    y: float = quantity(0.0, "middle of the drag", unit="m")
+
+    def path(self, speed: float, rest: float) -> tuple[Path, float, float]:
+        """Return the fingertip's path, and start and end of the drag, s, for a surface at `rest`, m."""
+        path, start, end = super().path(speed, rest)
+        cosine, sine = (
+            math.cos(math.radians(self.direction)),
+            math.sin(math.radians(self.direction)),
+        )
+        turned = (
+            replace(point, position=(self.x + along * cosine, self.y + along * sine, height))
+            for point in path.waypoints
+            for along, _, height in [point.position]
+        )
+        return replace(path, waypoints=(*turned,)), start, end
+
+
+@dataclass(frozen=True, eq=False, repr=False)
 class Lift(Parameters):
     """Press, then lift straight up with a gentle start and end; its speed is the largest in between."""
 
@@ -140,11 +166,14 @@ def make_trial(scene: Scene, motion: Drag | Lift, speed: float) -> tuple[Scene, 
 
     Refuses a bed that the fingertip would leave.
     """
-    wide = (scene.layout.columns - 1) * scene.layout.pitch
-    if isinstance(motion, Drag) and wide < motion.length:
-        rule = f"must make the bed at least as wide as the drag, {motion.length:g} m"
-        raise ParameterError("layout", "columns", rule, f"{wide:g} m")
     path, start, end = motion.path(speed, scene.actuator.rest_height)
+    layout = scene.layout
+    sides = (layout.columns - 1) * layout.pitch, (layout.rows - 1) * layout.row_spacing
+    places = np.abs([point.position[:2] for point in path.waypoints])
+    for name, side, reach in zip(("columns", "rows"), sides, places.max(axis=0), strict=True):
+        if isinstance(motion, Drag) and side < 2.0 * reach:
+            rule = f"must make the bed at least as wide as the drag, {2.0 * reach:g} m"
+            raise ParameterError("layout", name, rule, f"{side:g} m")
     shorter = replace(scene.simulation, duration=0.0)
     alone = replace(scene, fingers=scene.fingers[:1])
     return alone.with_sections(trajectory=path, simulation=shorter, recorder=Recorder()), start, end
