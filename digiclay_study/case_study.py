@@ -99,7 +99,7 @@ class Study(NamedTuple):
     def find_amount(self, scene: Scene) -> float:
         """Return what is minimized: the number of valves, or a parameter."""
         if self.minimized == "valves":
-            return scene.cells
+            return scene.drive.count_valves(scene.layout) if scene.drive else scene.cells
         numbers = find_numbers(scene, self.minimized)
         if len(numbers) != 1:
             rule = "must be valves or a parameter that is a number"
