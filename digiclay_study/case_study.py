@@ -5,17 +5,18 @@ The parameters of a STUDY file are those of a scene and of the `Stroke`, ``strok
 
 import math
 from argparse import Namespace
-from collections.abc import Sequence
-from functools import partial
+from collections.abc import Mapping, Sequence
+from functools import lru_cache, partial
 from itertools import product
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from digiclay import __version__
 from digiclay.commands.arguments import settings_of
-from digiclay.commands.evaluation_pool import Evaluation, run_series
+from digiclay.commands.evaluation_pool import run_series
 from digiclay.core.base.arrays import Floats
-from digiclay.core.base.errors import DigiclayError, ParameterError, SceneError
+from digiclay.core.base.errors import ParameterError, SceneError
 from digiclay.core.engine.simulation import Stopped
 from digiclay.core.files.run_folder import write_whole
 from digiclay.core.files.tables import (
@@ -37,11 +38,13 @@ from digiclay.core.scene.scene_source import (
     write_word,
 )
 from digiclay.core.scene.schema import Scene
-from digiclay.core.session.run_scene import run
-from digiclay.core.studies.axes import MOST, Point, find_numbers, refuse_twice
+from digiclay.core.session.run_scene import Result, run
+from digiclay.core.studies.axes import MOST, Point, find_numbers, make_axis, refuse_twice
+from digiclay.core.studies.evaluation import require_any
 from digiclay.core.studies.job_table import find_scene
 from digiclay.core.studies.speed_limits import Stroke, make_trial
 from digiclay.core.studies.sweep_plan import format_csv, hash_points, open_points
+from digiclay.plots.figure import save
 
 from .method_trials import OUTCOMES, judge_trial, lift_off
 from .study_plots import draw_limits
@@ -62,49 +65,31 @@ MEASURED: dict[str, Metric] = {
     ),
 }
 #: Tables of a STUDY file.
-TABLES = ("settings", "vary", "compare", "cases", "reference", "limits")
+TABLES = ("settings", "vary", "compare", "reference", "cases", "limits")
 STROKE = "stroke."
-
-
-class Case(NamedTuple):
-    """Run of a drag."""
-
-    words: tuple[str, ...]
-    """Values of what is compared and varied, and the case."""
-    scene: Scene
-    phase: tuple[float, float]
-    """Start and end of the drag, s."""
-
-    def make_point(self, number: int, reference: Record | None = None) -> Point:
-        """Return the run as a point, with the record of its reference if it has one."""
-        measure = partial(measure_case, phase=self.phase, reference=reference)
-        return Point(number, self.words, self.scene, measure=measure)
 
 
 class Study(NamedTuple):
     """Candidates over all cases."""
 
     minimized: str
-    compared: int
-    """How many keys are compared; the others are varied."""
     keys: tuple[str, ...]
-    """Of the words of a case."""
+    """Of the words of a point: what is compared, what varies, and the case."""
+    compared: int
+    """How many keys are compared."""
     limits: dict[str, float]
     """Most of metrics in every case, SI."""
-    references: list[Case]
-    cases: list[Case]
-    beside: list[int]
-    """The reference of each case."""
+    reference: Record
+    """Changes of each point for its reference."""
+    points: list[Point]
+    """The cases of a candidate, then those of the next one."""
+    amounts: list[float]
+    """What is minimized, of each point."""
 
-    def find_amount(self, scene: Scene) -> float:
-        """Return what is minimized: the number of valves, or a parameter."""
-        if self.minimized == "valves":
-            return scene.drive.count_valves(scene.layout) if scene.drive else scene.cells
-        numbers = find_numbers(scene, self.minimized)
-        if len(numbers) != 1:
-            rule = "must be valves or a parameter that is a number"
-            raise ParameterError("minimize", "", rule, repr(self.minimized))
-        return numbers[0]
+    @property
+    def cases(self) -> int:
+        """Number of cases."""
+        return len({point.words[-1] for point in self.points})
 
 
 def read_study(path: Path, given: Sequence[Setting] = ()) -> Study:
@@ -121,82 +106,109 @@ def read_study(path: Path, given: Sequence[Setting] = ()) -> Study:
 def _read(path: Path, table: Table, given: Sequence[Setting]) -> Study:
     """Read the tables of a STUDY file; ParameterError."""
     refuse_unknown("", table, ("scene", "minimize", *TABLES))
-    scene, minimized = (_require(table, key, str, "a text") for key in ("scene", "minimize"))
-    parts = {"compare": {}, "reference": {}, "settings": {}, **table}
-    settings, vary, compare, cases, reference, limits = (
-        _require(parts, key, dict, f"a section, [{key}]") for key in TABLES
-    )
+    name, minimized = (_require(table, key, str, "a text") for key in ("scene", "minimize"))
+    parts: Record = {"compare": {}, "reference": {}, "settings": {}, **table}
+    for key in TABLES:
+        _require(parts, key, dict, f"a section, [{key}]")
+    cases, limits = parts["cases"], parts["limits"]
     refuse_unknown("limits", limits, tuple(MEASURED))
-    for name in limits:
-        _require(limits, name, (int, float), "a number")
-    axes = dict(list_changes(compare)) | dict(list_changes(vary))
-    for key in axes:
-        _require(axes, key, list, "a list of values")
-    refuse_twice([*axes], given)
-    rows = list(product(*axes.values(), cases))
+    for key in limits:
+        if not 0.0 < _require(limits, key, (int, float), "a number") < math.inf:
+            rule = "must be a finite number above 0"
+            raise ParameterError("limits", key, rule, show_value(limits[key]))
+    if not limits:
+        raise ParameterError("limits", "", "must have a metric", "nothing")
+    compare, vary = (list(list_changes(parts[key])) for key in ("compare", "vary"))
+    axes = [make_axis(key, values) for key, values in (*compare, *vary)]
+    keys = [axis.key for axis in axes]
+    refuse_twice(keys, given)
+    rows = list(product(*(axis.words for axis in axes), cases))
     if not 0 < len(rows) <= MOST:
         raise ParameterError("vary", "", f"must come to 1 to {MOST} runs", f"{len(rows)} runs")
-    file, cache = find_scene(path, scene), ReadParts()
-    source = read_table(file)
-    common = dict(list_changes(settings)) | {key: read_value(word) for key, word, _ in given}
-    full = dict(list_changes(reference))
-    compared = len(dict(list_changes(compare)))
-    study = Study(minimized, compared, (*axes, "case"), limits, [], [], [])
-    known: dict[str, int] = {}
-    for *values, name in rows:
-        case = _require(cases, name, dict, "a table such as { stroke.direction = 30 }")
-        changes = common | dict(zip(axes, values, strict=True)) | dict(list_changes(case))
-        place = partial(_place, file, source, cache, (*map(write_word, values), name))
-        study.cases.append(place(changes))
-        study.find_amount(study.cases[-1].scene)
-        beside = place(changes | full)
-        number = known.setdefault(hash_points([beside.make_point(0)]), len(known))
-        study.beside.append(number)
-        if number == len(study.references):
-            study.references.append(beside)
-    return study
+    settings = _write_words(parts["settings"]) | {key: word for key, word, _ in given}
+    reference = _write_words(parts["reference"])
+    file, cache = find_scene(path, name), ReadParts()
+    place = partial(_place, file, read_table(file), cache)
+    points, amounts = list[Point](), list[float]()
+    for words in rows:
+        case = _require(cases, words[-1], dict, "a table such as { stroke.direction = 30 }")
+        changes = settings | dict(zip(keys, words, strict=False)) | _write_words(case)
+        scene, phase = place(changes)
+        full, _ = place(changes | reference)
+        measure = partial(measure_case, phase=phase, full=full)
+        points.append(Point(len(points), words, scene, measure=measure))
+        amounts.append(_count(scene, minimized))
+    every = (*keys, "case")
+    return Study(minimized, every, len(compare), limits, reference, points, amounts)
+
+
+def _write_words(changes: Table) -> dict[str, str]:
+    """Return changes as words of settings."""
+    return {key: write_word(value) for key, value in list_changes(changes)}
 
 
 def _require(table: Table, key: str, kind: Any, wanted: str) -> Any:
     """Return the value of a key, of a kind."""
     value = table.get(key)
     if not isinstance(value, kind) or isinstance(value, bool) or value != value:
-        raise ParameterError(key, "", f"must be {wanted}", show_value(value))
+        raise ParameterError(
+            key, "", f"must be {wanted}", "none" if value is None else show_value(value)
+        )
     return value
 
 
 def _place(
-    file: Path, source: Table, cache: ReadParts, words: tuple[str, ...], changes: Record
-) -> Case:
-    """Return the run of a scene with changes."""
-    stroke = {key.removeprefix(STROKE): changes[key] for key in changes if key.startswith(STROKE)}
-    settings = [
-        Setting(key, write_word(value), "STUDY")
-        for key, value in changes.items()
-        if not key.startswith(STROKE)
-    ]
+    file: Path, source: Table, cache: ReadParts, changes: Mapping[str, str]
+) -> tuple[Scene, tuple[float, float]]:
+    """Return a scene with changes that drags and lifts, and start and end of the drag, s."""
+    settings = [Setting(key, word, "STUDY") for key, word in changes.items()]
+    stroke = {
+        key.removeprefix(STROKE): read_value(word)
+        for key, word, _ in settings
+        if key.startswith(STROKE)
+    }
+    settings = [each for each in settings if not each.key.startswith(STROKE)]
     scene = make_scene(file, source, settings, cache)
     motion = read_part("stroke", Stroke, {}, stroke)
     trial, start, end = make_trial(scene, motion, motion.speed)
-    return Case(words, lift_off(trial), (start, end))
+    return lift_off(trial), (start, end)
+
+
+def _count(scene: Scene, minimized: str) -> float:
+    """Return what is minimized: the number of valves, or a parameter."""
+    if minimized == "valves":
+        return scene.drive.count_valves(scene.layout) if scene.drive else scene.cells
+    numbers = find_numbers(scene, minimized)
+    if len(numbers) != 1:
+        rule = "must be valves or a parameter that is a number"
+        raise ParameterError("minimize", "", rule, repr(minimized))
+    return numbers[0]
 
 
 def measure_case(
-    scene: Scene, stopped: Stopped, *, phase: tuple[float, float], reference: Record | None
+    scene: Scene, stopped: Stopped, *, phase: tuple[float, float], full: Scene
 ) -> Record | None:
-    """Run a case; return its figures, also those beside a reference, or the relief that it leaves."""
+    """Run a case, and its reference `full`; return the record, None after a stop."""
     done = run(scene, stopped=stopped)
     if done.incomplete:
         return None
-    judged = judge_trial(done, phase)
-    figures = {name: judged.get(name) for name in OUTCOMES}
-    relief = done.history["height"][-1] - done.history["height"][0]
-    if reference is None:
-        return {"figures": figures, "relief": np.round(relief, 9).tolist()}
-    rfd, wanted = figures["rfd"], reference["figures"]["rfd"]
-    ratio = rfd / wanted if rfd is not None and wanted else None
-    beside = compare_relief(relief, np.array(reference["relief"]))
-    return {"figures": {**figures, "rfd_ratio": ratio, **beside}}
+    figures, relief = _judge(done, phase)
+    beside, wanted = _run_reference(full, phase)
+    ratio = figures["rfd"] / beside["rfd"] if figures["rfd"] and beside["rfd"] else None
+    figures |= {"rfd_ratio": ratio, **compare_relief(relief, wanted)}
+    return {"figures": {name: figures.get(name) for name in MEASURED}}
+
+
+@lru_cache
+def _run_reference(scene: Scene, phase: tuple[float, float]) -> tuple[Record, Floats]:
+    """Run a reference, once in a process; return its figures and relief."""
+    return _judge(run(scene), phase)
+
+
+def _judge(done: Result, phase: tuple[float, float]) -> tuple[Record, Floats]:
+    """Return the figures of a finished case, and the relief it leaves behind, (n,), m."""
+    height = done.history["height"]
+    return judge_trial(done, phase), height[-1] - height[0]
 
 
 def compare_relief(relief: Floats, reference: Floats) -> dict[str, float | None]:
@@ -209,30 +221,25 @@ def compare_relief(relief: Floats, reference: Floats) -> dict[str, float | None]
 def run_cases(arguments: Namespace) -> int:
     """Run what is not done yet, and write table, page and plot."""
     study = read_study(find(arguments.scene), settings_of(arguments))
-    first = len(study.references)
-    every = [*study.references, *study.cases]
-    points = [case.make_point(number) for number, case in enumerate(every)]
-    description = {"keys": list(study.keys), "scenes": hash_points(points)}
-
-    def evaluate(evaluation: Evaluation) -> None:
-        evaluation.finish([(point,) for point in points[:first]], study.keys)
-        records = evaluation.collect()
-        failed = [record["error"] for record in records.values() if "error" in record]
-        if failed and len(records) == first:
-            raise DigiclayError(f"A reference fails: {failed[0]}")
-        if all(number in records for number in range(first)):
-            numbered = enumerate(zip(study.cases, study.beside, strict=True), first)
-            beside = (case.make_point(number, records[at]) for number, (case, at) in numbered)
-            evaluation.finish([(point,) for point in beside], study.keys)
+    description = {
+        "digiclay": __version__,
+        "keys": list(study.keys),
+        "reference": study.reference,
+        "scenes": hash_points(study.points),
+    }
 
     def describe(there: Table) -> str:
         return f"over {', '.join(there['keys'])}"
 
-    def write(records: dict[int, Record]) -> list[str]:
-        return _write(arguments.out, study, [records[point.index] for point in points[first:]])
-
-    opened = open_points(arguments.out, "study", description, describe)
-    return run_series(arguments, "study", len(points), opened, evaluate, write, noun="runs")
+    return run_series(
+        arguments,
+        "study",
+        len(study.points),
+        open_points(arguments.out, "study", description, describe),
+        lambda evaluation: evaluation.finish([(point,) for point in study.points], study.keys),
+        partial(_write, arguments.out, study),
+        noun="runs",
+    )
 
 
 class Candidate(NamedTuple):
@@ -241,42 +248,47 @@ class Candidate(NamedTuple):
     amount: float
     excess: float
     """Largest figure over its limit; at most 1 if the candidate meets all."""
-    figures: tuple[float, ...]
+    figures: Sequence[float]
     """By limit, SI; infinite where a case has none."""
-    words: tuple[str, ...]
+    words: Sequence[str]
 
 
 def find_least(candidates: Sequence[Candidate]) -> Candidate:
     """Return the least candidate that meets all limits, or the nearest one."""
     meeting = [each for each in candidates if each.excess <= 1.0]
-    return min(meeting) if meeting else min(candidates, key=lambda each: each.excess)
+    if meeting:
+        return min(meeting, key=lambda each: (each.amount, each.excess))
+    return min(candidates, key=lambda each: each.excess)
 
 
-def _write(out: Path, study: Study, records: Sequence[Record]) -> list[str]:
-    """Write table, plot and page of finished cases; return the answers."""
-    from digiclay.plots.figure import save
-
-    amounts = [study.find_amount(case.scene) for case in study.cases]
-    figures = np.full((len(records), len(study.limits)), math.inf)
-    for row, record in zip(figures, records, strict=True):
-        found = map(record.get("figures", {}).get, study.limits)
-        row[:] = [math.inf if value is None else value for value in found]
-    heads = [*study.keys, study.minimized, *study.limits, "error"]
-    rows = [
-        [*case.words, amount, *row, record.get("error", "")]
-        for case, amount, row, record in zip(study.cases, amounts, figures, records, strict=True)
-    ]
-    write_whole(out / "runs.csv", format_csv([heads, *rows]).encode())
-    each = len({case.words[-1] for case in study.cases})
+def find_candidates(study: Study, figures: Floats) -> dict[str, list[Candidate]]:
+    """Return the candidates by the values compared. `figures`: (points, limits), SI."""
+    worst = figures.reshape(-1, study.cases, len(study.limits)).max(axis=1)
+    excess = (worst / list(study.limits.values())).max(axis=1)
     groups: dict[str, list[Candidate]] = {}
-    for start in range(0, len(records), each):
-        worst = figures[start : start + each].max(axis=0)
-        excess = max(worst / np.maximum(list(study.limits.values()), 1e-300))
-        words = study.cases[start].words[:-1]
-        group = groups.setdefault(", ".join(words[: study.compared]), [])
-        group.append(
-            Candidate(amounts[start], excess, tuple(worst.tolist()), words[study.compared :])
+    firsts = zip(study.points[:: study.cases], study.amounts[:: study.cases], strict=True)
+    for number, (point, amount) in enumerate(firsts):
+        compared, words = point.words[: study.compared], point.words[study.compared : -1]
+        candidate = Candidate(amount, excess[number], worst[number].tolist(), words)
+        groups.setdefault(", ".join(compared), []).append(candidate)
+    return groups
+
+
+def _write(out: Path, study: Study, records: dict[int, Record]) -> list[str]:
+    """Write table, plot and page of finished points; return the answers."""
+    found = [records[point.index] for point in study.points]
+    require_any(found)
+    values = [[each.get("figures", {}).get(name) for name in study.limits] for each in found]
+    rows = [
+        [*point.words, amount, *row, record.get("error", "")]
+        for point, amount, row, record in zip(
+            study.points, study.amounts, values, found, strict=True
         )
+    ]
+    heads = [*study.keys, study.minimized, *study.limits, "error"]
+    write_whole(out / "runs.csv", format_csv([heads, *rows]).encode())
+    figures = np.array(values, dtype=np.float64)
+    groups = find_candidates(study, np.where(np.isnan(figures), np.inf, figures))
     limits = {MEASURED[name]: most for name, most in study.limits.items()}
     curves = {
         name: np.array([(each.amount, *each.figures) for each in sorted(group)])
@@ -284,7 +296,7 @@ def _write(out: Path, study: Study, records: Sequence[Record]) -> list[str]:
     }
     save(draw_limits(study.minimized, limits, curves), out / "limits.png")
     answers = [f"{name} {_answer(study, group)}".strip() for name, group in groups.items()]
-    page = [f"# Least {study.minimized}", *answers, "![Worst cases](limits.png)"]
+    page = [f"# Least {study.minimized}", *answers, "![Worst cases](limits.png)\n"]
     write_whole(out / "study.md", "\n\n".join(page).encode())
     return [*answers, f"written to {out}: start with study.md"]
 
@@ -296,11 +308,8 @@ def _answer(study: Study, candidates: Sequence[Candidate]) -> str:
         f"{name} {value:.3g} (at most {most:g})"
         for (name, most), value in zip(study.limits.items(), best.figures, strict=True)
     )
-    words = ", ".join(best.words)
-    text = f"{study.minimized} {best.amount:g} ({words}), {', '.join(worst)}"
+    text = f"{study.minimized} {best.amount:g} ({', '.join(best.words)}), {', '.join(worst)}"
     if best.excess > 1.0:
         return f"none meets the limits; nearest: {text}"
-    failing = sorted(
-        each.amount for each in candidates if each.excess > 1.0 and each.amount > best.amount
-    )
-    return text + "".join(f"; not with {amount:g}" for amount in failing)
+    larger = (each for each in sorted(candidates) if each.amount > best.amount)
+    return text + "".join(f"; not with {each.amount:g}" for each in larger if each.excess > 1.0)

@@ -7,10 +7,17 @@ import numpy as np
 import pytest
 from digiclay.cli import main
 from digiclay.commands.stop import STOPPED
+from digiclay.core.scene.scene_source import load
 from digiclay.core.session.run_scene import run, select_rows
+from digiclay.core.studies.speed_limits import Stroke, make_trial
 
-from digiclay_study.case_command import Candidate, find_least
-from digiclay_study.case_study import Stroke, compare_relief, divide, read_study
+from digiclay_study.case_study import (
+    Candidate,
+    compare_relief,
+    find_candidates,
+    find_least,
+    read_study,
+)
 from tests.scene_files import SMALL_BLISTER, interrupt_after, read_text, rows, write_text
 
 BED = f"[layout]\nrows = 5\ncolumns = 7\n{SMALL_BLISTER}"
@@ -32,11 +39,10 @@ across = { stroke.direction = 90, stroke.length = "6 mm" }
 valve.stroke = "45 um"
 
 [limits]
+rfd_ratio = 1.5
 relief_deviation = 0.05
-
-[ratios]
-rfd = 1.5
 """
+ACROSS = Stroke(direction=90.0, length=6e-3, press=3e-3, height=1e-3, approach=20e-3, speed=20e-3)
 COMMAND = ["study", "study.toml", "--workers", "1", "--out", "out", "--quiet"]
 
 pytestmark = pytest.mark.usefixtures("here")
@@ -55,17 +61,18 @@ def square(history, start, end):
 
 
 @pytest.mark.parametrize(
-    "direction, offset, first, last",
+    "direction, middle, first, last",
     [
         (0.0, (0.0, 0.0), (-0.021, 0.0), (0.021, 0.0)),
         (90.0, (0.0, 0.0015), (0.0, -0.0195), (0.0, 0.0225)),
         (30.0, (0.001, 0.0), (0.001 - 0.021 * 3**0.5 / 2, -0.0105), (0.001 + 0.021 * 3**0.5 / 2, 0.0105)),
     ],
 )  # fmt: skip
-def test_a_stroke_is_a_straight_drag_in_its_direction_through_its_offset(
-    direction, offset, first, last
+def test_a_stroke_is_a_straight_drag_in_its_direction_through_its_middle(
+    direction, middle, first, last
 ):
-    path, start, end = Stroke(direction=direction, offset=offset).path(0.01, 0.04)
+    stroke = Stroke(direction=direction, x=middle[0], y=middle[1])
+    path, start, end = stroke.path(0.01, 0.04)
     x, y, z = path.trajectory().poses(np.linspace(start, end, 5))[:, :3].T
     np.testing.assert_allclose(x, np.linspace(first[0], last[0], 5), atol=1e-12)
     np.testing.assert_allclose(y, np.linspace(first[1], last[1], 5), atol=1e-12)
@@ -76,39 +83,37 @@ def test_the_values_of_a_study_are_those_of_its_runs_and_a_finished_folder_has_o
     study = read_study(place())
     assert main(COMMAND) == 0
     found = rows(Path("out/runs.csv"))
-    assert (len(found), len(list(Path("out/points").iterdir()))) == (4, 4 + 2)
-    across = study.references[1]
-    history = {across.number: run(across.scene).history}
-    for row, trial in zip(found[1::2], study.trials[1::2], strict=True):
-        history[trial.case.number] = run(trial.case.scene).history
-        ended, reference = history[trial.case.number], history[trial.reference]
-        left, wanted = (each["height"][-1] - 0.04 for each in (ended, reference))
-        # Heights of the reference are kept to a nanometer.
-        off = np.linalg.norm(left - wanted) / np.linalg.norm(wanted)
-        assert float(row["relief_deviation"]) == pytest.approx(off, rel=1e-4, abs=1e-6)
-        squares = (square(each, *trial.case.phase) for each in (ended, reference))
-        ratio = math.sqrt(next(squares) / next(squares))
-        assert float(row["rfd ratio"]) == pytest.approx(ratio, rel=1e-9)
+    across = make_trial(load(Path("bed.toml")), ACROSS, ACROSS.speed)
+    assert len(found) == 4
+    wide = run(study.points[3].scene).history  # that of the reference
+    assert [float(row["rfd_ratio"]) for row in found[2:]] == [1.0, 1.0]
+    assert [float(row["relief_deviation"]) for row in found[2:]] == [0.0, 0.0]
+    narrow = run(study.points[1].scene).history
+    left, wanted = (each["height"][-1] - 0.04 for each in (narrow, wide))
+    off = np.linalg.norm(left - wanted) / np.linalg.norm(wanted)
+    assert float(found[1]["relief_deviation"]) == pytest.approx(off, rel=1e-9)
+    ratio = math.sqrt(square(narrow, *across[1:]) / square(wide, *across[1:]))
+    assert float(found[1]["rfd_ratio"]) == pytest.approx(ratio, rel=1e-9)
     before = {path: path.stat().st_mtime_ns for path in Path("out/points").iterdir()}
-    place(STUDY.replace("rfd = 1.5", "rfd = 1e9").replace("= 0.05", "= 1e9"))
+    place(STUDY.replace("= 1.5", "= 1e9").replace("= 0.05", "= 1e9"))
     assert main(COMMAND) == 0
     assert {path: path.stat().st_mtime_ns for path in before} == before
-    assert "valve.stroke 0.015 mm" in read_text(Path("out/study.md"))
+    assert "valve.stroke 1.5e-05 (15 um)" in read_text(Path("out/study.md"))
 
 
-def test_a_study_that_was_stopped_at_a_reference_and_at_a_candidate_goes_on_to_the_same_tables(
-    monkeypatch,
+def test_a_study_that_was_stopped_goes_on_to_the_same_table_and_another_reference_is_refused(
+    monkeypatch, refused
 ):
     place()
-    for count, more in ((1, 1), (3, 2)):
-        with monkeypatch.context() as patched:
-            interrupt_after(more, patched)
-            assert main(COMMAND) == STOPPED
-        assert len(list(Path("out/points").iterdir())) == count
+    with monkeypatch.context() as patched:
+        interrupt_after(1, patched)
+        assert main(COMMAND) == STOPPED
+    assert len(list(Path("out/points").iterdir())) == 1
     assert main(COMMAND) == 0
     assert main([*COMMAND[:-2], "again", "--quiet"]) == 0
-    for name in ("runs.csv", "candidates.csv"):
-        assert read_text(Path("out") / name) == read_text(Path("again") / name)
+    assert read_text(Path("out/runs.csv")) == read_text(Path("again/runs.csv"))
+    place(STUDY.replace('[reference]\nvalve.stroke = "45 um"', ""))
+    refused(COMMAND, "out holds another study")
 
 
 @pytest.mark.parametrize(
@@ -125,19 +130,27 @@ def test_the_least_candidate_is_that_with_the_smallest_amount_within_all_limits(
     amounts, excesses, least
 ):
     candidates = [
-        Candidate((), (), amount, np.zeros(1), (), excess)
-        for amount, excess in zip(amounts, excesses, strict=True)
+        Candidate(amount, excess, (), ()) for amount, excess in zip(amounts, excesses, strict=True)
     ]
     assert find_least(candidates) is candidates[least]
 
 
-def test_what_has_no_value_exceeds_every_limit_and_a_flat_reference_has_no_deviation():
-    assert [divide(None, 1.0), divide(1.0, None), divide(1.0, 0.0), divide(0.0, 0.0)] == [
-        math.inf, math.inf, math.inf, 0.0
-    ]  # fmt: skip
-    assert compare_relief(np.ones(3), np.zeros(3))["relief_deviation"] is None
+def test_a_candidate_has_the_worst_figures_of_its_cases(here):
+    study = read_study(place())
+    figures = np.array([[1.2, 0.01], [1.0, 0.02], [np.inf, 0.0], [3.0, 0.0]])
+    (found,) = find_candidates(study, figures).values()
+    assert [each.figures for each in found] == [[1.2, 0.02], [np.inf, 0.0]]
+    assert [each.excess for each in found] == [pytest.approx(1.2 / 1.5), np.inf]
+    assert [(each.amount, *each.words) for each in found] == [
+        (pytest.approx(15e-6), "15 um"),
+        (pytest.approx(45e-6), "45 um"),
+    ]
+
+
+def test_a_deviation_is_relative_to_the_relief_of_the_reference_and_a_flat_one_has_none():
     found = compare_relief(np.array([3.0, 4.0, 1.0]), np.array([3.0, 4.0, 0.0]))
     assert found == {"relief_deviation": pytest.approx(0.2), "relief_deviation_largest": 1.0}
+    assert compare_relief(np.ones(3), np.zeros(3))["relief_deviation"] is None
 
 
 @pytest.mark.parametrize(
@@ -150,18 +163,20 @@ def test_what_has_no_value_exceeds_every_limit_and_a_flat_reference_has_no_devia
         ("[cases]", "[case]", "A study needs at least two --vary, or a STUDY file with [cases]."),
         ("along = {}", "[ratio]", "study.toml: ratio must be a known key"),
         ("along = {}", "along = 3", "study.toml: along must be a table such as"),
-        ('["15 um", "45 um"]', '"15 um"', "study.toml: vary.valve.stroke must be a list"),
-        ('"15 um", "45 um"', '"15 um", "15 um"', "study.toml: vary.valve.stroke must be a list"),
+        ('["15 um", "45 um"]', '"15 um"', "study.toml: valve.stroke must be varied over a list"),
+        ('"15 um", "45 um"', '"15 um", "15 um"', "valve.stroke must not have a value twice"),
         ('"15 um", "45 um"', '"0 um"', "valve.stroke must be above 0"),
         ("valve.stroke = [", "valve.stoke = [", "valve.stoke must be a known key"),
         ("direction = 90", "direction = nan", "study.toml: stroke.direction must be"),
         ("direction = 90", "directions = 90", "study.toml: stroke.directions must be a known key"),
-        ('length = "6 mm"', 'length = "17 mm"', "study.toml: stroke must keep the drag on the bed"),
+        ('length = "6 mm"', 'length = "17 mm"', "layout.rows must make the bed at least as wide as"),
         ('speed = "20 mm/s"', "speed = 0", "study.toml: stroke.speed must be above 0 m/s"),
         ("relief_deviation", "relief_deviatoin", "study.toml: limits.relief_deviatoin must be a"),
-        ("rfd = 1.5", "rfd = -1", "study.toml: ratios.rfd must be a number, 0 or above (got -1)."),
-        ("rfd = 1.5", 'rfd = "1"', "study.toml: ratios.rfd must be a number, 0 or above"),
-        ("[limits]\nrelief_deviation = 0.05\n\n[ratios]\nrfd = 1.5", "", "limits must not be empty"),
+        ("= 1.5", "= 0", "limits.rfd_ratio must be a finite number above 0 (got 0)."),
+        ("= 1.5", "= inf", "limits.rfd_ratio must be a finite number above 0 (got inf)."),
+        ("= 1.5", '= "1"', "study.toml: rfd_ratio must be a number (got '1')."),
+        ("rfd_ratio = 1.5\nrelief_deviation = 0.05", "", "limits must have a metric (got nothing)."),
+        ('["15 um", "45 um"]', "[]", "valve.stroke must be varied over at least one value"),
     ],
 )  # fmt: skip
 def test_a_mistake_is_told_in_one_line(old, new, message, refused):
