@@ -46,12 +46,14 @@ examples:
   digiclay study slow_press --vary control.force_gain=0.5:8:log --vary control.dead_band=1e-5:1e-4 --out which
   digiclay study my.toml --vary valve.stroke="20 um:40 um" --vary control.force_gain=1:6 --samples 128 \\
     --second --metric rfd,lag --out which
+  digiclay study valves.toml --out valves
 
 A design of N x (parameters + 2) runs, with --second N x (2 parameters + 2). The folder holds study.md
 (start there), indices.csv, indices.png, points.csv with every run, and points/, a small file for each
 finished run; with --uncertain bands.csv, 95 % bands of each point. After Ctrl-C the same command continues.
 
-Without --vary the argument is a STUDY file, with [cases]: the least device that meets limits in all cases.
+Without --vary SCENE is a STUDY file, with [cases]: the least device that meets limits in all cases. The
+folder then holds study.md, limits.png and runs.csv.
 """
 METRICS = "rfd,lag,oscillation,relief"
 PICTURE = "indices.png"

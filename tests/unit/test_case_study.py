@@ -158,7 +158,7 @@ def test_a_deviation_is_relative_to_the_relief_of_the_reference_and_a_flat_one_h
     [
         ('scene = "bed.toml"', "", "study.toml: scene must be a text (got none)."),
         ('"bed.toml"', '"bad.toml"', "bad.toml: there is no such file."),
-        ("minimize", "minimise", "study.toml: minimise must be a known key"),
+        ("minimize", "minimze", "study.toml: minimze must be a known key"),
         ('"valve.stroke"', '"valve.law"', "study.toml: minimize must be valves or a parameter"),
         ("[cases]", "[case]", "A study needs at least two --vary, or a STUDY file with [cases]."),
         ("along = {}", "[ratio]", "study.toml: ratio must be a known key"),
