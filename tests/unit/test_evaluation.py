@@ -279,15 +279,8 @@ def test_a_fault_in_a_stack_is_not_passed_over(here, monkeypatch, capsys):
         records = evaluate_bundle(some("control.force_gain=1,5"))
     assert [record and record["alone"] for record in records] == ["ZeroDivisionError: by zero"] * 2
     break_stacks(monkeypatch, MemoryError())
-    varied = [
-        "--vary",
-        "control.force_gain=1:5:4",
-        "--set",
-        "simulation.duration=0.1",
-        "--workers",
-        "1",
-    ]
-    assert main(["sweep", "tap", *varied, "--out", "out"]) == 0
+    line = "sweep tap --vary control.force_gain=1:5:4 --set simulation.duration=0.1 --workers 1"
+    assert main([*line.split(), "--out", "out"]) == 0
     assert (
         "\n4 points one at a time: there is not enough memory for a batch\n"
         in capsys.readouterr().out
