@@ -13,8 +13,18 @@ from digiclay.core.model.underside import Mesh
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.schema import Presser
 from digiclay.core.scene.toml_table import resolve
-from digiclay.core.session import given_bodies, snapshot
-from digiclay.core.session.take import Take, from_bytes, replay, to_bytes, to_scene
+from digiclay.core.session import accuracy, given_bodies, snapshot
+from digiclay.core.session.live_session import LiveSession, follow_path, start_recording
+from digiclay.core.session.take import (
+    Take,
+    from_bytes,
+    make_take,
+    play,
+    refine,
+    replay,
+    to_bytes,
+    to_scene,
+)
 from digiclay.core.shapes.body import Body
 
 SIDE = 20
@@ -127,6 +137,32 @@ def test_a_damaged_take_of_bodies_is_refused_in_a_line(monkeypatch, name, spoil)
     damaged = to_bytes(take())
     with pytest.raises(OutputError, match="damaged"):
         from_bytes(damaged)
+
+
+@pytest.mark.parametrize("step", ["5 ms", "1 ms"])
+def test_the_monitor_of_a_session_finds_the_error_under_bodies(step):
+    # The truth, of the first stretch: the same periods at a twentieth of the step. The commands
+    # differ by what the errors before them changed: the right size is asked for.
+    simulation = {"physics_step": step}
+    plain = resolve({"control": {"method": "plastic"}, "simulation": simulation})
+    scene = replace(plain, bodies=(Presser(Body(), plain.fingers[0].trajectory),))
+    system, poses, heights = assemble(scene), np.array([[0.0, 0.0, 0.2, *LEVEL]]), []
+    session = LiveSession(
+        scene=scene, system=system, state=begin(system), poses=poses, monitor=accuracy.start(scene)
+    )
+    session = start_recording(session, snapshot.dump(system, session.state))
+    for tick in range(accuracy.STRETCH + 1):  # four periods each: the reference lags behind
+        session = replace(session, aim=(ball(40e-3 - 5e-4 * tick, 2e-4 * tick),))
+        path = np.repeat(poses[None], 5, axis=0)
+        session = follow_path(
+            session, path, watch=lambda state: heights.append(state.row(0).copy())
+        )
+    take = make_take(scene, session.recording, snapshot.dump(system, session.state))
+    *_, (_, state) = play(take)
+    assert snapshot.dump(system, state) == take.end
+    fine = [state.row(0).copy() for _, state in play(take, refine(scene, 20))]
+    error = np.abs(np.array(fine[1 : accuracy.STRETCH + 1]) - heights[: accuracy.STRETCH]).max()
+    assert 1e-9 < error < session.errors.height < 3.0 * error
 
 
 def test_a_minute_of_a_rigid_body_takes_its_mesh_and_less_than_200_kilobytes():

@@ -80,7 +80,7 @@ def begin_session(
         base=base,
         numbers=numbers[:fingers],
         clock=live_session.Clock(),
-        monitor=None if scene.bodies else accuracy.start(whole),
+        monitor=accuracy.start(whole),
         trace=recent_trace.start(system.period, fingers=fingers),
         next_gesture=Moment(state.period, now, poses, tick, base),
     )

@@ -81,6 +81,8 @@ def test_a_ball_leaves_its_shape_and_is_told_by_force_and_pins(bed, ball, clock)
     # The spring of the contact gives 0.05 mm under the 0.02 N of a pin.
     assert np.abs(exact(bed) - sphere(bed)).max() < 0.1e-3
     assert_near(shown(bed), exact(bed), 1e-8)  # Blender's 32 bits
+    clock.until(lambda: running.find(bed).errors)
+    assert 0.0 < running.find(bed).errors.height < 0.1e-3
 
 
 def keyed(ball, bed, clock):

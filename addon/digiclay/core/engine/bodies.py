@@ -260,6 +260,13 @@ def find_given(system: System) -> GivenUndersides | None:
     return undersides if isinstance(undersides, GivenUndersides) else None
 
 
+def give_bodies(system: System, knots: Sequence[Knot]) -> None:
+    """Give a system bodies, if it expects any."""
+    given = find_given(system)
+    if given:
+        given.give(knots)
+
+
 @dataclass(frozen=True, eq=False)
 class BodyPeriod:
     """Fingertips and bodies in one control period."""

@@ -8,9 +8,10 @@ history; a live session has an `ErrorMonitor`, which follows it for a short stre
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -26,9 +27,12 @@ from ..model.trajectory import Path, interpolate_poses, sample_poses
 from ..scene.assembly import assemble
 from ..scene.schema import MOST_CUT, MOST_STEPS, Scene, Simulation
 
-#: Control periods of a session: the state after each, and the fingertip at both ends of it, (2, f,
-#: 7).
-Noted = tuple[tuple[State, Floats], ...]
+if TYPE_CHECKING:
+    from ..engine.bodies import Knot
+
+#: Control periods of a session: the state after each, the fingertip at both ends of it, (2, f, 7), and
+#: bodies at times before and after it.
+Noted = tuple[tuple[State, Floats, "Sequence[Knot]"], ...]
 
 #: Error of a run per difference from its reference. The reference's own error is taken as a quarter
 #: of that of the run: with a quarter of the step, that remains of an error of first order, as
@@ -80,7 +84,7 @@ class ErrorMonitor(NamedTuple):
     """Control periods of the session in the tick before."""
     waiting: Noted = ()
     """Periods of the stretch still to be integrated: the session's state after each, of which only the active
-    cells are as of then, and the fingertip at both ends of it."""
+    cells are as of then, the fingertip at both ends of it, and bodies."""
     reached: Floats | None = None
     """(n,): Heights of the session at the end of the stretch, m."""
     carried: Floats | None = None
@@ -257,8 +261,14 @@ def begin_stretch(monitor: ErrorMonitor, state: State, pause: int = PAUSE) -> Er
     )
 
 
-def note(monitor: ErrorMonitor, after: State, path: Floats, pause: int = PAUSE) -> ErrorMonitor:
-    """Return the monitor with the session's last period; `path` (2, f, 7): its fingertips."""
+def note(
+    monitor: ErrorMonitor,
+    after: State,
+    path: Floats,
+    pause: int = PAUSE,
+    knots: Sequence[Knot] = (),
+) -> ErrorMonitor:
+    """Return the monitor with a session's last period; `path` (2, f, 7), `knots`: its fingertips, bodies."""
     monitor = monitor._replace(age=monitor.age + 1)
     if monitor.state is None:
         return begin_stretch(monitor, after, pause)
@@ -266,7 +276,7 @@ def note(monitor: ErrorMonitor, after: State, path: Floats, pause: int = PAUSE) 
         return monitor
     state = after._replace(active=replace(after.active, block=after.active.block.copy()))
     reached = after.row(0) if monitor.age == STRETCH else None
-    return monitor._replace(waiting=(*monitor.waiting, (state, path)), reached=reached)
+    return monitor._replace(waiting=(*monitor.waiting, (state, path, knots)), reached=reached)
 
 
 def catch_up(monitor: ErrorMonitor, after: State, count: int) -> tuple[ErrorMonitor, Errors | None]:
@@ -278,7 +288,11 @@ def catch_up(monitor: ErrorMonitor, after: State, count: int) -> tuple[ErrorMoni
     while state is not None and due > 0:
         due -= 1
         with np.errstate(over="ignore", invalid="ignore"):
-            (leader, path), *waiting = monitor.waiting
+            (leader, path, knots), *waiting = monitor.waiting
+            if knots:
+                from ..engine.bodies import give_bodies
+
+                give_bodies(system, knots)
             poses = interpolate_poses(path, system.instants / system.period)
             (finger,) = system.trace(poses, state.period)
             state = repeat_period(system, state, finger, leader)

@@ -363,7 +363,7 @@ def follow_path(
 
     `pause`: control periods between two stretches of its monitor.
     """
-    session = _lead_bodies(session, len(path) - 1)
+    session, knots = _lead_bodies(session, len(path) - 1)
     system, state, monitor = session.system, session.state, session.monitor
     monitor = monitor and accuracy.begin_stretch(monitor, state, pause)
     errors, first = None, state.period + 1
@@ -372,7 +372,7 @@ def follow_path(
         for state in simulate_path(system, session.state, path, orders):
             if monitor:
                 index = state.period - first
-                monitor = accuracy.note(monitor, state, path[index : index + 2], pause)
+                monitor = accuracy.note(monitor, state, path[index : index + 2], pause, knots)
             if watch:
                 watch(state)
     if monitor:
@@ -384,16 +384,17 @@ def follow_path(
     )
 
 
-def _lead_bodies(session: Session, count: int) -> Session:
-    """Give the bodies along a path of `count` periods to the system; return the session at its end."""
+def _lead_bodies(session: Session, count: int) -> tuple[Session, list[Knot]]:
+    """Give bodies along a path of `count` periods to the system; return the session at its end, and them."""
     aim, reached, first = session.aim, session.reached, session.state.period
     given = find_given(session.system)
     if aim is None or given is None:
-        return session
+        return session, []
     if reached is None or len(reached) != len(aim):  # others than before begin where they are
         reached = aim
     knots: list[Knot] = [(first, reached), (first + count, aim)]
-    given.give(knots)
+    unders: list[Knot] = [(period, given.measure(bodies)) for period, bodies in knots]
+    given.give(unders)
     recording = session.recording
     if recording:
         known = recording.knots or knots[:1]
@@ -401,7 +402,7 @@ def _lead_bodies(session: Session, count: int) -> Session:
         last, bodies = known[-1]
         goes_on = bool(recording.knots) and last == first and all(map(is_, bodies, knots[0][1]))
         recording = replace(recording, knots=(*recording.knots, *knots[goes_on:]))
-    return replace(session, reached=aim, recording=recording)
+    return replace(session, reached=aim, recording=recording), unders
 
 
 def start_recording(session: Session, now: bytes, tick: int = 0, room: int = 255) -> Session:

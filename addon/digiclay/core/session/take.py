@@ -16,7 +16,7 @@ import numpy as np
 from ..base.arrays import Array, Floats
 from ..base.errors import OutputError, ParameterError
 from ..control.orders import FARTHEST, STRONGEST, Orders, add_verbs, find_fault
-from ..engine.bodies import Knot, find_given
+from ..engine.bodies import Knot, give_bodies
 from ..engine.simulation import begin
 from ..engine.state import State
 from ..engine.system import System
@@ -128,9 +128,7 @@ def play(take: Take, scene: Scene | None = None) -> Iterator[tuple[System, State
 
     def prepare(count: int) -> System:
         system = assemble(scene.with_fingers(count))
-        given = find_given(system)
-        if given:
-            given.give(take.knots)
+        give_bodies(system, take.knots)
         return system
 
     def change(system: System, state: State, count: int) -> tuple[System, State]:
