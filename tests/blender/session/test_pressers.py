@@ -387,6 +387,24 @@ def test_recorded_strokes_are_played_on_a_bed_that_a_mesh_presses(bed, ball, tmp
     assert exact(bed).min() < 38.5e-3
 
 
+@pytest.mark.parametrize("back", [sculpting.rewind, None], ids=["a gesture", "undo"])
+def test_what_is_taken_back_while_a_mesh_presses_leaves_no_dent(bed, ball, clock, back):
+    started(bed)
+    clock.tick(3)
+    done("Start")
+    before = exact(bed)
+    press(ball, clock, lift=False)
+    done("Pressed")
+    if back:  # which leaves the mesh where it is
+        place(ball, ABOVE)
+        running.put(back(running.find(bed)))
+    else:
+        bpy.ops.ed.undo()
+        looked()
+    clock.tick(handlers.STALE + 3)
+    np.testing.assert_array_equal(exact(only_bed()), before)
+
+
 @pytest.mark.parametrize("back", ["a gesture", "undo"])
 def test_what_is_taken_back_while_a_mesh_is_recorded_is_in_no_take(bed, ball, clock, back):
     started(bed)
