@@ -145,6 +145,9 @@ def test_a_bake_goes_before_a_recording_and_that_before_the_last_take(bed, tmp_p
     "name, options, written",
     [
         ("clay.glb", {}, "clay.glb"),
+        ("clay.GLB", {}, "clay.glb"),
+        ("clay.usd", {}, "clay.usda"),
+        ("clay.usdc", {}, "clay.usda"),
         ("clay 1.5", {}, "clay 1.5.usda"),
         ("clay.glb", {"file_format": "usd"}, "clay.usda"),
         ("clay.stl", {"file_format": "glb"}, "clay.stl.glb"),

@@ -17,6 +17,10 @@ from ..device.primitives import rod
 
 #: Extensions of the formats.
 SUFFIXES = {"usd": ".usda", "abc": ".abc", "glb": ".glb"}
+#: Formats that the ending of a name tells; USD is text whatever the name.
+ENDINGS = {suffix: name for name, suffix in SUFFIXES.items()} | dict.fromkeys(
+    (".usd", ".usdc"), "usd"
+)
 #: Kinds of `export_model.KINDS` that can be animated.
 ANIMATED = ("pins", "surface")
 #: Sides of a pin, and its length beyond the range of all heights, in its radii: none hangs in the

@@ -23,7 +23,7 @@ from ..core.session.take import play as play_take
 from ..device import view
 from ..device.instant import find_ellipsoids
 from ..exchange import formed_bed
-from ..exchange.animation_file import SUFFIXES, animate, write_animation
+from ..exchange.animation_file import ENDINGS, SUFFIXES, animate, write_animation
 from ..live import beds, handlers, tick
 from ..recorded import bake, takes
 from ..recorded.pointer_strokes import play_strokes, read_strokes
@@ -428,6 +428,11 @@ class ExportAnimation(SteppedAction, Operator):
         result: Result = bpy.ops.export_anim.digital_clay("INVOKE_DEFAULT", **self.as_keywords())
         return result - {"RUNNING_MODAL"} or {"FINISHED"}
 
+    def cancel(self, context: Context) -> None:
+        """Take back what shows the progress, of which the file browser has none."""
+        if not self.browses:
+            super().cancel(context)
+
     def work(self, context: Context) -> Generator[float, None, None]:
         """Find the heights of all frames, which may need a simulation, and write them."""
         bed, file, rate = bed_of(context), self._choose_file(), bake.read_rate(context.scene)
@@ -446,7 +451,7 @@ class ExportAnimation(SteppedAction, Operator):
     def _choose_file(self) -> Path:
         """Return the file with the extension of its format, which the name tells where none is given."""
         file = Path(bpy.path.abspath(self.filepath or "digital_clay"))
-        named = {suffix: name for name, suffix in SUFFIXES.items()}.get(file.suffix)
+        named = ENDINGS.get(file.suffix.lower())
         if named and not self.properties.is_property_set("file_format"):
             self.file_format = named
         stem = file.with_suffix("") if named else file
