@@ -28,8 +28,9 @@ FINGER, BALL = "digiclay_fingertip", "digiclay_ellipsoid"
 HAND = "digiclay_hand"
 #: Those by which beds and palms hold their fingertips, by number, from 1 on.
 FINGERS = (FINGER, *(f"{FINGER}_{number}" for number in range(2, MOST_FINGERS + 1)))
-#: Property by which a mesh object that presses a bed holds that bed.
-PRESSES = "digiclay_presses"
+#: Property by which a mesh object that presses a bed holds that bed; and that by which the bed holds
+#: those of other files, in which nothing can be stored.
+PRESSES, PRESSED_BY = "digiclay_presses", "digiclay_pressed_by"
 #: Marks what was seen to belong to a bed: only that can be left behind by one. What older files
 #: have lying about without a bed stays.
 OWNED = "digiclay_owned"
@@ -50,10 +51,50 @@ def bed_of(context: Context) -> Any:
 
 def find_whole(part: Object) -> Object | None:
     """Return what an object is a part of: its parent, or the bed of a fingertip or palm, or of a presser."""
-    pressed: Object | None = part.get(PRESSES)
+    pressed = _find_pressed(part)
     if pressed is not None and is_linked(pressed):
         return pressed
     return owner_of(part) if part.get(ROLE) in (FINGERTIP, PALM) else part.parent
+
+
+def _find_pressed(thing: Object) -> Object | None:
+    """Return the bed that an object presses, or of an armature that which a mesh presses that it moves."""
+    if thing.type == "ARMATURE":
+        moved = (other for other in _list_beside(thing) if other.find_armature() == thing)
+        return next(filter(None, map(_find_pressed, moved)), None)
+    if thing.type != "MESH" or is_local(thing):
+        return thing.get(PRESSES)
+    beds = filter(is_bed, _list_beside(thing))
+    return next((bed for bed in beds if thing in _list_held(bed)), None)
+
+
+def _list_beside(thing: Object) -> list[Object]:
+    """Return the objects of all scenes in which an object stands."""
+    return [other for scene in thing.users_scene for other in scene.objects]
+
+
+def _list_held(bed: Object) -> list[Object]:
+    """Return the mesh objects of other files that press a bed."""
+    return list(bed.get(PRESSED_BY, {}).values())
+
+
+def press(bed: Object, presser: Object) -> None:
+    """Have a mesh object press a bed."""
+    if is_local(presser):
+        presser[PRESSES] = bed
+    elif presser not in _list_held(bed):
+        _hold(bed, [*_list_held(bed), presser])
+
+
+def press_no_longer(bed: Object, presser: Object) -> None:
+    """Have a mesh object press a bed no longer."""
+    presser.pop(PRESSES, None)
+    _hold(bed, [held for held in _list_held(bed) if held != presser])
+
+
+def _hold(bed: Object, pressers: list[Object]) -> None:
+    """Have a bed hold mesh objects of other files."""
+    bed[PRESSED_BY] = {str(number): presser for number, presser in enumerate(pressers)}
 
 
 def is_edited(context: Context) -> bool:
@@ -92,8 +133,9 @@ def list_meshes(context: Context) -> list[Object]:
 
 def list_pressers(bed: Object) -> list[Object]:
     """Return the mesh objects that press a bed and stand in a scene with it, by name."""
-    things = {thing for scene in bed.users_scene for thing in scene.objects}
-    pressing = (thing for thing in things if thing.type == "MESH" and thing.get(PRESSES) == bed)
+    things, held = set(_list_beside(bed)), _list_held(bed)
+    meshes = (thing for thing in things if thing.type == "MESH")
+    pressing = (mesh for mesh in meshes if mesh.get(PRESSES) == bed or mesh in held)
     return sorted(pressing, key=lambda presser: presser.name)
 
 
@@ -117,7 +159,7 @@ def owner_of(part: Object, role: str = BED) -> Object | None:
     # A palm is held by its fingertips, and a copy of a fingertip by the one that has its ellipsoid.
     ball = part.get(BALL)
     family = {part, ball and ball.parent, *(part.get(name) for name in FINGERS)} - {None}
-    beds = (thing for scene in part.users_scene for thing in scene.objects if is_bed(thing))
+    beds = filter(is_bed, _list_beside(part))
     held = [bed for bed in beds if family & {bed.get(name) for name in FINGERS}]
     # A copy of the bed holds it as well, until it gets one of its own.
     return min(held, key=lambda bed: bed.session_uid, default=None)

@@ -2,7 +2,6 @@
 
 import os
 import shutil
-from contextlib import contextmanager
 from pathlib import Path
 
 import bpy
@@ -131,31 +130,27 @@ def animated(blender):
     blender.call(export, "INVOKE_DEFAULT", filepath=str(whole), **options)
     yield from blender.until(whole.is_file)
     with (yield from open_browser(blender, export, options)):
-        bpy.ops.file.cancel()  # a traceback in the output is the fixture's to find
+        bpy.ops.file.cancel()  # a traceback of it fails every test of this script
     yield 1.0
-    with (yield from open_browser(blender, export, options)) as space:
-        space.params.directory, space.params.filename = os.fsencode(blender.OUT), browsed.name
-        blender.shot("animation_browser")
+    with (yield from open_browser(blender, export, options, browsed.name)):
         bpy.ops.file.execute()
     yield from blender.until(browsed.is_file)
     blender.SEEN["animations"] = [whole.read_bytes() == browsed.read_bytes(), whole.stat().st_size]
     note(blender, "animated")
 
 
-def open_browser(blender, operator, options):
-    """Open the file browser of an operator; return the context of its commands, which gives its space."""
+def open_browser(blender, operator, options, name=""):
+    """Open the file browser of an operator, with the name of a file; return the context of its commands."""
     blender.call(operator, "INVOKE_DEFAULT", **options)
     yield 1.0
     windows = bpy.context.window_manager.windows
     browser = next(each for each in windows if each.screen.areas[0].type == "FILE_BROWSER")
-    return in_browser(browser)
-
-
-@contextmanager
-def in_browser(browser):
     area = browser.screen.areas[0]
-    with bpy.context.temp_override(window=browser, area=area):
-        yield area.spaces.active
+    if name:
+        space = area.spaces.active
+        space.params.directory, space.params.filename = os.fsencode(blender.OUT), name
+        blender.shot("animation_browser")
+    return bpy.context.temp_override(window=browser, area=area)
 
 
 def baked(blender):

@@ -17,7 +17,7 @@ from ..device.primitives import rod
 
 #: Extensions of the formats.
 SUFFIXES = {"usd": ".usda", "abc": ".abc", "glb": ".glb"}
-#: Formats that the ending of a name tells; USD is text whatever the name.
+#: Formats that the ending of a name tells; USD is always written as text, .usda.
 ENDINGS = {suffix: name for name, suffix in SUFFIXES.items()} | dict.fromkeys(
     (".usd", ".usdc"), "usd"
 )

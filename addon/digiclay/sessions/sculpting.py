@@ -301,7 +301,7 @@ def restore(
         tick=running.tick + 1,
         base=base,
         correction=None,
-        under=None,
+        reached=None,
         rest_time=0.0,
         next_gesture=Moment(state.period, now, poses, running.tick, base) if free else None,
     )

@@ -138,11 +138,29 @@ def test_whatever_moves_a_mesh_it_presses(bed, ball, clock, way):
 def test_subdivision_is_off_while_a_mesh_presses_and_on_in_renders(bed, ball, clock):
     bpy.ops.digiclay.remove_presser(presser="Ball")
     assert list_pressers(bed) == []
+    assert bed_of(bpy.context) == bed  # its panels stay
+    select(ball)
     finer = ball.modifiers.new("Finer", "SUBSURF")
+    finer.levels = 6  # beyond the number of triangles that can press
+    off = ball.modifiers.new("Off", "MULTIRES")
+    off.show_viewport = False
     bpy.ops.digiclay.add_presser()
     assert (finer.show_viewport, finer.show_render) == (False, True)
     looked()
     assert len(read_cage(bpy.context, bed, ball).mesh.triangles) == len(ball.data.polygons)
+    bpy.ops.digiclay.add_presser()
+    bpy.ops.digiclay.remove_presser()
+    assert (finer.show_viewport, off.show_viewport) == (True, False)
+
+
+def test_a_refused_mesh_and_those_selected_with_it_stay_as_they_are(bed, ball):
+    bpy.ops.digiclay.remove_presser()
+    finer = ball.modifiers.new("Finer", "SUBSURF")
+    bpy.ops.mesh.primitive_plane_add(location=ball.location, rotation=(0.3, 0.2, 0.1))
+    select(ball, bpy.context.object)
+    with pytest.raises(RuntimeError, match=r"Plane\.mesh must have a thickness"):
+        bpy.ops.digiclay.add_presser()
+    assert (finer.show_viewport, list_pressers(bed)) == (True, [])
 
 
 def test_undo_copies_deletion_and_saving_leave_a_session_and_its_pressers_in_order(
@@ -337,23 +355,31 @@ def test_without_its_bed_a_presser_is_a_mesh_like_any_other_and_may_press_the_ne
     assert bed_of(bpy.context) == other
 
 
-def test_a_linked_mesh_is_refused(bed, ball, clock, tmp_path):
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "ball.blend"))
-    bpy.ops.wm.read_homefile(use_empty=False, use_factory_startup=True)
+@pytest.mark.parametrize("override", [False, True])
+def test_a_mesh_of_another_file_presses_and_is_kept(bed, ball, clock, tmp_path, override):
+    bpy.ops.digiclay.remove_presser()
+    place(ball, 36e-3)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "ball.blend"), copy=True)
+    ball.name = "Another"
     with bpy.data.libraries.load(str(tmp_path / "ball.blend"), link=True) as (_, here):
         here.objects = ["Ball"]
-    bpy.context.collection.objects.link(here.objects[0])
-    bpy.ops.mesh.digital_clay_add(rows=13, columns=13)
-    select(here.objects[0])
-    with pytest.raises(RuntimeError, match="Ball is linked: make it local first"):
-        bpy.ops.digiclay.add_presser()
-
-
-def test_a_flat_mesh_is_refused(bed, ball):
-    bpy.ops.mesh.primitive_plane_add(location=ball.location, rotation=(0.3, 0.2, 0.1))
-    with pytest.raises(RuntimeError, match=r"Plane\.mesh must have a thickness"):
-        bpy.ops.digiclay.add_presser()
-    assert list_pressers(bed) == [ball]
+    (linked,) = here.objects
+    bpy.context.collection.objects.link(linked)
+    if override:
+        linked = linked.override_create(remap_local_usages=True)
+    select(linked)
+    bpy.ops.digiclay.add_presser()
+    save_and_open(tmp_path / "bed.blend")
+    bed = only_bed()
+    (presser,) = list_pressers(bed)
+    assert presser.name == "Ball"
+    select(presser)
+    assert bed_of(bpy.context) == bed
+    started(bed)
+    clock.tick(20)
+    assert np.abs(exact(bed) - sphere(bed)).max() < 0.1e-3
+    bpy.ops.digiclay.remove_presser(presser="Ball")
+    assert (list_pressers(bed), bed_of(bpy.context)) == ([], bed)
 
 
 @pytest.mark.usefixtures("machine")
