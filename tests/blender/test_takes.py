@@ -375,6 +375,14 @@ def test_an_animated_fingertip_is_read_once_a_control_period(bed):
     assert bpy.context.scene.frame_current == 3
 
 
+@pytest.mark.parametrize("rate, last", [(24, 24), (25, 24), (30, 7), (24, 2)])
+def test_a_bake_has_each_of_its_frames(extension, rate, last):
+    bed = new_bed(rows=5, columns=5)
+    bpy.context.scene.render.fps = rate
+    assert bpy.ops.digiclay.bake(source="FINGERTIP", first=1, last=last) == {"FINISHED"}
+    assert len(bake.read_moments(bed)[1]) == last
+
+
 @pytest.mark.parametrize("first, last", [(5, 5), (9, 2), (1, 300_000)])
 def test_a_range_of_frames_that_cannot_be_is_refused(bed, first, last):
     with pytest.raises(DigiclayError, match="The frames to bake must have from 1 to"):

@@ -7,21 +7,23 @@ import numpy as np
 from .. import bridge
 from ..compat import Context, Object
 from ..core.base.errors import DigiclayError
-from ..core.engine.bodies import Given, PlacedMesh
+from ..core.engine.bodies import UNIT, Given, PlacedMesh, find_given
+from ..core.engine.system import System
 from ..core.model.underside import Mesh, check_vertices, refuse_flat
 from ..core.shapes.body import MOST_TRIANGLES
 from ..roles import list_pressers
 from ..ui_text import localize
 
 
-def find_fault(context: Context, presser: Object) -> str:
-    """Return why the mesh of a presser cannot be read now, or an empty text."""
-    if presser.mode == "EDIT" or presser.data.is_editmode:
-        return localize("{} is being edited: go back to Object Mode to go on", presser.name)
-    if not presser.visible_get(view_layer=context.view_layer):
-        return localize(
-            "{} is hidden: show it to go on, as wire in its Viewport Display, say", presser.name
-        )
+def find_fault(context: Context, bed: Object) -> str:
+    """Return why the mesh of a presser of a bed cannot be read now, or an empty text."""
+    for presser in list_pressers(bed):
+        if presser.mode == "EDIT" or presser.data.is_editmode:
+            return localize("{} is being edited: go back to Object Mode to go on", presser.name)
+        if not presser.visible_get(view_layer=context.view_layer):
+            return localize(
+                "{} is hidden: show it to go on, as wire in its Viewport Display, say", presser.name
+            )
     return ""
 
 
@@ -33,6 +35,16 @@ def read_pressers(
     before = former if former and len(former) == len(pressers) else [None] * len(pressers)
     pairs = zip(pressers, before, strict=True)
     return tuple(read_cage(context, bed, presser, given) for presser, given in pairs) or None
+
+
+def refuse_sunk(bed: Object, system: System, bodies: Sequence[Given] | None) -> None:
+    """Refuse pressers of a bed that begin below its floor, as they were read."""
+    given = find_given(system)
+    undersides = given.measure(bodies) if given and bodies else ()
+    for presser, under in zip(list_pressers(bed), undersides, strict=False):
+        if under.min() < 0:
+            rule = "{} must begin above the floor of the bed (got {:.3g} mm): lift it"
+            raise DigiclayError(localize(rule, presser.name, 1e3 * UNIT * under.min()))
 
 
 def read_cage(

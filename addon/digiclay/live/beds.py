@@ -9,7 +9,7 @@ from .. import bridge
 from ..compat import Context, Object, bpy
 from ..core.base.arrays import Floats
 from ..device import pressers
-from ..roles import BED, FINGERS, ROLE, bed_of, fingertips_of, is_local, list_pressers
+from ..roles import BED, FINGERS, ROLE, bed_of, fingertips_of, is_local
 from ..sessions import running
 from ..sessions.running import TABLE, Running, name_fingers
 from ..strokes import drawn
@@ -85,8 +85,7 @@ def blocking_reason(context: Context, bed: Object, pins: int | None = None) -> s
             )
         if abs(np.linalg.det(matrix[:3, :3])) < 1e-12 * bridge.uniform(bed) ** 3:
             return localize("{} is scaled to nothing: clear its scale to go on", tip.name)
-    faults = (pressers.find_fault(context, presser) for presser in list_pressers(bed))
-    return next(filter(None, faults), "")
+    return pressers.find_fault(context, bed)
 
 
 class Use(Enum):

@@ -79,7 +79,9 @@ def start(context: Context, bed: Object) -> list[Note]:
         base,
     )
     begun = stored.add_strokes(begun, lines)
-    show(bed, replace(begun, settings=settings, aim=pressers.read_pressers(context, bed)))
+    aim = pressers.read_pressers(context, bed)
+    pressers.refuse_sunk(bed, begun.system, aim)
+    show(bed, replace(begun, settings=settings, aim=aim))
     if lines:
         place_fingers(context, bed, begun)
     damaged = len(lines) - len(begun.strokes)
@@ -296,9 +298,10 @@ def _read_changes(context: Context, bed: Object, session: Running) -> tuple[str,
             session = back
         aim, given = pressers.read_pressers(context, bed, session.aim), find_given(session.system)
         if aim and given:
-            given.measure(
-                aim
-            )  # not in the time of the periods, by which the clock limits their number
+            # Not in the time of the periods, by which the clock limits their number.
+            given.measure(aim)
+        if aim and (session.reached is None or len(session.reached) != len(aim)):
+            pressers.refuse_sunk(bed, session.system, aim)
         session = replace(session, aim=aim)
     except DigiclayError as error:
         return str(error), session, words

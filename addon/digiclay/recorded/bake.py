@@ -231,10 +231,10 @@ def sample_path(
         rule = f"must have from 1 to {MOST_FRAMES} frames after its first"
         raise DigiclayError(f"The frames to bake {rule} (got {first} to {last}).")
     rate = read_rate(scene)
-    period, given = device.simulation.control_period, find_given(assemble(device))
-    count = int(np.floor((last - first) / rate / period + 1e-6))
+    period, system = device.simulation.control_period, assemble(device)
+    count = int(np.ceil((last - first) / rate / period - 1e-6))
     knots: list[Knot] = []
-    every, aim = max(1, int(INTERVAL / period)), None
+    given, every, aim = find_given(system), max(1, int(INTERVAL / period)), None
     frame_before = scene.frame_current, scene.frame_subframe
     tips = len(fingertips_of(bed))
     if not tips:
@@ -246,8 +246,12 @@ def sample_path(
             scene.frame_set(int(whole), subframe=part)
             poses[row] = bridge.poses(bed)
             if given and (row % every == 0 or row == count):
+                if fault := pressers.find_fault(bpy.context, bed):
+                    raise DigiclayError(fault)
                 aim = pressers.read_pressers(bpy.context, bed, aim)
                 assert aim is not None  # there are bodies
+                if row == 0:
+                    pressers.refuse_sunk(bed, system, aim)
                 knots.append((row, given.condense(aim, knots[0][1] if knots else aim)))
             yield row / count
     finally:

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from digiclay import bridge
 from digiclay.compat import curves
+from digiclay.core.base.errors import DigiclayError
 from digiclay.core.base.modes import COLORS
 from digiclay.core.engine.bodies import PlacedMesh
 from digiclay.core.session import snapshot
@@ -14,6 +15,7 @@ from digiclay.device.pressers import read_cage
 from digiclay.live import handlers, tick
 from digiclay.overlay import views
 from digiclay.recorded import takes
+from digiclay.recorded.bake import is_baked
 from digiclay.roles import PRESSES, bed_of, list_pressers
 from digiclay.sessions import running, sculpting
 from digiclay.strokes.stroke import make_images, start
@@ -334,6 +336,37 @@ def test_an_animated_mesh_is_baked_with_subframes(bed, ball):
     middle = np.abs(bridge.read_cells(bed.data)["position"][:, 1]) < 1e-3
     # Valves let pins down by 1.7 mm or so while it is over them, all alike.
     assert formed[middle].max() < 38.5e-3
+
+
+def test_a_bake_refuses_a_hidden_mesh_and_keeps_the_frame(bed, ball):
+    ball.hide_set(True)
+    select(bed)
+    bpy.context.scene.frame_set(3)
+    with pytest.raises(RuntimeError, match="Ball is hidden: show it"):
+        bpy.ops.digiclay.bake(source="FINGERTIP", first=1, last=6)
+    assert (bpy.context.scene.frame_current, is_baked(bed)) == (3, False)
+
+
+def test_a_mesh_must_begin_above_the_floor_and_may_go_below_it(bed, ball, clock):
+    place(ball, -1e-3)
+    looked()
+    fault = r"Ball must begin above the floor of the bed \(got -1 mm\): lift it"
+    with pytest.raises(DigiclayError, match=fault):
+        tick.start(bpy.context, bed)
+    select(bed)
+    with pytest.raises(RuntimeError, match=fault):
+        bpy.ops.digiclay.bake(source="FINGERTIP", first=1, last=6)
+    place(ball, ABOVE)
+    looked()
+    started(bed)
+    clock.tick(2)
+    press(ball, clock, depth=41e-3, lift=False)
+    assert not running.find(bed).blocking_reason
+    assert exact(bed).min() < 39e-3
+    running.put(sculpting.rewind(running.find(bed)))
+    waits(bed, clock, words="Ball must begin above the floor")
+    place(ball, ABOVE)
+    goes_on(clock)
 
 
 def test_without_its_bed_a_presser_is_a_mesh_like_any_other_and_may_press_the_next(bed, ball):
