@@ -196,6 +196,14 @@ def begin_hollow(locks=SHARES):
     return replace(session, snapshot=dump(session.system, session.state))
 
 
+def test_another_method_keeps_all_locks():
+    session = begin_hollow()
+    other, words = sculpting.change_scene(session, replace(session.scene, control=None))
+    assert words.startswith("Only heights and locks were kept")
+    assert_array_equal(shares(other), shares(session))
+    assert_array_equal(heights(other), heights(session))
+
+
 CROSS = ((-12e-3, -9e-3), (12e-3, 9e-3))
 CASES = {
     "lower": lay(Brush.LOWER, CROSS),

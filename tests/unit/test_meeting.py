@@ -277,7 +277,7 @@ def begin(count=31):
         pytest.param(lambda session: session.snapshot, "", True, id="the same parts"),
         pytest.param(
             lambda session: sculpting.change_scene(session, replace(session.scene, control=None))[0].snapshot,
-            "Only the heights", True, id="another method",
+            "Only heights", True, id="another method",
         ),
         pytest.param(lambda session: b"broken", "The bed begins at rest", False, id="no session"),
     ],

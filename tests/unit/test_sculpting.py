@@ -80,7 +80,7 @@ def test_changed_parts_keep_the_heights_and_say_so_and_a_changed_gain_takes_effe
     other = resolve({"layout": SIZES, "control": {"method": "plastic"}})
     later, said = begin_session(8, "Copy", other, pose(), session.snapshot)
     assert np.array_equal(heights(later), heights(session))
-    assert "heights were kept" in said
+    assert "heights and locks were kept" in said
     hand = Hand()
     session = hand.move(started(), [(0.0, 38.0)] * 10)
     assert change_scene(session, resolve({"layout": SIZES}))[0] is session

@@ -9,6 +9,7 @@ PANELS = {
     "DIGICLAY_PT_session": "",
     "DIGICLAY_PT_shapes": "",
     "DIGICLAY_PT_takes": "",
+    "DIGICLAY_PT_pressers": "",
     "DIGICLAY_PT_show": "",
     "DIGICLAY_PT_display": "",
     "DIGICLAY_PT_features": "",
@@ -44,7 +45,6 @@ def script(blender):
     yield from blender.empty_scene()
     preferences = bpy.context.preferences
     preferences.view.language = "de_DE"
-    yield from blender.add_paper_bed()
     drawn = blender.SEEN["drawn"] = {}
 
     def measure(panel, context):
@@ -61,6 +61,12 @@ def script(blender):
     for kind in blender.part("panels").CLASSES:
         if issubclass(kind, bpy.types.Panel):
             kind.append(measure)
+    yield from unfold(blender, "DIGICLAY_PT_start", "")
+    blender.shot("german_start")
+    yield from blender.add_paper_bed()
+    bpy.ops.mesh.primitive_monkey_add(location=(0.0, 0.0, 3.0))
+    yield None
+    blender.call(bpy.ops.digiclay.add_presser)
     for scale in SCALES:
         preferences.view.ui_scale = scale
         for root, sections in PANELS.items():

@@ -1,4 +1,4 @@
-"""Played by `driver`: a monkey's head presses the bed, dragged with G; then it is taken back."""
+"""Played by `driver`: a monkey's head presses the bed, dragged with G; taken back; moved in Pose Mode."""
 
 import bpy
 
@@ -25,3 +25,18 @@ def script(blender):
     blender.shot("mesh_lifted")
     yield from blender.after("rewound", "BACK_SPACE")
     yield from blender.after("stopped", "ESC")
+    monkey = bpy.context.object
+    blender.call(bpy.ops.object.armature_add, location=monkey.location)
+    armature = bpy.context.object
+    monkey.modifiers.new("Armature", "ARMATURE").object = armature
+    group = monkey.vertex_groups.new(name=armature.pose.bones[0].name)
+    group.add(range(len(monkey.data.vertices)), 1.0, "REPLACE")
+    blender.call(bpy.ops.object.mode_set, mode="POSE")
+    yield from blender.start()
+    blender.SEEN["mode"] = bpy.context.mode
+    # Along the bone, which points up.
+    armature.pose.bones[0].location.y = -0.45
+    yield from blender.settle(6)
+    yield from blender.after("posed")
+    blender.shot("mesh_posed")
+    yield from blender.after("left", "ESC")

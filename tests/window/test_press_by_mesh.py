@@ -16,3 +16,10 @@ def test_a_dragged_mesh_presses_the_bed_while_it_is_dragged(seen):
     assert abs(seen["lifted"]["heights"][0] - lowest[-1]) < 1e-4
     assert seen["rewound"]["heights"][0] > 39.9e-3
     assert seen["stopped"]["sessions"] == 0
+
+
+def test_a_session_is_started_and_goes_on_in_pose_mode_of_an_armature_that_moves_the_mesh(seen):
+    assert seen["mode"] == "POSE"
+    assert (seen["posed"]["sessions"], seen["posed"]["waits"]) == (1, "")
+    assert seen["posed"]["heights"][0] < 38e-3
+    assert seen["left"]["sessions"] == 0

@@ -102,20 +102,29 @@ def measure(arguments: Namespace, members: Members, result: Result, stop: Stop) 
     notes += _note_failed(rows, "failed")
     nominal = {**result.metrics, "free_rise": find_free_speed(result.scene)}
     if arguments.speed:
-        # Behind the members the scene itself.
-        every = [*points, Point(len(points), (), result.scene)]
-        searched = [replace(point, measure=measure_speeds) for point in every]
-        with Evaluation(arguments, "speeds", None, len(every), stop) as evaluation:
-            evaluation.finish([(point,) for point in searched], members.keys)
-            speeds = evaluation.collect()
-        if len(speeds) < len(every):
+        speeds = _search_speeds(arguments, members, result, stop)
+        if not speeds:
             return None
-        nominal |= speeds[len(points)].get("figures", {})
-        for point, row in zip(points, rows, strict=True):
-            row["figures"] = row.get("figures", {}) | speeds[point.index].get("figures", {})
-        notes += _note_failed([speeds[point.index] for point in points], "have no largest speeds")
+        *found, own = (speed.get("figures", {}) for speed in speeds)
+        nominal |= own
+        for row, figures in zip(rows, found, strict=True):
+            row["figures"] = row.get("figures", {}) | figures
+        notes += _note_failed(speeds[:-1], "have no largest speeds")
     bands = find_bands(nominal, [row["figures"] for row in rows if "figures" in row])
     return {"bands": bands, "notes": notes, "members": rows}
+
+
+def _search_speeds(
+    arguments: Namespace, members: Members, result: Result, stop: Stop
+) -> list[Record]:
+    """Return the records of the largest speeds of the members, and of the scene; empty after a stop."""
+    count = len(members.points)
+    every = [*members.points, Point(count, (), result.scene)]
+    with Evaluation(arguments, "speeds", None, len(every), stop) as evaluation:
+        bundles = [(replace(point, measure=measure_speeds),) for point in every]
+        evaluation.finish(bundles, members.keys)
+        speeds = evaluation.collect()
+    return [speeds[point.index] for point in every] if len(speeds) == len(every) else []
 
 
 def _note_failed(records: Sequence[Record], what: str) -> list[str]:

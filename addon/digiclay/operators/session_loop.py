@@ -265,7 +265,8 @@ class Session(LoopMixin, Action, Operator):
     def perform(self, context: Context) -> Result | None:
         """Start the session, and the loop unless another session's drives this one as well."""
         bed = bed_of(context)
-        leave_mode(context)
+        if context.mode != "POSE":  # in which an armature moves a presser
+            leave_mode(context)
         notes = tick.start(context, bed)
         notes = notes or [
             tick.Note("INFO", localize("The session of {} runs: Esc stops it", bed.name))
@@ -273,7 +274,7 @@ class Session(LoopMixin, Action, Operator):
         self.tell([note._replace(uid=bed.session_uid) for note in notes])
         handlers.watch()
         views.follow()
-        if preferences.get(context).take_press_tool:
+        if preferences.get(context).take_press_tool and context.mode == "OBJECT":
             tool.take_up(context)
         beds.deselect(bed)
         view.show_form(bed)
@@ -334,6 +335,8 @@ def rewind_session(operator: Operator, context: Context) -> None:
             {"INFO"}, words or localize("The recording ended: the gesture began before it")
         )
     tick.bring_back(context, bed, back)
+    if back.scene.bodies:
+        inform(operator, "Pressers stay where they are")
 
 
 @action(

@@ -22,10 +22,9 @@ BESIDE = {"ENUM", "STRING"}
 @panel("DIGICLAY_PT_start", "Digital Clay", 0, closed=False, with_bed=False)
 def start(sidebar: Sidebar, context: Context) -> None:
     """Content of the tab without an active bed: how to add one."""
-    column = sidebar.layout.column()
-    column.label(text="Select a bed or its fingertip,")
-    column.label(text="or add a new device:")
-    column.operator("mesh.digital_clay_add", text="Add Digital Clay", icon="MESH_GRID")
+    words = localize("Select a bed or its fingertip, or add a new device:")
+    draw_lines(sidebar.layout, words, "NONE")
+    sidebar.layout.operator("mesh.digital_clay_add", text="Add Digital Clay", icon="MESH_GRID")
     # A session may have ended with its file.
     draw_lines(sidebar.layout, running.last_message(), "INFO")
 

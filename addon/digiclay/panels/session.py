@@ -136,7 +136,7 @@ def pressers_panel(sidebar: Sidebar, context: Context) -> None:
     layout.operator("digiclay.add_presser", icon="ADD")
     for presser in list_pressers(bed_of(context)):
         row = layout.row(align=True)
-        row.label(text=presser.name, icon="MESH_DATA")
+        row.label(text=presser.name, icon="MESH_DATA", translate=False)
         row.operator("digiclay.remove_presser", text="", icon="X").presser = presser.name
         if presser == context.object:
             column = layout.column(align=True)

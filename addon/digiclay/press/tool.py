@@ -28,7 +28,7 @@ from ..device.instant import find_ellipsoid
 from ..overlay.picture import Color, Line, Words
 from ..overlay.sections import LETTERS, place_label
 from ..overlay.views import find_free_room
-from ..roles import fingertip_of
+from ..roles import fingertip_of, list_pressers
 from ..sessions import running
 from ..sessions.running import list_pressing
 from ..settings import devices
@@ -223,10 +223,13 @@ def _draw_cursor(context: Context, tool: WorkSpaceTool, xy: tuple[int, int]) -> 
     corner = region.x, region.y
     settings = tool.operator_properties(OPERATOR)
     target, hider = aim.look_at(context, (xy[0] - region.x, xy[1] - region.y), settings.project)
-    if hider is not None:
-        cursor([], make_label(context, localize("{} hides the bed", hider.name), xy, corner))
+    if target is None:
         return
-    if target is None or fingertip_of(target.bed) is None:
+    if hider is not None:
+        if hider not in list_pressers(target.bed):  # which is there to be seen and moved
+            cursor([], make_label(context, localize("{} hides the bed", hider.name), xy, corner))
+        return
+    if fingertip_of(target.bed) is None:
         return
     brush, amount, _ = find_shown(target.bed, settings)
     depth = 1e-3 * settings.depth if brush.rises else amount

@@ -15,7 +15,7 @@ from ..core.shapes.body import Body
 from ..ui_text import localize
 
 #: Message when the state of other parts is taken up.
-CHANGED = "Only the heights were kept: the bed's parts or its method have changed"
+CHANGED = "Only heights and locks were kept: the bed's parts or its method have changed"
 #: Numbers of fingertips.
 Numbers = tuple[int, ...]
 

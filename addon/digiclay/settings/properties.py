@@ -106,7 +106,13 @@ def _read_presser(presser: Object, scene: Scene) -> Presser:
     """Return the body of a mesh object, whose underside a session reads: it has no path of its own."""
     group = presser.digiclay.presser
     values = read(group, Body, {}, presser.name, PRESSER_FIELDS)
-    return Presser(Body(**values), scene.fingers[0].trajectory)
+    try:
+        return Presser(Body(**values), scene.fingers[0].trajectory)
+    except ParameterError as error:
+        value = convert_units(error.value)
+        raise ParameterError(
+            presser.name, error.field, convert_units(error.rule), value, error.hint
+        ) from None
 
 
 def read_scene(bed: Object) -> Scene:

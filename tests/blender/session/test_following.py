@@ -162,7 +162,7 @@ def test_a_method_that_is_changed_in_mid_session_takes_over_with_the_heights(bed
     before = exact(bed)
     bed.digiclay.method = "plastic"
     notes = clock.tick()
-    assert ["heights were kept" in note.message for note in notes] == [True]
+    assert ["heights and locks were kept" in note.message for note in notes] == [True]
     assert_near(exact(bed), before, 1e-5)  # pins were still coming to rest
     assert running.find(bed).scene.method == "plastic"
 

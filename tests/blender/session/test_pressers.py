@@ -233,7 +233,7 @@ ODD = {
         lambda ball: setattr(ball.scale, "z", 0.0),
         lambda ball: setattr(ball.scale, "z", 1.0),
     ),
-    "samples must be odd (got 4)": (
+    "Ball.samples must be odd (got 4)": (
         lambda ball: setattr(ball.digiclay.presser, "samples", 4),
         lambda ball: setattr(ball.digiclay.presser, "samples", 3),
     ),

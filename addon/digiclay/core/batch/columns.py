@@ -15,7 +15,7 @@ import numpy as np
 from ..base.arrays import Cells, Flags, Floats
 from ..control.side_by_side import join_controllers, merge_parts, merge_values
 from ..engine.active_set import Selection
-from ..engine.hand_steps import HandStep
+from ..engine.hand_steps import HandStep, rest_hands
 from ..engine.state import ActiveSet, State, make_initial_state
 from ..engine.system import System
 from ..model.interfaces import Movement
@@ -182,7 +182,7 @@ def begin(batch: Batch) -> State:
     memory = [system.controller.begin() for system in batch.systems]
     heights = np.array([system.cell.actuator.rest_height for system in batch.systems], np.float64)
     state = make_initial_state(batch.rows, batch.grid.count, heights, memory)
-    return state._replace(deflection=batch.hands[0].swing.rest()) if batch.hands else state
+    return state._replace(deflection=rest_hands(batch.hands))
 
 
 def make_batch(systems: Sequence[System]) -> Batch:

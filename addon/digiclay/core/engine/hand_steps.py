@@ -70,6 +70,11 @@ class RaisedPeriod(NamedTuple):
         return intended + self.finger.spread(self.rise, positions)
 
 
+def rest_hands(steps: tuple[HandStep, ...]) -> Deflection | None:
+    """Return the deflection of hands at rest; None where there are none."""
+    return steps[0].swing.rest() if steps else None
+
+
 def lower_reach(steps: tuple[HandStep, ...], state: State, finger: Any) -> Any:
     """Return the fingers' paths in a period with windows of all that hands can touch: pins push only up."""
     now = state.deflection

@@ -13,7 +13,7 @@ from ..base.arrays import Floats
 from ..base.errors import DivergenceError
 from ..model.touch import FingerPeriod
 from ..model.trajectory import Trajectory, sample_poses
-from .hand_steps import lower_reach, move_hands
+from .hand_steps import lower_reach, move_hands, rest_hands
 from .state import State, make_initial_state
 from .system import System
 
@@ -36,8 +36,7 @@ def begin(system: System) -> State:
     """Return the state before a session."""
     rest = system.cell.actuator.rest_height
     state = make_initial_state(system.rows, system.grid.count, rest, system.controller.begin())
-    state = state._replace(addressing=system.drive.begin())
-    return state._replace(deflection=system.hands[0].swing.rest()) if system.hands else state
+    return state._replace(addressing=system.drive.begin(), deflection=rest_hands(system.hands))
 
 
 def step(system: System, state: State, poses: Floats) -> State:

@@ -18,6 +18,7 @@ from ..base.arrays import Array, Flags, Floats
 from ..base.errors import StateError
 from ..base.modes import HOLD, LOCKED, REST, Mode
 from ..control.pin_division import Hands
+from ..engine.hand_steps import rest_hands
 from ..engine.simulation import begin
 from ..engine.state import ActiveSet, Rows, State
 from ..engine.system import System
@@ -200,8 +201,7 @@ def load(system: System, data: bytes) -> State:
     memory = rebuild(system.controller.begin(), header["memory"], stored.memory)
     bed = arrays["rows"], arrays["modes"], arrays["aged"]
     locks = stored.arrays.get("locks")
-    begun = begin(system)
-    deflection, addressing = begun.deflection, begun.addressing
+    deflection, addressing = rest_hands(system.hands), system.drive.begin()
     if addressing is not None and "addressing" in header:
         addressing = rebuild(addressing, header["addressing"], stored.memory)
         _check_same("lines of the drive", addressing.last.size, system.drive.begin().last.size)
@@ -225,7 +225,7 @@ def read_shares(data: bytes) -> Floats:
 
 
 def transfer_heights(system: System, data: bytes) -> State:
-    """Return the first state of a session, with the heights of a stored state whose parts were others."""
+    """Return the first state of a session, with heights and locks of a stored state of other parts."""
     stored = _read(data)
     _check_same("number of cells", stored.header["cells"], system.grid.count)
     height = stored.arrays["rows"][0].copy()
@@ -233,8 +233,11 @@ def transfer_heights(system: System, data: bytes) -> State:
     actuator, state = system.cell.actuator, begin(system)
     height = np.clip(height, 0.0, actuator.stroke)
     state.rows[0] = state.rows[system.rows.target] = height
+    shares = read_shares(data)
     state.modes[:] = np.where(height == actuator.rest_height, REST, HOLD)
-    return state._replace(peak=float(height.max()))
+    state.modes[shares == 1.0] = LOCKED
+    in_part = np.where(shares < 1.0, shares, 0.0)
+    return state._replace(peak=float(height.max()), locks=in_part if in_part.any() else None)
 
 
 def _check_limits(system: System, stored: Snapshot) -> None:
