@@ -5,6 +5,7 @@ from digiclay.core.session import live_session
 from digiclay.live import handlers
 
 from tests.blender.at_hand import new_bed
+from tests.blender.session.balls import add_ball
 from tests.blender.session.live import Clock
 
 
@@ -20,6 +21,12 @@ def bed():
     made = new_bed(rows=13, columns=13)
     handlers.watch()  # to open a file ends it
     return made
+
+
+@pytest.fixture
+def ball(bed):
+    """A ball over the bed, which presses it."""
+    return add_ball()
 
 
 @pytest.fixture

@@ -11,7 +11,6 @@ from digiclay.core.engine.bodies import PlacedMesh
 from digiclay.core.session import snapshot
 from digiclay.core.session.take import from_bytes, play, to_bytes
 from digiclay.device import view
-from digiclay.device.pressers import read_cage
 from digiclay.live import handlers, tick
 from digiclay.overlay import views
 from digiclay.recorded import takes
@@ -19,51 +18,12 @@ from digiclay.recorded.bake import is_baked
 from digiclay.roles import PRESSES, bed_of, list_pressers
 from digiclay.sessions import running, sculpting
 from digiclay.strokes.stroke import make_images, start
-from mathutils import Vector
 
 from tests.assemble import assert_near
 from tests.blender.at_hand import delete, done, looked, save_and_open, select
+from tests.blender.session.balls import ABOVE, place, press, sphere
 from tests.blender.session.live import exact, goes_on, only_bed, shown, started, waits
 from tests.hand import let_go
-
-#: A ball of 12 mm, its lowest point 45 mm above the floor: 5 mm above the pins.
-RADIUS, ABOVE = 12e-3, 45e-3
-
-
-def place(ball, z, x=0.0):
-    """Put the lowest point of a ball to a height, m."""
-    origin = ball[PRESSES].location if PRESSES in ball else only_bed().location
-    ball.location = origin + Vector((x, 0.0, z + RADIUS)) * bridge.SCALE
-
-
-@pytest.fixture
-def ball(bed):
-    """A ball of 5,120 triangles over the bed, which presses it."""
-    bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=5, radius=RADIUS * bridge.SCALE)
-    made = bpy.context.object
-    made.name = "Ball"
-    place(made, ABOVE)
-    looked()
-    assert bpy.ops.digiclay.add_presser() == {"FINISHED"}
-    done("Add Presser")
-    return made
-
-
-def press(ball, clock, depth=4e-3, lift=True):
-    """Press a ball into the pins at 60 mm/s, and lift it; return the messages."""
-    notes = []
-    down = np.linspace(ABOVE, 40e-3 - depth, 6)
-    for z in [*down, *[down[-1]] * 3, *(down[::-1] if lift else ())]:
-        place(ball, z)
-        notes += clock.tick()
-    return notes
-
-
-def sphere(bed, depth=4e-3):
-    """Return the height of a ball over the pins, at most that at rest, m."""
-    x, y = bridge.read_cells(bed.data)["position"].T
-    square = RADIUS**2 - x**2 - y**2
-    return np.minimum(40e-3 - depth + RADIUS - np.sqrt(np.maximum(square, 0.0)), 40e-3)
 
 
 def test_a_ball_leaves_its_shape_and_is_told_by_force_and_pins(bed, ball, clock):
@@ -135,34 +95,6 @@ def test_whatever_moves_a_mesh_it_presses(bed, ball, clock, way):
     way(ball, bed, clock)
     clock.tick(3)
     assert np.abs(exact(bed) - sphere(bed)).max() < 0.1e-3
-
-
-def test_subdivision_is_off_while_a_mesh_presses_and_on_in_renders(bed, ball, clock):
-    bpy.ops.digiclay.remove_presser(presser="Ball")
-    assert list_pressers(bed) == []
-    assert bed_of(bpy.context) == bed  # its panels stay
-    select(ball)
-    finer = ball.modifiers.new("Finer", "SUBSURF")
-    finer.levels = 6  # beyond the number of triangles that can press
-    off = ball.modifiers.new("Off", "MULTIRES")
-    off.show_viewport = False
-    bpy.ops.digiclay.add_presser()
-    assert (finer.show_viewport, finer.show_render) == (False, True)
-    looked()
-    assert len(read_cage(bpy.context, bed, ball).mesh.triangles) == len(ball.data.polygons)
-    bpy.ops.digiclay.add_presser()
-    bpy.ops.digiclay.remove_presser()
-    assert (finer.show_viewport, off.show_viewport) == (True, False)
-
-
-def test_a_refused_mesh_and_those_selected_with_it_stay_as_they_are(bed, ball):
-    bpy.ops.digiclay.remove_presser()
-    finer = ball.modifiers.new("Finer", "SUBSURF")
-    bpy.ops.mesh.primitive_plane_add(location=ball.location, rotation=(0.3, 0.2, 0.1))
-    select(ball, bpy.context.object)
-    with pytest.raises(RuntimeError, match=r"Plane\.mesh must have a thickness"):
-        bpy.ops.digiclay.add_presser()
-    assert (finer.show_viewport, list_pressers(bed)) == (True, [])
 
 
 def test_undo_copies_deletion_and_saving_leave_a_session_and_its_pressers_in_order(
@@ -367,52 +299,6 @@ def test_a_mesh_must_begin_above_the_floor_and_may_go_below_it(bed, ball, clock)
     waits(bed, clock, words="Ball must begin above the floor")
     place(ball, ABOVE)
     goes_on(clock)
-
-
-def test_without_its_bed_a_presser_is_a_mesh_like_any_other_and_may_press_the_next(bed, ball):
-    delete(bed)
-    select(ball)
-    assert bed_of(bpy.context) is None
-    with pytest.raises(RuntimeError, match=r"Select one bed .*\(got 0\)"):
-        bpy.ops.digiclay.add_presser()
-    bpy.ops.mesh.digital_clay_add(rows=5, columns=5)
-    other = bpy.context.object
-    bpy.ops.mesh.digital_clay_add(rows=5, columns=5)
-    select(ball)
-    with pytest.raises(RuntimeError, match=r"Select one bed .*\(got 2\)"):
-        bpy.ops.digiclay.add_presser()
-    select(other, ball)
-    bpy.ops.digiclay.add_presser()
-    assert list_pressers(other) == [ball]
-    select(ball)
-    assert bed_of(bpy.context) == other
-
-
-@pytest.mark.parametrize("override", [False, True])
-def test_a_mesh_of_another_file_presses_and_is_kept(bed, ball, clock, tmp_path, override):
-    bpy.ops.digiclay.remove_presser()
-    place(ball, 36e-3)
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "ball.blend"), copy=True)
-    ball.name = "Another"
-    with bpy.data.libraries.load(str(tmp_path / "ball.blend"), link=True) as (_, here):
-        here.objects = ["Ball"]
-    (linked,) = here.objects
-    bpy.context.collection.objects.link(linked)
-    if override:
-        linked = linked.override_create(remap_local_usages=True)
-    select(linked)
-    bpy.ops.digiclay.add_presser()
-    save_and_open(tmp_path / "bed.blend")
-    bed = only_bed()
-    (presser,) = list_pressers(bed)
-    assert presser.name == "Ball"
-    select(presser)
-    assert bed_of(bpy.context) == bed
-    started(bed)
-    clock.tick(20)
-    assert np.abs(exact(bed) - sphere(bed)).max() < 0.1e-3
-    bpy.ops.digiclay.remove_presser(presser="Ball")
-    assert (list_pressers(bed), bed_of(bpy.context)) == ([], bed)
 
 
 @pytest.mark.usefixtures("machine")
