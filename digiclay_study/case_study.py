@@ -74,9 +74,7 @@ class Study(NamedTuple):
 
     minimized: str
     keys: tuple[str, ...]
-    """Of the words of a point: what is compared, what varies, and the case."""
-    compared: int
-    """How many keys are compared."""
+    """Of the words of a point: the variant, what varies, and the case."""
     limits: dict[str, float]
     """Most of metrics in every case, SI."""
     reference: Record
@@ -118,11 +116,10 @@ def _read(path: Path, table: Table, given: Sequence[Setting]) -> Study:
             raise ParameterError("limits", key, rule, show_value(limits[key]))
     if not limits:
         raise ParameterError("limits", "", "must have a metric", "nothing")
-    compare, vary = (list(list_changes(parts[key])) for key in ("compare", "vary"))
-    axes = [make_axis(key, values) for key, values in (*compare, *vary)]
+    axes = [make_axis(key, values) for key, values in list_changes(parts["vary"])]
     keys = [axis.key for axis in axes]
-    refuse_twice(keys, given)
-    rows = list(product(*(axis.words for axis in axes), cases))
+    variants = parts["compare"] or {"least": {}}
+    rows = list(product(variants, *(axis.words for axis in axes), cases))
     if not 0 < len(rows) <= MOST:
         raise ParameterError("vary", "", f"must come to 1 to {MOST} runs", f"{len(rows)} runs")
     settings = _write_words(parts["settings"]) | {key: word for key, word, _ in given}
@@ -131,15 +128,18 @@ def _read(path: Path, table: Table, given: Sequence[Setting]) -> Study:
     place = partial(_place, file, read_table(file), cache)
     points, amounts = list[Point](), list[float]()
     for words in rows:
-        case = _require(cases, words[-1], dict, "a table such as { stroke.direction = 30 }")
-        changes = settings | dict(zip(keys, words, strict=False)) | _write_words(case)
+        variant, case = (
+            _write_words(_require(table, key, dict, "a table such as { stroke.direction = 30 }"))
+            for table, key in ((variants, words[0]), (cases, words[-1]))
+        )
+        refuse_twice([*keys, *variant, *case], given)
+        changes = settings | variant | dict(zip(keys, words[1:], strict=False)) | case
         scene, phase = place(changes)
         full, _ = place(changes | reference)
         measure = partial(measure_case, phase=phase, full=full)
         points.append(Point(len(points), words, scene, measure=measure))
         amounts.append(_count(scene, minimized))
-    every = (*keys, "case")
-    return Study(minimized, every, len(compare), limits, reference, points, amounts)
+    return Study(minimized, ("variant", *keys, "case"), limits, reference, points, amounts)
 
 
 def _write_words(changes: Table) -> dict[str, str]:
@@ -262,15 +262,14 @@ def find_least(candidates: Sequence[Candidate]) -> Candidate:
 
 
 def find_candidates(study: Study, figures: Floats) -> dict[str, list[Candidate]]:
-    """Return the candidates by the values compared. `figures`: (points, limits), SI."""
+    """Return the candidates by their variants. `figures`: (points, limits), SI."""
     worst = figures.reshape(-1, study.cases, len(study.limits)).max(axis=1)
     excess = (worst / list(study.limits.values())).max(axis=1)
     groups: dict[str, list[Candidate]] = {}
     firsts = zip(study.points[:: study.cases], study.amounts[:: study.cases], strict=True)
     for number, (point, amount) in enumerate(firsts):
-        compared, words = point.words[: study.compared], point.words[study.compared : -1]
-        candidate = Candidate(amount, excess[number], worst[number].tolist(), words)
-        groups.setdefault(", ".join(compared), []).append(candidate)
+        candidate = Candidate(amount, excess[number], worst[number].tolist(), point.words[1:-1])
+        groups.setdefault(point.words[0], []).append(candidate)
     return groups
 
 
@@ -295,7 +294,7 @@ def _write(out: Path, study: Study, records: dict[int, Record]) -> list[str]:
         for name, group in groups.items()
     }
     save(draw_limits(study.minimized, limits, curves), out / "limits.png")
-    answers = [f"{name} {_answer(study, group)}".strip() for name, group in groups.items()]
+    answers = [f"{name}: {_answer(study, group)}" for name, group in groups.items()]
     page = [f"# Least {study.minimized}", *answers, "![Worst cases](limits.png)\n"]
     write_whole(out / "study.md", "\n\n".join(page).encode())
     return [*answers, f"written to {out}: start with study.md"]

@@ -274,7 +274,7 @@ def draw_limits(
 ) -> Figure:
     """Draw the worst figures of candidates, a panel for each limit.
 
-    `curves`: (candidates, 1 + limits), what is minimized and the figures, SI, by name.
+    `curves`: (candidates, 1 + limits), what is minimized and the figures, SI, by variant.
     """
     from matplotlib.ticker import LogLocator, NullLocator
 

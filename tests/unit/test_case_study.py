@@ -135,16 +135,26 @@ def test_the_least_candidate_is_that_with_the_smallest_amount_within_all_limits(
     assert find_least(candidates) is candidates[least]
 
 
-def test_a_candidate_has_the_worst_figures_of_its_cases(here):
-    study = read_study(place())
-    figures = np.array([[1.2, 0.01], [1.0, 0.02], [np.inf, 0.0], [3.0, 0.0]])
-    (found,) = find_candidates(study, figures).values()
-    assert [each.figures for each in found] == [[1.2, 0.02], [np.inf, 0.0]]
-    assert [each.excess for each in found] == [pytest.approx(1.2 / 1.5), np.inf]
-    assert [(each.amount, *each.words) for each in found] == [
+def test_a_candidate_of_a_variant_has_the_worst_figures_of_its_cases():
+    variants = "[compare]\nsoft = { contact.stiffness = 300 }\nhard = { contact.stiffness = 500 }\n"
+    study = read_study(place(STUDY.replace("[vary]", f"{variants}[vary]")))
+    figures = np.array([[1.2, 0.01], [1.0, 0.02], [np.inf, 0.0], [3.0, 0.0], *[[0.3, 0.05]] * 4])
+    found = find_candidates(study, figures)
+    assert [[each.figures for each in group] for group in found.values()] == [
+        [[1.2, 0.02], [np.inf, 0.0]],
+        [[0.3, 0.05]] * 2,
+    ]
+    assert [each.excess for each in (*found["soft"], *found["hard"])] == [
+        pytest.approx(0.8),
+        np.inf,
+        1.0,
+        1.0,
+    ]
+    assert [(each.amount, *each.words) for each in found["hard"]] == [
         (pytest.approx(15e-6), "15 um"),
         (pytest.approx(45e-6), "45 um"),
     ]
+    assert [point.scene.contact.stiffness for point in study.points[::4]] == [300.0, 500.0]
 
 
 def test_a_deviation_is_relative_to_the_relief_of_the_reference_and_a_flat_one_has_none():
@@ -162,6 +172,8 @@ def test_a_deviation_is_relative_to_the_relief_of_the_reference_and_a_flat_one_h
         ('"valve.stroke"', '"valve.law"', "study.toml: minimize must be valves or a parameter"),
         ("[cases]", "[case]", "A study needs at least two --vary, or a STUDY file with [cases]."),
         ("along = {}", "[ratio]", "study.toml: ratio must be a known key"),
+        ("[cases]", "[compare]\nall = 3\n[cases]", "study.toml: all must be a table such as"),
+        ("[cases]", "[compare.all]\nvalve.stroke = 1e-5\n[cases]", "valve.stroke must be given once"),
         ("along = {}", "along = 3", "study.toml: along must be a table such as"),
         ('["15 um", "45 um"]', '"15 um"', "study.toml: valve.stroke must be varied over a list"),
         ('"15 um", "45 um"', '"15 um", "15 um"', "valve.stroke must not have a value twice"),
