@@ -58,7 +58,7 @@ ROWS = [[0.0, 0.1], [0.3, 0.0], [0.2, 0.2], [-0.2, 0.2]]
     "drive, force, lines",
     {
         "the largest sums of commands of each set": ({"policy": "largest"}, (), [[2, 3]]),
-        "cells under the fingertip count five times": (
+        "lines under the fingertip count five times": (
             {"policy": "pressed"},
             [[0, 1], [1, 0], [0, 0], [0, 0]],
             [[0, 1]],

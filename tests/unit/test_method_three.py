@@ -204,7 +204,7 @@ def test_a_single_pin_gives_way_that_carries_nearly_half_of_the_set_point(asked,
     pressed[pin] = force
     basis, mode = system.grid.compute_basis(np.arange(count)), np.zeros(count, np.int8)
     own = np.zeros((controller.rows, count))
-    seen = Measurement(basis, level, pressed, level.copy(), mode, own, np.arange(count))
+    seen = Measurement(basis, level, pressed, level.copy(), mode, own, np.arange(count), mode * 0.0)
     _, orders = controller.command(controller.begin(), seen)
     assert (orders.target[pin] < 40e-3, orders.command[pin] < 0.0) == (yields, yields)
     np.testing.assert_array_equal(np.delete(orders.target, pin), 40e-3)

@@ -268,6 +268,7 @@ class HandInGroups(HandControl):
                 seen.mode[at],
                 flat.take(rows),
                 seen.cells[at],
+                seen.command[at],
             )
             self.division.mask(part)
             sections = WHOLE if len(fingers) == 1 else Sections([counts[i] for i in fingers])

@@ -30,7 +30,7 @@ POLICIES: dict[str, Urgency] = {
     "one_time": lambda effort, served: np.sign(effort) * (1.0 + served),
     "round_robin": lambda effort, served: 0.0 * effort,
 }
-#: Weight of a cell under the fingertip in the effort of its line, with the policy *pressed*.
+#: Weight of a line under a fingertip, with the policy *pressed*.
 PRESSED = 5.0
 
 
@@ -57,7 +57,7 @@ class MatrixDrive(Parameters):
     )
     policy: str = quantity(
         "pressed",
-        "lines addressed first: those with the largest sum of commands, where cells under the "
+        "lines addressed first: those with the largest sum of commands, where lines under the "
         "fingertip count five times (pressed) or once (largest); those that need it, in turn "
         "(needed) or each until it has arrived (one_time); all in turn (round_robin)",
         choices=tuple(POLICIES),
@@ -156,11 +156,10 @@ class MatrixAddressing:
 
     def measure_effort(self, line: Cells, seen: Measurement, orders: Commands) -> Floats:
         """Return the efforts of all lines, (n,): the sums of their commands' amounts."""
-        effort = np.abs(orders.command)
+        effort: Floats = settle(np.bincount(line, np.abs(orders.command), self.lines))
         if self.parameters.policy == "pressed":
-            effort[seen.force > self.floor] *= PRESSED
-        total: Floats = settle(np.bincount(line, effort, self.lines))
-        return total
+            effort[line[seen.force > self.floor]] *= PRESSED
+        return effort
 
     def choose(self, state: Addressing, period: int, effort: Floats, table: Floats) -> Flags:
         """Return which lines are addressed in the slot that begins, (n,)."""
