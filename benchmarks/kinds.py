@@ -151,6 +151,7 @@ BENCHMARKS = {
     "hand": Benchmark(
         "yielding_hands.measure", "the methods under prescribed paths and under yielding hands"
     ),
+    "zoo": Benchmark("zoo.measure", "published figures of pin displays beside simulated ones"),
     "kernels": Benchmark(
         "kernels.measure",
         "sessions on other kernels of numpy's library: what the last bit changes",

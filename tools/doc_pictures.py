@@ -53,6 +53,7 @@ INSTANTS = {
     "tap": 0.2,
     "two_hands_bowl": 9.0,
     "viscous_press": 2.7,
+    "zhu_5x5": 0.8,
 }
 #: Films of some: a series of a scene at a speed, and how long a frame is shown, ms.
 SCENE_FILM = """\

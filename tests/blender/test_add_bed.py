@@ -304,6 +304,20 @@ def test_a_sample_session_opens_as_the_bed_it_describes(name):
     assert made.shape is None or made.shape.heights
 
 
+@pytest.mark.parametrize(
+    "name, sculpts", [("shapeshift", False), ("wagner_6x6", True), ("zhu_5x5", True)]
+)
+def test_a_display_opens_and_one_that_cannot_be_sculpted_says_so(name, sculpts, capfd):
+    assert bpy.ops.digiclay.add_sample(sample=f"display:{name}") == {"FINISHED"}
+    bed, wanted = bpy.context.object, load(find(name))
+    made = properties.scene_of(bed)
+    for section in ("layout", "actuator", "valve", "drive", "control"):
+        assert getattr(made, section) == getattr(wanted, section), section
+    (entry,) = takes.list_takes(bed)
+    assert replayed(takes.read(bed, entry.number))
+    assert ("cannot be sculpted" in capfd.readouterr().out) != sculpts
+
+
 @pytest.mark.parametrize("name", ["face", "knot", list_shapes()[-1]])
 def test_a_sample_shape_opens_on_a_bed_that_displays_it(name):
     assert bpy.ops.digiclay.add_sample(sample=f"shape:{name}") == {"FINISHED"}

@@ -149,7 +149,7 @@ def test_every_license_has_its_text_and_manifest_package_and_samples_name_the_sa
     ]
     pages = [
         PACKAGE / "sample_shapes" / name / "README.md"
-        for name in ("", "shapes", "sessions", "bodies")
+        for name in ("", "shapes", "sessions", "displays", "bodies")
     ]
     assert all("CC0-1.0" in page.read_text(encoding="utf-8") for page in pages)
     assert not any("License:\nGPL" in page.read_text(encoding="utf-8") for page in pages)

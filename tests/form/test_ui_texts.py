@@ -23,6 +23,7 @@ NAMES = (
     "DIGICLAY_PT_part_",
     "use_",
     "session:",
+    "display:",
     "shape:",
     ", crest ",
     "    {} mm²",

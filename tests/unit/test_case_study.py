@@ -154,7 +154,10 @@ def test_a_candidate_of_a_variant_has_the_worst_figures_of_its_cases():
         (pytest.approx(15e-6), "15 um"),
         (pytest.approx(45e-6), "45 um"),
     ]
-    assert [point.scene.fingers[0].contact.stiffness for point in study.points[::4]] == [300.0, 500.0]
+    assert [point.scene.fingers[0].contact.stiffness for point in study.points[::4]] == [
+        300.0,
+        500.0,
+    ]
 
 
 def test_a_deviation_is_relative_to_the_relief_of_the_reference_and_a_flat_one_has_none():

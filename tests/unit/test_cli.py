@@ -6,6 +6,7 @@ import signal
 import sys
 from pathlib import Path
 
+import digiclay
 import numpy as np
 import pytest
 from digiclay import __version__
@@ -412,6 +413,28 @@ def test_speeds_stall_forces_and_refresh_are_those_of_a_pin_with_its_valve_wide_
     said = described(capsys, "supply.low=0")
     assert ", 0 mm/s down" in said["free speed"]
     assert "floor: never" in said["refresh"]
+
+
+def test_the_refresh_of_a_matrix_drive_is_that_of_its_lines_in_turn(capsys):
+    bed = {
+        "layout.rows": 4,
+        "layout.columns": 3,
+        "actuator.rest_height": 0.0,
+        "drive.sections": 2,
+        "drive.policy": "one_time",
+        "fingertip": "absent",
+    }
+    said = described(capsys, "control=absent", *(f"{key}={value}" for key, value in bed.items()))
+    valves, pins, lines = numbers(said["valves"])
+    assert (valves, pins, lines) == (4 + 2 * 3, 12, 4)
+    turns, filled, *_ = numbers(said["refresh"])
+    np.save("full.npy", np.full((4, 3), 0.1))
+    display = {"method": "shape_display", "shape": "full.npy", "patience": 10.0}
+    control = {**display, "refresh": "approximate_gradual", "surfaces": 1}
+    rising = digiclay.scene({"control": control}, {**bed, "simulation.duration": 10.0})
+    height = digiclay.run(rising).history["height"]
+    risen = 5e-3 * np.count_nonzero(height.min(axis=1) < 0.0999)
+    assert (turns, filled) == (2, pytest.approx(risen, rel=0.02))
 
 
 def test_the_stiffness_felt_is_the_slope_of_a_quick_press_on_a_shut_pin(capsys):

@@ -88,8 +88,8 @@ def test_what_cannot_be_is_refused(ask, words):
     [
         ("aligned", 3, None, []),
         ("hexagonal", 3, None, []),
-        ("aligned", 4, None, ["± 1.3 % from place to place, 2 mm deep"]),
-        ("aligned", 5, None, ["± 11 % from place to place, 2 mm deep"]),
+        ("aligned", 4, None, ["± 1.26 % from place to place, 2 mm deep"]),
+        ("aligned", 5, None, ["± 10.8 % from place to place, 2 mm deep"]),
         ("aligned", 6, None, ["mm deep"]),
         ("aligned", 7, None, ["the bed can show shapes, but cannot be sculpted"]),
         ("hexagonal", 4, None, []),

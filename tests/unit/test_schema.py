@@ -4,7 +4,7 @@ import tomllib
 from dataclasses import replace
 
 import pytest
-from digiclay.core.base.errors import ParameterError, SceneError
+from digiclay.core.base.errors import LONGEST, ParameterError, SceneError, one_line
 from digiclay.core.scene.scene_source import SAMPLES, Setting, find, list_samples, load
 from digiclay.core.scene.schema import (
     NEEDS,
@@ -280,4 +280,6 @@ def test_every_sample_is_a_scene_called_like_its_file():
 def test_what_is_no_sample_is_told_with_the_nearest_or_with_all(word, known):
     with pytest.raises(SceneError) as caught:
         find(word)
-    assert str(caught.value) == f"{word} is neither a file nor a sample{known}"
+    # Too many for a line of a message: those in the middle are left out.
+    whole = f"{word} is neither a file nor a sample{known}"
+    assert str(caught.value) == one_line(whole, LONGEST)

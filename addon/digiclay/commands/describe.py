@@ -166,15 +166,20 @@ def _pins(scene: Scene, system: System) -> Iterator[tuple[str, str]]:
     actuator, supply = scene.actuator, system.cell.supply
     speed = make_master_cell(system.cell, system.period).speed
     up, down = speed(1.0), 0.0 - speed(-1.0)
-    yield "valves", f"{scene.cells}, one per pin"
-    yield (
-        "free speed",
-        f"{up * 1e3:.3g} mm/s up, {down * 1e3:.3g} mm/s down, valve wide open and no load",
-    )
+    drive, turns, electric = scene.drive, 1, getattr(scene.valve, "law", "") == "motor"
+    count, words = scene.cells, "one per pin"
+    if drive is not None:
+        lines, count = drive.count_lines(scene.layout), drive.count_valves(scene.layout)
+        turns = 1 if drive.share else math.ceil(lines / drive.sections)
+        words = f"for {scene.cells} pins in {lines} lines"
+    yield "motors" if electric else "valves", f"{count}, {words}"
+    full = "at full command" if electric else "valve wide open"
+    speeds = f"{up * 1e3:.3g} mm/s up, {down * 1e3:.3g} mm/s down"
+    yield "free speed", f"{speeds}, {full} and no load"
     lift, pull = supply.high * actuator.area, (0.0 - supply.low) * actuator.area
-    yield "stall", f"{lift:.3g} N up, {pull:.3g} N down, valve wide open"
+    yield "stall", f"{lift:.3g} N up, {pull:.3g} N down, {full}"
     if supply.locks:
-        yield "shut valve", "holds any load, rigid; 0 mm of leak per minute"
+        yield "command 0", "holds any load, rigid; 0 mm of leak per minute"
     else:
         yield "command 0", f"yields {1e3 * up / lift:.3g} mm/s per N"
     for fingers, contact in _list_parts(scene, "contact"):
@@ -183,14 +188,15 @@ def _pins(scene: Scene, system: System) -> Iterator[tuple[str, str]]:
             first = law.share * law.stiffness
             yield (
                 f"felt {fingers}".strip(),
-                f"a held pin through the pulp: {first:.3g} N/m at first touch, "
-                f"{first + law.exponent * FELT:.3g} N/m at {FELT:g} N",
+                f"a held pin through the pulp: {first:.4g} N/m at first touch, "
+                f"{first + law.exponent * FELT:.4g} N/m at {FELT:g} N",
             )
-    volume = scene.cells * actuator.area * actuator.stroke
+    volume, stroke = scene.cells * actuator.area * actuator.stroke, turns * actuator.stroke
     yield (
         "refresh",
-        f"all pins together, from the floor to the full stroke: {_lasting(actuator.stroke, up)}; "
-        f"back to the floor: {_lasting(actuator.stroke, down)}; {volume * 1e6:.3g} ml",
+        f"{f'in {turns} turns' if turns > 1 else 'all pins together'}, from the floor to the full stroke: "
+        f"{_lasting(stroke, up)}; back to the floor: {_lasting(stroke, down)}"
+        + ("" if electric else f"; {volume * 1e6:.3g} ml"),
     )
 
 

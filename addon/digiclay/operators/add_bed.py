@@ -13,9 +13,10 @@ from ..core.files.run_folder import list_files
 from ..core.files.tables import Record
 from ..core.model.layout import ARRANGEMENTS, Layout
 from ..core.model.trajectory import sample_poses
-from ..core.scene.scene_source import SAMPLES, find, load
+from ..core.scene.scene_source import DISPLAY_SAMPLES, SAMPLES, find, load
 from ..core.scene.schema import Scene
 from ..core.scene.toml_table import PRESETS, resolve
+from ..core.session.plate import list_cautions
 from ..core.shapes.fitting import list_shapes
 from ..core.shapes.request import Shape
 from ..core.studies.job_table import embed_heights
@@ -41,7 +42,7 @@ from .poll_messages import baked, cannot_change, edited, inside_edit, no_collect
 
 DEFAULT = Layout()
 #: Sample scenes that Blender can open: none has bodies.
-SESSIONS = list(list_files(SAMPLES, ".toml"))
+SESSIONS, DISPLAYS = (list(list_files(folder, ".toml")) for folder in (SAMPLES, DISPLAY_SAMPLES))
 #: Beyond this a bed is a matter of scene files: the redo panel would stall on every change.
 MOST = 400
 #: Blender stores no reference to the texts of a list that is made on demand: this one does.
@@ -140,6 +141,8 @@ class Placed:
         bed.select_set(shown is None)
         if words:
             self.report({"INFO"}, words)
+        for caution in list_cautions(properties.read_scene(bed)):
+            self.report({"WARNING"}, caution)
         running.set_message(words, bed.session_uid)
 
 
@@ -364,6 +367,7 @@ class OpenScene(AddSceneAction, FileAction, Operator):
         "Sample",
         items=[
             *((f"session:{name}", title(name), "A session") for name in SESSIONS),
+            *((f"display:{name}", title(name), "A display") for name in DISPLAYS),
             *(
                 (f"shape:{name}", title(name), "A shape on a bed of 25 × 25 pins")
                 for name in list_shapes()
@@ -372,9 +376,9 @@ class OpenScene(AddSceneAction, FileAction, Operator):
     ),
 )
 def add_sample(operator: Operator, context: Context) -> None:
-    """Add a bed with a sample session or shape of Digital Clay"""
+    """Add a bed with a sample session, display or shape of Digital Clay"""
     kind, _, name = operator.sample.partition(":")
-    if kind == "session":
+    if kind != "shape":
         operator.add_scene(context, load(find(name)))
         return
     bed = add(context, resolve({}, name))
@@ -397,6 +401,12 @@ def session_samples(entries: Menu, context: Context) -> None:
     _list_samples(entries.layout, "session", SESSIONS)
 
 
+@menu("DIGICLAY_MT_display_samples", "Displays")
+def display_samples(entries: Menu, context: Context) -> None:
+    """Pin displays, built or planned; those with pins 7 mm apart show shapes, but cannot be sculpted"""
+    _list_samples(entries.layout, "display", DISPLAYS)
+
+
 @menu("DIGICLAY_MT_shape_samples", "Shapes")
 def shape_samples(entries: Menu, context: Context) -> None:
     """Sample shapes of Digital Clay, displayed on a bed"""
@@ -405,8 +415,9 @@ def shape_samples(entries: Menu, context: Context) -> None:
 
 @menu("DIGICLAY_MT_samples", "Digital Clay Samples")
 def samples(entries: Menu, context: Context) -> None:
-    """Sample sessions and shapes of Digital Clay"""
+    """Sample sessions, displays and shapes of Digital Clay"""
     entries.layout.menu(session_samples.bl_idname, icon="CON_TRACKTO")
+    entries.layout.menu(display_samples.bl_idname, icon="MESH_GRID")
     entries.layout.menu(shape_samples.bl_idname, icon="RNDCURVE")
     entries.layout.separator()
     entries.layout.operator_context = "INVOKE_DEFAULT"

@@ -40,9 +40,10 @@ Source = Scene | Table | str | os.PathLike[str]
 #: Sections that another scene may take from a file, and what else may stand there.
 PORTABLE = (*SECTIONS[1 : SECTIONS.index("control")],)
 BESIDE = (FORMAT, "name", "description", UNCERTAINTY)
-#: Folders of the sample scenes without bodies, and with them.
+#: Folders of the sample scenes: sessions without bodies, and with them; displays that were built.
 SAMPLES = Path(__file__).parents[2] / "sample_shapes" / "sessions"
-BODY_SAMPLES = SAMPLES.parent / "bodies"
+BODY_SAMPLES, DISPLAY_SAMPLES = SAMPLES.parent / "bodies", SAMPLES.parent / "displays"
+SAMPLE_FOLDERS = SAMPLES, BODY_SAMPLES, DISPLAY_SAMPLES
 
 
 def list_samples() -> list[str]:
@@ -52,7 +53,11 @@ def list_samples() -> list[str]:
 
 def _list_sample_files() -> dict[str, Path]:
     """Return the files of the sample scenes, by their names."""
-    files = {**list_files(SAMPLES, ".toml"), **list_files(BODY_SAMPLES, ".toml")}
+    files = {
+        name: path
+        for folder in SAMPLE_FOLDERS
+        for name, path in list_files(folder, ".toml").items()
+    }
     return dict(sorted(files.items()))
 
 
@@ -155,9 +160,7 @@ def make_scene(
         if settings:
             make_scene(path, table)  # reports an error of the file itself first
         key = split_key(f"{error.owner}.{error.field}")
-        origins = (
-            [path.name if path.parent in (SAMPLES, BODY_SAMPLES) else str(path)] if path else []
-        )
+        origins = [path.name if path.parent in SAMPLE_FOLDERS else str(path)] if path else []
         origins += [setting.option for setting in settings]
         for setting in settings:
             changed = split_key(setting.key)

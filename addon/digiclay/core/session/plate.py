@@ -108,7 +108,7 @@ def list_cautions(scene: Scene) -> list[str]:
         if spread > COARSE:
             lines.append(
                 f"pins {plan.pitch * 1e3:g} mm apart are coarse for this finger: "
-                f"its force changes by ± {100 * spread:.2g} % from place to place, "
+                f"its force changes by ± {100 * spread:.3g} % from place to place, "
                 f"{JUDGED * tip.height * 1e3:g} mm deep"
                 + (": the bed can show shapes, but cannot be sculpted" if spread > LOST else "")
             )
