@@ -155,6 +155,8 @@ def test_describe_counts_cells_periods_and_bytes_and_lists_every_parameter_with_
     # Height, three filters, the valve, two commands on their way, target, force: 9 float64.
     counts = ("3 x 4 = 12 cells", "20 control periods", "9 rows", "72 bytes")
     assert [part for part in counts if part not in out] == []
+    # Of the law of the valve that is selected, not of others.
+    assert ("orifice diameter" in out, "stall force" in out) == (True, False)
     assert main(["describe", "tap", "--parameters", "--set", "layout.pitch=3.5 mm"]) == 0
     text = capsys.readouterr().out
     parts = {"layout": Layout, "actuator": Actuator, "control": VirtualMaster}

@@ -225,9 +225,11 @@ def _filled(place: str, text: str) -> str:
 
 
 def _parameters(part: Parameters) -> str:
-    """Write a part's parameters on one line."""
-    shown = []
+    """Write a part's parameters on one line, without those of laws that are not selected."""
+    shown, idle = [], part.list_idle()
     for name, declared in list_quantities(part).items():
+        if name in idle:
+            continue
         value = getattr(part, name)
         values = value if isinstance(value, tuple) else (value,)
         shown.append(
