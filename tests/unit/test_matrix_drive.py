@@ -1,21 +1,36 @@
 """A matrix drive: which lines it addresses, what their cells command, and what it leaves as it is."""
 
+import digiclay
 import numpy as np
 import pytest
-from digiclay.core.base.errors import ParameterError
+import trimesh
+from digiclay.core.base.errors import ParameterError, StateError
+from digiclay.core.batch.run_together import run_together
 from digiclay.core.control.methods import METHODS
+from digiclay.core.control.orders import place
 from digiclay.core.engine.simulation import begin, periods
 from digiclay.core.model.control_interface import Commands, Measurement
 from digiclay.core.model.layout import Layout
 from digiclay.core.model.matrix_drive import POLICIES, MatrixDrive, make_addressing
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.toml_table import format_scene, resolve
+from digiclay.core.session import snapshot
+from digiclay.core.session.live_session import simulate_path
 from digiclay.core.session.run_scene import run
+from digiclay.core.session.take import Take, from_bytes, replay, to_bytes
+from digiclay.core.shapes.body import pack_mesh
 
 from tests.assemble import over_middle, refused_in_a_line, table
+from tests.own_methods import Mine, forgotten
 
 BED = {"layout": {"rows": 11, "columns": 13}}
 WAY = {"waypoints": over_middle((0, 42e-3), (0.1, 37e-3), (0.25, 37e-3), (0.5, 46e-3))}
+ASIDE = {
+    "waypoints": [
+        {**point, "position": [9e-3, 0, point["position"][2]]} for point in WAY["waypoints"]
+    ]
+}
+BOX = trimesh.creation.box((12e-3, 12e-3, 4e-3))
 
 
 def scene(drive=None, **tables):
@@ -30,7 +45,8 @@ def scene(drive=None, **tables):
 def test_as_many_sections_as_lines_are_a_valve_per_cell_bit_for_bit(method, drive):
     control = {"control": {"method": method}}
     driven, direct = (run(scene(given, **control)).history for given in (drive, None))
-    assert driven.keys() == direct.keys()
+    assert driven.keys() - direct.keys() == {"served"}
+    assert driven["served"][:-1].all()
     for name, values in direct.items():
         assert driven[name].tobytes() == values.tobytes(), name
 
@@ -168,3 +184,86 @@ def test_pins_that_wait_for_their_lines_arrive():
     *_, state = periods(system, made.trajectories(), begin(system), made.periods)
     assert np.abs(state.row(0) - 40e-3).max() <= made.control.dead_band
     assert not state.addressing.waiting.size
+
+
+#: Beds on which a drive serves: sections of the scene.
+BEDS = {
+    "of Method III": {"control": {"method": "hybrid"}},
+    "of a behavior": {"control": {"method": "viscous"}},
+    "that shows a shape, then forms": {"shape": {"file": "ripple", "rise": "2 mm"}},
+    "with sensors": {"sensors": {"delay": 1, "force_noise": "1 mN"}},
+    "of shifted rows": {"layout": {"rows": 11, "columns": 13, "arrangement": "hexagonal"}},
+    "under a hand that gives way": {"hand": {}},
+    "under a body": {
+        "control": {"method": "plastic"},
+        "trajectory": None,
+        "body": [{"mesh": pack_mesh(BOX.vertices, BOX.faces), "trajectory": WAY}],
+    },
+    "under two fingers": {
+        "trajectory": None,
+        "finger": [{"trajectory": WAY}, {"trajectory": ASIDE}],
+    },
+}
+DRIVE = {"sections": 3, "slot": 15e-3, "share": True}
+
+
+@pytest.mark.parametrize("tables", BEDS.values(), ids=BEDS)
+def test_a_bed_is_driven_goes_on_from_a_kept_state_and_knows_its_error(tables):
+    tables = {key: part for key, part in {"trajectory": WAY, **tables}.items() if part is not None}
+    made = resolve({**BED, **tables, "drive": DRIVE})
+    system, paths = assemble(made), made.trajectories()
+    *_, half = periods(system, paths, begin(system), 40)  # in mid-slot
+    data = snapshot.dump(system, half)
+    *_, end = periods(system, paths, half, 30)
+    *_, again = periods(system, paths, snapshot.load(system, data), 30)
+    assert snapshot.dump(system, again) == snapshot.dump(system, end)
+    result = run(made)
+    served, command = result.history["served"], result.history["command"]
+    assert served.shape == command.shape
+    assert not command[~served].any()
+    error = result.estimate_errors().metrics["height_error"]
+    assert error < 0.2e-3  # commands that did not act would leave millimeters
+
+
+def test_a_state_of_a_bed_without_a_drive_goes_on_with_one_and_of_other_lines_is_refused():
+    bare, driven = assemble(scene()), assemble(scene({"axis": "columns"}))
+    state = snapshot.load(driven, snapshot.dump(bare, begin(bare)))
+    assert state.addressing.served.tolist() == [True] * 4 + [False] * 9
+    rows = assemble(scene({"axis": "rows"}))
+    with refused_in_a_line(StateError, "lines of the drive as the bed now, 11 .got 13"):
+        snapshot.load(rows, snapshot.dump(driven, state))
+
+
+def test_orders_to_the_valves_pass_the_drive_and_a_take_is_replayed_bit_for_bit():
+    made = scene({"sections": 1})
+    system, count = assemble(made), 400
+    raised = np.full(143, np.nan)
+    raised[30:80] = 43e-3
+    poses = np.tile([0.0, 0.0, 0.1, 1.0, 0.0, 0.0, 0.0], (count + 1, 1, 1))
+    start = snapshot.dump(system, begin(system))
+    seen = 0
+    for state in simulate_path(system, begin(system), poses, place(count, raised)):
+        moved = np.flatnonzero(state.row(system.rows.command))
+        line, _ = made.drive.locate(made.layout, moved)
+        assert state.addressing.served[line].all()
+        seen = max(seen, np.unique(line).size)
+    assert seen == 1
+    end = snapshot.dump(system, state)
+    take = from_bytes(to_bytes(Take(made, start, poses, end, place(count, raised))))
+    *_, state = replay(take)
+    assert snapshot.dump(system, state) == end
+    assert np.nanmax(np.abs(state.row(0) - raised)) < 1e-6
+
+
+def test_a_batch_with_a_drive_is_refused_and_its_runs_are_run_alone():
+    with refused_in_a_line(ParameterError, "must have no drive: run them alone"):
+        list(run_together([scene({}), scene({"sections": 3})][:1]))
+
+
+def test_a_method_of_ones_own_is_driven_unchanged():
+    with forgotten():
+        tables = {**BED, "trajectory": WAY, "drive": {"sections": 2}}
+        result = run(digiclay.scene(tables, {"control.method": Mine}))
+    command, served = result.history["command"], result.history["served"]
+    assert command.any()
+    assert not command[~served].any()

@@ -77,6 +77,8 @@ class Readings:
     top: float | None = None
     #: Whether the contact law does not hold now, by `core.model.touch`.
     beyond: bool = False
+    #: Number of lines that a drive addresses now, of all, and of pins that wait; None: no drive.
+    drive: tuple[int, int, int] | None = None
     #: Largest force of several fingertips now, N; None of one, whose force is the total.
     hardest: float | None = None
     #: How many pins are pressed, where meshes press them too; None: only fingertips do.
@@ -312,6 +314,11 @@ def _draw_modes(pen: Pen) -> None:
     pen.row(localize("Pins by mode"), f"{int(modes.sum())}")
     names = {mode: localize(mode.name.lower().replace("_", " ")) for mode in Mode if modes[mode]}
     pen.entries(2, [(colors[mode], f"{modes[mode]} {name}") for mode, name in names.items()])
+    if pen.readings.drive:
+        served, lines, waiting = pen.readings.drive
+        pen.row(
+            localize("{} of {} lines addressed", served, lines), localize("{} pins wait", waiting)
+        )
 
 
 def _size(error: float, unit: str) -> str:

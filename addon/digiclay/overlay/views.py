@@ -16,6 +16,7 @@ from .. import preferences
 from ..bridge import project
 from ..compat import Area, Context, Object, Region, bpy
 from ..core.base.modes import COLORS, Mode
+from ..core.engine.state import State
 from ..core.model.control_interface import find_set_point
 from ..core.session.recent_trace import exceeds_law
 from ..device import palettes, view
@@ -110,9 +111,16 @@ def read_session(
         seconds=bed.digiclay_display.seconds,
         top=view.read_setting(bed, TOP_FORCE, None) if view.shows_force(bed) else None,
         hardest=float(forces.max()) if len(forces) > 1 else None,
+        drive=_count_served(session.state),
         beyond=exceeds_law(session.system, session.state, session.tips[0]),
         pressed=_count_pressed(session) if scene.bodies else None,
     )
+
+
+def _count_served(state: State) -> tuple[int, int, int] | None:
+    """Return the numbers of lines addressed, of all lines, and of pins that wait; None without a drive."""
+    now = state.addressing
+    return now and (int(now.served.sum()), now.served.size, now.waiting.size)
 
 
 def _count_pressed(session: running.Running) -> int:

@@ -84,6 +84,8 @@ def session_figure(history: History, set_point: SetPoint | None) -> Figure:
         figures = place("figures", 8.62, 0.65, 3.78, 1.7)
         draw_map(plan, history, "Where the cells are")
         for name, color, cell in zip(letters, LINES, session_cells(history), strict=False):
+            if "served" in history:
+                _mark_served(heights, time, array(history, "served")[:, cell], color)
             heights.plot(time, height[:, cell] * MM, color=color, label=name)
             spot = array(history, "position")[cell] * MM
             disc = {
@@ -155,6 +157,14 @@ def shade_contact(axes: Axes, history: History, label: str | None = None) -> Non
     touching, across = find_contact_rows(array(history, "total_force")), axes.get_xaxis_transform()
     shade: dict[str, Any] = {"color": SHADE, "linewidth": 0, "label": label}
     axes.fill_between(array(history, "time"), 0, 1, where=touching, transform=across, **shade)
+
+
+def _mark_served(axes: Axes, time: ArrayLike, served: Any, color: str) -> None:
+    """Draw a strip below the former ones at the top of the axes: when a cell's line is addressed."""
+    top = 1.0 - 0.02 * len(axes.collections)
+    strip: dict[str, Any] = {"color": color, "linewidth": 0, "step": "post"}
+    across = axes.get_xaxis_transform()
+    axes.fill_between(time, top, top - 0.015, where=served, transform=across, **strip)
 
 
 def surface_figure(history: History) -> Figure:

@@ -76,6 +76,11 @@ class MatrixDrive(Parameters):
         lines = self.count_lines(layout)
         return lines + self.sections * (layout.rows * layout.columns // lines)
 
+    def locate(self, layout: Layout, cells: Cells) -> tuple[Cells, Cells]:
+        """Return the lines of cells (m,), and their places along them."""
+        row, column = np.divmod(cells, layout.columns)
+        return (row, column) if self.axis == "rows" else (column, row)
+
     def count_periods(self, period: float) -> int:
         """Return the control periods, of `period` s, of a slot."""
         return max(1, round(self.slot / period))
@@ -131,16 +136,11 @@ class MatrixAddressing:
             np.empty(0, np.intp),
         )
 
-    def locate(self, cells: Cells) -> tuple[Cells, Cells]:
-        """Return the lines of cells (m,), and their places along them."""
-        row, column = np.divmod(cells, self.layout.columns)
-        return (row, column) if self.parameters.axis == "rows" else (column, row)
-
     def serve(
         self, state: Addressing, period: int, seen: Measurement, orders: Commands
     ) -> tuple[Addressing, Commands]:
         """Return the commands that act in a control period: 0 for cells whose line is not addressed."""
-        line, place = self.locate(seen.cells)
+        line, place = self.parameters.locate(self.layout, seen.cells)
         table = np.zeros((self.lines, seen.cells.size and int(place.max()) + 1))
         table[line, place] = orders.command
         served = state.served

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.arrays import Array, Floats, Modes
+from ..base.arrays import Array, Flags, Floats, Modes
 from ..base.quantity import Parameters, quantity
 from ..engine.state import ActiveSet, Rows, State
 
@@ -156,12 +156,15 @@ class RunRecording(Recording):
         self._history.begin(state.row(0), state.mode())
         super().__init__(recorder, rows, self._history.write, bodies)
         self._fingers = [_read_fingers(state)]
+        self._served: list[Flags] = []
         self._last = state
 
     def observe(self, state: State) -> None:
         """Record the state after a control period."""
         super().observe(state)
         self._last = state
+        if state.addressing and (state.period - 1) % self.every == 0:
+            self._served.append(state.addressing.served)
         if state.period % self.every == 0:
             self._fingers.append(_read_fingers(state))
 
@@ -171,6 +174,9 @@ class RunRecording(Recording):
         rows = self._history.finish(period, self.every)
         last = _read_fingers(self._last)
         each = [*self._fingers, last][: len(rows["period"])]
+        if self._served:
+            # No period follows the last row.
+            rows["served"] = np.array([*self._served, np.zeros_like(self._served[0])])
         return rows | {name: np.array([values[name] for values in each]) for name in last}
 
 

@@ -68,6 +68,13 @@ HISTORY_ARRAYS: dict[str, HistoryArray] = {
     "beyond_a_finger": HistoryArray(
         "t", "1", "whether a finger presses beyond the range of the contact law", "b", optional=True
     ),
+    "served": HistoryArray(
+        "t, n",
+        "1",
+        "whether the drive addresses each pin's line in that control period",
+        "b",
+        optional=True,
+    ),
     "position": HistoryArray("n, 2", "m", "x and y of each pin's axis from the middle of the bed"),
 }
 

@@ -270,6 +270,9 @@ def _complete(scene: Scene, system: System, rows: History) -> History:
         paths = [each.trajectory.trajectory() for each in scene.bodies]
         history["body"] = sample_poses(paths, moments)
     history["fingertip"] = per_finger(poses)
+    if scene.drive:
+        line, _ = scene.drive.locate(scene.layout, np.arange(scene.cells))
+        history["served"] = history["served"][:, line]
     history["total_force"] = rows["force"].sum(axis=1)
     history["position"] = system.grid.positions
     return history
