@@ -199,7 +199,7 @@ def test_a_wrong_scene_is_refused_in_one_line(content, changes, message):
             "layot must be a known key (got 3). Did you mean layout",
         ),
         (lambda scene: scene.with_sections(layout=3), "layout must be Layout (got int)."),
-        (lambda scene: scene.with_sections(valve=None), "valve must be Valve (got None)."),
+        (lambda scene: scene.with_sections(valve=None), "valve must be Valve or Motor (got None)."),
         (
             lambda scene: scene.with_sections(fingertip=scene.valve),
             "fingertip must be Fingertip or None (got Valve)",
