@@ -15,7 +15,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ..base.arrays import Cells, Flags
+from ..base.arrays import Cells, Flags, Floats
 from ..base.modes import HOLD, LOCKED
 from ..model.fingertip import Window, compute_reach
 from ..model.layout import Disc, Discs, Grid, encloses, widen_disc
@@ -137,13 +137,18 @@ class Selection:
         state.rows.reshape(rows.count, -1)[:, active.flat] = active.block
         state.modes.reshape(-1)[active.flat] = active.mode
         state.aged.reshape(-1)[active.flat[: active.near]] = state.period * self.period
-        moving: Flags = active.block[cell.lag_rows.start : rows.target].any(axis=0)
+        moving = self.find_driven(active.block)
         moving |= active.block[rows.force] > 0.0
         # Locked pins do not move.
         moving |= (active.mode > HOLD) & (active.mode != LOCKED)
         if state.addressing is not None:
             moving |= np.isin(active.cells, state.addressing.waiting)
         return moving
+
+    def find_driven(self, block: Floats) -> Flags:
+        """Return the cells whose valves are open, or will be by a queued command; of rows (r, m[, b])."""
+        driven: Flags = block[self.cell.lag_rows.start : self.rows.target].any(axis=0)
+        return driven
 
     def take(self, state: State, chosen: ActiveSet) -> ActiveSet:
         """Return the chosen set with its rows of a state whose set is released; ages the pulp over them."""

@@ -50,6 +50,11 @@ class Commands(NamedTuple):
     mode: NDArray[np.int8]
     command: Floats
 
+    @property
+    def queued(self) -> tuple[Floats, ...]:
+        """What is queued of it in a control period."""
+        return (self.command,)
+
     def take(self, entries: Cells) -> "Commands":
         """Return some of them, by their numbers in a row."""
         return Commands(

@@ -59,6 +59,14 @@ class Lag(Protocol):
 
     def settle(self, rows: Floats) -> None: ...
 
+    def list_cuts(self, queue: Queue) -> tuple[float, ...]:
+        """Return when the valve changes to the next command in a period, s."""
+        return (queue.cut,)
+
+    def join(self, raw: Floats, count: int) -> Floats:
+        """Return the openings at the first `count` times of `response` from its product with the rows."""
+        return raw[:count]
+
 
 class Pulp(Protocol):
     """Relaxation of the pulp; `filters` are its state rows, (rows, k)."""

@@ -9,6 +9,7 @@ import numpy as np
 from ..base.arrays import Floats
 from ..base.quantity import Parameters, quantity
 from .delay import Queue
+from .interfaces import Lag
 
 #: Opening below which a closing valve counts as shut: its flow is at most 1e-18 of a cell's free
 #: speed, and a cell with a shut valve need not be integrated.
@@ -16,7 +17,7 @@ SHUT = 1e-9
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class ValveLag(Parameters):
+class ValveLag(Parameters, Lag):
     """``τ_v dK/dt + K = K_com``: exact while the command is held."""
 
     time_constant: float = quantity(

@@ -66,6 +66,36 @@ class MatrixDrive(Parameters):
         False,
         "whether lines of a set are addressed together, with the commands they have in common",
     )
+    line_lag: float = quantity(
+        0.0,
+        "time constant of the gates of lines, in series with those of columns, whose lag is that of "
+        "the valve; 0: a cell opens and shuts as one valve",
+        unit="s",
+        symbol="τ_l",
+        at_least=0.0,
+    )
+    overlap: float = quantity(
+        0.0,
+        "time by which gates of lines follow those of columns",
+        unit="s",
+        symbol="t_o",
+        at_least=0.0,
+    )
+    leak: float = quantity(
+        0.0,
+        "conductance of a shut gate as a share of an open one",
+        symbol="ε",
+        at_least=0.0,
+        below=1.0,
+    )
+
+    def check(self) -> None:
+        """Refuse properties of gates without gates."""
+        for name in ("overlap", "leak"):
+            value = getattr(self, name)
+            if value and not self.line_lag:
+                rule = "must be 0 without gates of lines: give drive.line_lag"
+                raise ParameterError("drive", name, rule, f"{value:g}")
 
     def count_lines(self, layout: Layout) -> int:
         """Return the number n of lines of a bed."""

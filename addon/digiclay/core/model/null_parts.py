@@ -8,10 +8,10 @@ import numpy as np
 from ..base.arrays import Floats
 from .control_interface import Commands, Measurement, Memory
 from .delay import Queue
-from .interfaces import Alike, Sensors
+from .interfaces import Alike, Lag, Sensors
 
 
-class InstantValve(Alike):
+class InstantValve(Alike, Lag):
     """No valve lag: the opening is the command."""
 
     rows = 0

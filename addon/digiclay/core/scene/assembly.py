@@ -19,7 +19,7 @@ from ..engine.hand_steps import HandStep
 from ..engine.state import Rows
 from ..engine.system import System, make_segments
 from ..model.control_interface import Controller
-from ..model.delay import Queue, split_delay
+from ..model.delay import Delay, Queue, split_delay
 from ..model.fingertip import Fingertip, require_one
 from ..model.interfaces import Drive, Flow, Segment, Sensors, Stepper
 from ..model.laws import import_part, select_law
@@ -110,10 +110,39 @@ def assemble(scene: Scene) -> System:
         hands=(),
     )
 
+    if scene.drive and scene.drive.line_lag:
+        return _add_gates(scene, motion, system)
+
     def plan(line: Queue, steps: tuple[Segment, ...]) -> System:
         return replace(system, plan=motion.stepper.plan(cell, line, steps))
 
     return replace(system, hands=_make_hand_steps(scene, motion, plan))
+
+
+def _add_gates(scene: Scene, motion: Motion, system: System) -> System:
+    """Return the system of a scene whose cells have gates of lines and columns in place of valves."""
+    from ..engine.gated_lines import GatedDrive, GatedSelection
+    from ..model.gates import Gates
+    from ..model.lag import ValveLag
+
+    drive, lag, period = scene.drive, scene.valve_lag, system.period
+    assert drive
+    assert lag
+    dead_time = (scene.delay.dead_time if scene.delay else 0.0) + drive.overlap
+    queue = split_delay(Delay(dead_time), period)
+    power = scene.valve.flow_law(scene.fluid, scene.actuator.area).power
+    gates: Any = Gates(ValveLag(drive.line_lag), lag, queue, drive.leak, power)
+    cell = replace(motion.cell, lag=gates)
+    plan = motion.stepper.plan(cell, motion.line, motion.steps)
+    commands = 2 * max(queue.length, motion.line.length)
+    rows = replace(system.rows, physics=cell.rows, queue=commands)
+    shut = gates.join(np.zeros((2, 1)), 1)[0]
+    flow = cell.flow.flow(shut, cell.supply.pressure(shut))
+    creep = period * float(flow[0]) / cell.actuator.area
+    lines: Any = system.drive
+    gated = GatedDrive(lines, cell, rows, motion.stepper, plan, system.instants.size, creep)
+    selection = GatedSelection(system.grid, rows, cell, period, system.fastest, gated)
+    return replace(system, cell=cell, plan=plan, rows=rows, drive=gated, selection=selection)
 
 
 def _make_hand_steps(

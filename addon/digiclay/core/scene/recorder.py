@@ -124,6 +124,10 @@ class HistoryWriter:
         self._now[:, cells], self._mode_now[cells] = stretch.last, stretch.last_mode
         self._done, self._given = felt.stop, given.stop
 
+    def age(self, height: Floats) -> None:
+        """Replace the heights of idle cells by those of all, (n,), m."""
+        self._now[0] = height
+
     def finish(self, period: int, every: int) -> dict[str, Array]:
         """Return the rows, valid until `begin`: period (t,), height, force, command, mode (t, n).
 
@@ -161,7 +165,10 @@ class RunRecording(Recording):
 
     def observe(self, state: State) -> None:
         """Record the state after a control period."""
+        renewed = state.active is not self._last.active
         super().observe(state)
+        if renewed and state.addressing is not None:
+            self._history.age(state.row(0))
         self._last = state
         if state.addressing and (state.period - 1) % self.every == 0:
             self._served.append(state.addressing.served)

@@ -256,6 +256,8 @@ class Scene(Described):
         if self.drive:
             dead_time = self.delay.dead_time if self.delay else 0.0
             self.drive.check_device(plan, self.simulation.control_period, dead_time)
+            if self.drive.line_lag:
+                self._refuse_beside_gates()
 
     def _refuse_beside_bodies(self) -> None:
         """Refuse what cannot be where bodies press."""
@@ -266,6 +268,25 @@ class Scene(Described):
         if any(self.list_parts("hand")):
             rule = "must be left out beside [[body]], where paths are prescribed"
             raise ParameterError("hand", "", rule, "a hand")
+
+    def _refuse_beside_gates(self) -> None:
+        """Refuse what is not simulated with gates of lines and columns."""
+        sensing = self.sensors
+        wrong = {
+            "finger: must be one": len(self.fingers) != 1,
+            "body: must be absent": bool(self.bodies),
+            "hand: must be absent": any(self.list_parts("hand")),
+            "valve_lag: must be given": self.valve_lag is None,
+            "valve.law: must be orifice": getattr(self.valve, "law", "orifice") != "orifice",
+            "sensors.observer: must be none": bool(sensing and sensing.observer == "valve"),
+            "simulation.stepper: must be bernoulli or richardson": self.simulation.stepper
+            not in ("bernoulli", "richardson"),
+        }
+        for rule, broken in wrong.items():
+            if broken:
+                name, rule = rule.split(": ")
+                value = f"{self.drive.line_lag:g} s" if self.drive else ""
+                raise ParameterError(name, "", f"{rule} with drive.line_lag", value)
 
     def _refuse_beside_motors(self) -> None:
         """Refuse what motors do not have, and a force that is no pressure on a pin."""

@@ -123,6 +123,8 @@ def explain_absence(scene: Scene) -> str:
     """Return why errors of a run of this scene cannot be estimated, or ``""``."""
     if scene.recorder is None:
         return "recorder = 'absent' keeps no command"
+    if scene.drive and scene.drive.line_lag:
+        return "commands of the lines' gates are not recorded"
     try:
         reference_settings(scene.simulation)
     except ParameterError:
@@ -222,7 +224,9 @@ def _measure_bends(paths: tuple[Path, ...], step: float, duration: float) -> flo
 
 
 def start(scene: Scene) -> ErrorMonitor | None:
-    """Return the monitor of a live session that begins; None if the step cannot be halved."""
+    """Return the monitor of a live session that begins; None if its errors cannot be estimated."""
+    if scene.drive and scene.drive.line_lag:
+        return None
     try:
         # With the controller: a stretch begins with a copy of the session's state, which has its
         # rows.

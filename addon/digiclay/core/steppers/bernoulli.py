@@ -136,7 +136,7 @@ def _path(segments: tuple[Segment, ...]) -> Floats:
 
 
 def _gauss_points(
-    queue: Queue, segments: tuple[Segment, ...]
+    cuts: tuple[float, ...], segments: tuple[Segment, ...]
 ) -> tuple[Floats, Floats, tuple[slice, ...]]:
     """Return Gauss points of all steps: times and weights, s, and the slice of each step.
 
@@ -148,7 +148,7 @@ def _gauss_points(
     nodes: list[slice] = []
     for part in segments:
         end = part.start + part.length
-        inner = (queue.cut,) if part.start < queue.cut * (1.0 - 1e-9) < end * (1.0 - 2e-9) else ()
+        inner = [cut for cut in cuts if part.start < cut * (1.0 - 1e-9) < end * (1.0 - 2e-9)]
         first = len(times)
         for a, b in pairwise((part.start, *inner, end)):
             points = next(
@@ -192,7 +192,7 @@ class BernoulliExponential(Alike):
 
     def plan(self, cell: Cell, queue: Queue, segments: tuple[Segment, ...]) -> BernoulliPlan:
         """Compute once what all periods share."""
-        times, weights, nodes = _gauss_points(queue, segments)
+        times, weights, nodes = _gauss_points(cell.lag.list_cuts(queue), segments)
         end = segments[-1].start + segments[-1].length
         pulp, contact = (
             (cell.touch.pulp, cell.touch.contact) if cell.touch else (Unrelaxed(), Contact())
@@ -254,11 +254,10 @@ class StepWorkspace:
 
         self.plan, self.height, self.near = plan, rows[0], rows[0, :k]
         self.pulp, self.lag = rows[cell.pulp_rows, :k], rows[cell.lag_rows]
-        openings = empty(len(plan.response), every)
-        self.opening, self.opening_after = (
-            openings[:gauss],
-            openings[len(openings) - len(self.lag) :],
-        )
+        openings = np.zeros_like(rows, shape=(len(plan.response), *every))
+        self.opening_after = openings[len(openings) - len(self.lag) :]
+        self.opening = cell.lag.join(openings, gauss)
+        self.gates = openings if cell.lag.rows > 1 else None
         self.open_valves = prepare_map(plan.response, rows[cell.lag_rows.start :], openings)
         # Conductances of the valves, the same with the signs of the openings, underside, and ones.
         inputs = empty(2 * gauss + instants + 1, every)
@@ -299,6 +298,8 @@ class StepWorkspace:
     def __call__(self, under: Floats) -> Floats:
         """Move the block by one control period, in place; see `interfaces.Movement`."""
         self.open_valves()
+        if self.gates is not None:
+            self.opening[:] = self.plan.cell.lag.join(self.gates, len(self.opening))
         self.lag[:] = self.opening_after
         self._conduct()
         self.rise_freely()

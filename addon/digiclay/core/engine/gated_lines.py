@@ -1,0 +1,178 @@
+"""Beds whose cells have gates of their lines and columns: commands, active set, creep of idle cells.
+
+A gate of a line has the same opening in all its cells, and so has one of a column in a set of lines.
+Idle cells, on which nothing presses, therefore move as the sum of what a cell does whose line alone,
+and one whose column alone, has opened: a cell without load stands for each line and each column.
+Their motion is added to idle cells whenever the active set is renewed. Cells where an open line
+meets an open column are active.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..base.arrays import Cells, Flags, Floats, Modes
+from ..model.control_interface import Commands, Measurement
+from ..model.fingertip import Window
+from ..model.gates import Gates
+from ..model.interfaces import Movement, Stepper
+from ..model.layout import Discs
+from ..model.matrix_drive import Addressing, MatrixAddressing
+from ..model.physics import Cell
+from .active_set import Selection
+from .state import ActiveSet, Rows, State
+
+
+class GatedCommands(NamedTuple):
+    """Output of the drive; see `Commands`, with column gates for valves, and commands of the line gates."""
+
+    target: Floats
+    mode: Modes
+    command: Floats
+    gate: Floats
+
+    @property
+    def queued(self) -> tuple[Floats, ...]:
+        """What is queued of it in a control period."""
+        return self.gate, self.command
+
+
+class GatedAddressing(NamedTuple):
+    """State of the drive; see `Addressing` for the first three."""
+
+    served: Flags
+    last: Cells
+    waiting: Cells
+    cells: Floats
+    """(r, n + k m + 1): Rows of a cell for each line, for each column, and of one whose gates stay shut."""
+    aged: int
+    """Control period up to which idle cells are as of now."""
+
+
+@dataclass(frozen=True, eq=False)
+class GatedDrive:
+    """Drive whose lines and columns have gates in series."""
+
+    lines: MatrixAddressing
+    cell: Cell
+    """With `Gates` as its lag."""
+    rows: Rows
+    stepper: Stepper
+    plan: Any
+    instants: int
+    creep: float
+    """Motion of an idle cell in a period while both gates are shut, m."""
+
+    @property
+    def gates(self) -> Gates:
+        """Gates of a cell."""
+        gates: Any = self.cell.lag
+        return gates
+
+    @property
+    def columns(self) -> int:
+        """Number m of cells in a line."""
+        layout = self.lines.layout
+        return layout.rows * layout.columns // self.lines.lines
+
+    @property
+    def middle(self) -> float:
+        """Height at which the cells of lines and columns begin, m."""
+        return 0.5 * self.cell.actuator.stroke
+
+    @cached_property
+    def workspace(self) -> tuple[Floats, Movement]:
+        """Rows of the cells of lines and columns, and their movement."""
+        count = self.lines.lines + self.lines.parameters.sections * self.columns + 1
+        rows = np.zeros((self.rows.target, count))
+        return rows, self.stepper.prepare(self.plan, rows, 0)
+
+    def begin(self) -> GatedAddressing:
+        """Return the state before a session: all gates are shut."""
+        cells = np.zeros_like(self.workspace[0])
+        cells[0] = self.middle
+        return GatedAddressing(*self.lines.begin(), cells, 0)
+
+    def find_gates(self, cells: Cells) -> tuple[Cells, Cells]:
+        """Return the numbers of the lines and of the columns of cells in `GatedAddressing.cells`."""
+        line, place = self.lines.locate(cells)
+        section = line % self.lines.parameters.sections
+        return line, self.lines.lines + section * self.columns + place
+
+    def serve(
+        self, state: GatedAddressing, period: int, seen: Measurement, orders: Commands
+    ) -> tuple[GatedAddressing, Commands]:
+        """Return the commands of both gates of cells in a control period: also where the line is shut."""
+        addressing, orders = self.lines.serve(Addressing(*state[:3]), period, seen, orders)
+        line, column = self.find_gates(seen.cells)
+        block, move = self.workspace
+        block[:] = state.cells
+        queue = block[self.rows.commands]
+        queue[:-2], queue[-2:] = queue[2:].copy(), 0.0
+        queue[-2, : self.lines.lines] = addressing.served
+        addressed = addressing.served[line]
+        queue[-1, column[addressed]] = self.gates.command(orders.command[addressed])
+        commands: Any = GatedCommands(
+            orders.target, orders.mode, queue[-1, column], queue[-2, line]
+        )
+        move(np.empty((self.instants, 0)))
+        return GatedAddressing(*addressing, block.copy(), state.aged), commands
+
+    def age(self, height: Floats, state: GatedAddressing, period: int) -> GatedAddressing:
+        """Move idle cells, of heights (n,), m, in place, up to a control period."""
+        line, column = self.find_gates(np.arange(height.size))
+        own = state.cells[0] - state.cells[0, -1]
+        height += own[line] + own[column] + (period - state.aged) * self.creep
+        np.clip(height, 0.0, self.cell.actuator.stroke, out=height)
+        cells = state.cells.copy()
+        cells[0] = self.middle
+        return state._replace(cells=cells, aged=period)
+
+
+@dataclass(frozen=True, eq=False)
+class GatedSelection(Selection):
+    """Selection of the active cells where cells have two gates."""
+
+    drive: GatedDrive
+
+    #: Control periods for which a set serves, and by which idle cells may be out of date.
+    lifetime = 8
+
+    def renew(
+        self, state: State, active: ActiveSet, window: Window | None, disc: Discs | None
+    ) -> State:
+        """Return a state, in the same arrays, with another set, and idle cells as of now."""
+        addressing: Any = state.addressing
+        height = state.rows[0]
+        addressing = self.drive.age(height, addressing, state.period)
+        peak = max(state.peak, float(height.max()))
+        return super().renew(state._replace(addressing=addressing, peak=peak), active, window, disc)
+
+    def find_driven(self, block: Floats) -> Flags:
+        """Return the cells whose two gates are open, or will be by queued commands."""
+        first, end = self.cell.lag_rows.start, self.rows.target
+        return block[first:end:2].any(axis=0) & block[first + 1 : end : 2].any(axis=0)
+
+    def pick(
+        self, active: ActiveSet, moving: Flags, reach: Discs | None, control: Discs | None
+    ) -> tuple[Cells, int]:
+        """Return the active cells, with all where their lines and columns cross; see `Selection`."""
+        cells, near = super().pick(active, moving, reach, control)
+        line, place = self.drive.lines.locate(np.arange(self.grid.count))
+        crossing = np.isin(line, line[cells]) & np.isin(place, place[cells])
+        crossing[cells] = False
+        return np.concatenate([cells, np.flatnonzero(crossing)]), near
+
+    def take(self, state: State, chosen: ActiveSet) -> ActiveSet:
+        """Return the chosen set with its rows: gates are those of the lines and columns."""
+        active, addressing = super().take(state, chosen), state.addressing
+        line, column = self.drive.find_gates(active.cells)
+        first, end = self.cell.lag_rows.start, self.rows.target
+        gates: Floats = addressing.cells  # type: ignore[union-attr]
+        active.block[first:end:2] = gates[first:end:2, line]
+        active.block[first + 1 : end : 2] = gates[first + 1 : end : 2, column]
+        return active

@@ -1,0 +1,76 @@
+"""Two gates in series per cell, one of its line and one of its column, which act as one valve.
+
+Their drops add: of conductances a and b, as shares of an open gate, the pair has ``2 a b / (a + b)``
+of both open. A shut gate leaks the share ε. What leaks past a shut column gate comes from the low
+reservoir. Each gate has a first-order lag, so that both are known in closed form.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..base.arrays import TINY, Floats
+from .delay import Queue
+from .lag import ValveLag
+
+#: Lags after a command between which the opening is integrated by Gauss points of its own.
+LAGS = (0.0, 1.0, 3.0, 8.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Gates:
+    """Openings of the gates of a cell: that of its line, 0 to 1, and that of its column, -1 to 1."""
+
+    line: ValveLag
+    column: ValveLag
+    queue: Queue
+    """Commands of the line."""
+    leak: float
+    """Conductance of a shut gate as a share of an open one, ε."""
+    power: int
+    """Exponent of the opening in the laminar branch of the valve."""
+
+    rows = 2
+
+    def response(self, queue: Queue, times: Sequence[float]) -> Floats:
+        """Return the map from the gates and their commands to the gates at times, line and column in turn."""
+        length = max(self.queue.length, queue.length)
+        response = np.zeros((2 * len(times), 2 + 2 * length))
+        for gate, (lag, own) in enumerate(((self.line, self.queue), (self.column, queue))):
+            given = lag.response(own, times)
+            response[gate::2, gate] = given[:, 0]
+            response[gate::2, 2 * (1 + length - own.length) + gate :: 2] = given[:, 1:]
+        return response
+
+    def list_cuts(self, queue: Queue) -> tuple[float, ...]:
+        """Return when a gate changes to its next command in a period, and times of its lag after that, s."""
+        gates = (self.queue, self.line), (queue, self.column)
+        cuts = {own.cut + n * lag.time_constant for own, lag in gates for n in LAGS}
+        return tuple(sorted(cuts))
+
+    def join(self, raw: Floats, count: int) -> Floats:
+        """Return the openings of the equivalent valve at the first `count` times."""
+        line, column = raw[: 2 * count : 2], raw[1 : 2 * count : 2]
+        line_gate = self.leak + (1.0 - self.leak) * np.abs(line) ** self.power
+        column_gate = (1.0 - self.leak) * np.abs(column) ** self.power
+        driven = _connect(line_gate, column_gate)
+        leaked = _connect(line_gate, column_gate + self.leak) - driven
+        lift = np.copysign(driven, column) - leaked
+        return np.copysign(np.abs(lift) ** (1.0 / self.power), lift)
+
+    def command(self, opening: Floats) -> Floats:
+        """Return the column gates' commands for openings of the pair, while the line gate is open."""
+        lift = np.abs(opening) ** self.power
+        return np.copysign((lift / (2.0 - lift)) ** (1.0 / self.power), opening)
+
+    def settle(self, rows: Floats) -> None:
+        """Shut gates that are almost shut, in place."""
+        self.column.settle(rows)
+
+
+def _connect(first: Floats, second: Floats) -> Floats:
+    """Return the conductance of two gates in series, as a share of two open ones."""
+    return 2.0 * first * second / (first + second + TINY)
