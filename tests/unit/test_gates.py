@@ -16,6 +16,7 @@ from scipy.integrate import quad, solve_ivp
 
 from tests.assemble import (
     AWAY,
+    Scripted,
     assert_near,
     over_middle,
     record,
@@ -52,12 +53,19 @@ def bed(lag=2e-3, sections=1, power=1, step=PERIOD, **gates):
     )  # fmt: skip
 
 
+class Middle(Scripted):
+    """A script that asks for the middle pin: with its neighbors, nine are active."""
+
+    def locate(self, memory, touched):
+        return memory, (0.0, 0.0, 1e-3)
+
+
 def rise(scene, count, command=0.0):
     """Return the rise of the pins, (5, 5), m, while the middle one is commanded; the free speed, m/s."""
     system = assemble(scene)
     if command:
-        only = scripted(lambda t, x, y: command * (np.hypot(x, y) < 1e-4))
-        system = replace(system, controller=only(PERIOD))
+        only = Middle(lambda t, x, y: command * (np.hypot(x, y) < 1e-4), PERIOD)
+        system = replace(system, controller=only)
     # Idle cells are as of the last renewal of the set, every 8 periods.
     height = record(system, AWAY, count + 1).height
     return (height[-1] - height[0]).reshape(5, 5), system.fastest
@@ -109,10 +117,12 @@ def test_a_half_selected_pin_moves_by_the_free_speed_times_the_pulse_of_its_gate
 @table(
     "sections, command, place, wanted",
     {
-        "both gates shut": (1, 0.0, (0, 0), -1.0),
-        "the line's open": (5, 1.0, (0, 0), -2.0),
-        # The column's is open, upwards, for a fifth of the time, and so is the line's.
-        "one or the other open": (1, 1.0, (0, 2), 0.2 * 2.0 - 0.2 * 2.0 - 0.6),
+        "both gates shut, no cell active": (1, 0.0, (0, 0), -1.0),
+        "both gates shut": (1, 1.0, (0, 0), -1.0),
+        "the line's open": (5, 1.0, (2, 0), -2.0),
+        "the line's open for a fifth of the time": (1, 1.0, (2, 0), -2.0 * 0.2 - 0.8),
+        "a column of another set open": (5, 1.0, (0, 2), -1.0),
+        "the column's open, upwards, for a fifth of the time": (1, 1.0, (0, 2), 2.0 * 0.2 - 0.8),
     },
 )
 def test_an_idle_pin_creeps_by_the_leak_of_its_gates(sections, command, place, wanted):

@@ -3,8 +3,8 @@
 A gate of a line has the same opening in all its cells, and so has one of a column in a set of lines.
 Idle cells, on which nothing presses, therefore move as the sum of what a cell does whose line alone,
 and one whose column alone, has opened: a cell without load stands for each line and each column.
-Their motion is added to idle cells whenever the active set is renewed. Cells where an open line
-meets an open column are active.
+Their motion is added to idle cells whenever the active set is renewed. Lines without active cells
+stay shut, and cells where an open line meets an open column are active.
 """
 
 from __future__ import annotations
@@ -113,8 +113,8 @@ class GatedDrive:
         block[:] = state.cells
         queue = block[self.rows.commands]
         queue[:-2], queue[-2:] = queue[2:].copy(), 0.0
-        queue[-2, : self.lines.lines] = addressing.served
         addressed = addressing.served[line]
+        queue[-2, line[addressed]] = 1.0
         queue[-1, column[addressed]] = self.gates.command(orders.command[addressed])
         commands: Any = GatedCommands(
             orders.target, orders.mode, queue[-1, column], queue[-2, line]
@@ -163,7 +163,9 @@ class GatedSelection(Selection):
         """Return the active cells, with all where their lines and columns cross; see `Selection`."""
         cells, near = super().pick(active, moving, reach, control)
         line, place = self.drive.lines.locate(np.arange(self.grid.count))
-        crossing = np.isin(line, line[cells]) & np.isin(place, place[cells])
+        first, end = self.cell.lag_rows.start, self.rows.target
+        still_open = active.cells[active.block[first:end:2].any(axis=0)]
+        crossing = np.isin(line, line[np.append(cells, still_open)]) & np.isin(place, place[cells])
         crossing[cells] = False
         return np.concatenate([cells, np.flatnonzero(crossing)]), near
 
