@@ -31,7 +31,7 @@ SLOT, PERIOD = 4, 5e-3
 CYCLE = 5 * SLOT
 
 
-def bed(lag=2e-3, sections=1, power=1, step=PERIOD, **gates):
+def bed(lag=2e-3, sections=1, power=1, step=PERIOD, cells=5, **gates):
     gates = {
         "line_lag": lag,
         "sections": sections,
@@ -41,7 +41,7 @@ def bed(lag=2e-3, sections=1, power=1, step=PERIOD, **gates):
     }
     return resolve(
         {
-            "layout": {"rows": 5, "columns": 5},
+            "layout": {"rows": cells, "columns": cells},
             "valve": {"gap": "opening" if power == 1 else "stroke"},
             "conduit": "absent",
             "control": "absent",
@@ -58,6 +58,13 @@ class Middle(Scripted):
 
     def locate(self, memory, touched):
         return memory, (0.0, 0.0, 1e-3)
+
+
+class Wide(Scripted):
+    """A script that asks for the pins around the middle, 9 mm to each side."""
+
+    def locate(self, memory, touched):
+        return memory, (0.0, 0.0, 9.1e-3)
 
 
 def rise(scene, count, command=0.0):
@@ -129,6 +136,21 @@ def test_an_idle_pin_creeps_by_the_leak_of_its_gates(sections, command, place, w
     leak, count = 1e-3, 16 * CYCLE
     moved, free = rise(bed(0.02e-3, sections, leak=leak), count, command)
     assert moved[place] == pytest.approx(wanted * free * leak * count * PERIOD, rel=0.02)
+
+
+def test_pins_where_other_lines_and_columns_cross_are_half_selected_too():
+    # Two pins off the middle, one to the right, one behind, are raised in turn: the columns of one
+    # change as the line of the other does.
+    scene = bed(policy="needed", cells=11)
+    system = assemble(scene)
+    both = Wide(lambda t, x, y: np.hypot(x + y - 9e-3, x * y * 1e3) < 1e-4, PERIOD)
+    system = replace(system, controller=both)
+    run = record(system, AWAY, 10 * SLOT)
+    x, y = system.grid.x, system.grid.y
+    corner = np.flatnonzero((np.abs(x - 9e-3) < 1e-4) & (np.abs(y - 9e-3) < 1e-4))
+    moved = (run.height[-1] - 40e-3)[corner] / system.fastest / 2e-3
+    assert moved == pytest.approx(9.0, rel=0.02)
+    assert run.last.active.cells.size < 121
 
 
 def test_a_pressed_pin_with_gates_moves_as_scipy_says():
