@@ -99,7 +99,7 @@ class GatedDrive:
 
     def find_gates(self, cells: Cells) -> tuple[Cells, Cells]:
         """Return the numbers of the lines and of the columns of cells in `GatedAddressing.cells`."""
-        line, place = self.lines.locate(cells)
+        line, place = self.lines.parameters.locate(self.lines.layout, cells)
         section = line % self.lines.parameters.sections
         return line, self.lines.lines + section * self.columns + place
 
@@ -162,7 +162,8 @@ class GatedSelection(Selection):
     ) -> tuple[Cells, int]:
         """Return the active cells, with all where their lines and columns cross; see `Selection`."""
         cells, near = super().pick(active, moving, reach, control)
-        line, place = self.drive.lines.locate(np.arange(self.grid.count))
+        lines = self.drive.lines
+        line, place = lines.parameters.locate(lines.layout, np.arange(self.grid.count))
         first, end = self.cell.lag_rows.start, self.rows.target
         still_open = active.cells[active.block[first:end:2].any(axis=0)]
         crossing = np.isin(line, line[np.append(cells, still_open)]) & np.isin(place, place[cells])
