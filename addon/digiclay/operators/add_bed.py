@@ -1,5 +1,6 @@
 """Beds that are added: at rest, by scene files, samples, recorded runs; Rebuild: a bed by its settings."""
 
+import math
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path
@@ -7,28 +8,32 @@ from typing import Any
 
 from .. import bridge, preferences
 from ..compat import Context, Event, Menu, NodeTree, Object, Operator, UILayout, bpy
-from ..core.base.errors import ParameterError
+from ..compat import Scene as Timeline
 from ..core.control.methods import METHODS
 from ..core.files.run_folder import list_files
 from ..core.files.tables import Record
 from ..core.model.layout import ARRANGEMENTS, Layout
 from ..core.model.trajectory import sample_poses
+from ..core.scene.assembly import assemble
 from ..core.scene.scene_source import DISPLAY_SAMPLES, SAMPLES, find, load
 from ..core.scene.schema import Scene
 from ..core.scene.toml_table import PRESETS, resolve
 from ..core.session.plate import list_cautions
+from ..core.shapes.body import read_bodies
 from ..core.shapes.fitting import list_shapes
 from ..core.shapes.request import Shape
 from ..core.studies.job_table import embed_heights
 from ..device import palettes, repair, view
 from ..device.instant import Instant, find_ellipsoids, read
 from ..device.node_tree import list_sources
+from ..device.pressers import make_presser
 from ..exchange import shape_show
 from ..live import beds
 from ..overlay.ready_view import find_view, frame, light
 from ..panels.base import menu
 from ..press.aim import find_free_place
 from ..recorded import takes
+from ..recorded.bake import read_rate
 from ..roles import HOUSING, ROLE, bed_of, fingertips_of
 from ..sessions import running
 from ..settings import own_presets, properties
@@ -41,7 +46,7 @@ from .action import Action, FileAction, Result, action, file_of, inform, millime
 from .poll_messages import baked, cannot_change, edited, inside_edit, no_collection, session_runs
 
 DEFAULT = Layout()
-#: Sample scenes that Blender can open: none has bodies.
+#: Sample scenes of the extension: those with bodies are opened by their files.
 SESSIONS, DISPLAYS = (list(list_files(folder, ".toml")) for folder in (SAMPLES, DISPLAY_SAMPLES))
 #: Beyond this a bed is a matter of scene files: the redo panel would stall on every change.
 MOST = 400
@@ -321,15 +326,17 @@ class AddSceneAction(Placed, Action):
 
     def add_scene(self, context: Context, scene: Scene) -> None:
         """Add the bed of a scene, its fingertips where their paths begin."""
-        if scene.bodies:
-            rule = "must be left out in Blender, where meshes press after Add Presser"
-            raise ParameterError("body", "", rule, f"{len(scene.bodies)} of them")
+        if scene.bodies:  # what they cannot be or do is refused before anything is made
+            assemble(scene)
+            read_rate(context.scene)
         scene = embed_heights(scene)
         taken = takes.simulate(scene) if self.take else None
         bed = add(context, scene)
         bed.name = scene.name
         start = sample_poses(scene.trajectories(), takes.START)[0]
         bridge.place_fingertips(bed, start, find_ellipsoids(scene))
+        if scene.bodies:
+            add_bodies(context.scene, bed, scene)
         words = f"{scene.name}: {scene.description.strip()}" if scene.description else scene.name
         if taken is not None:
             takes.add(bed, taken, scene.name)
@@ -338,6 +345,21 @@ class AddSceneAction(Placed, Action):
             words += localize(" Its session is too long to be simulated here: use 'digiclay run'.")
         self.report({"INFO"}, words)
         self.place(context, bed)
+
+
+def add_bodies(timeline: Timeline, bed: Object, scene: Scene) -> None:
+    """Add the bodies of a scene over its bed, their paths keyed from the first frame on, which is shown."""
+    first, rate = timeline.frame_start, read_rate(timeline)
+    meshes = read_bodies(replace(each.body, scale=1.0) for each in scene.bodies)
+    for row, (each, mesh) in enumerate(zip(scene.bodies, meshes, strict=True), 1):
+        name = f"Body {row} {title(Path(each.body.file).stem)}".rstrip()
+        make_presser(bed, name, each, mesh, first, rate)
+    timeline.frame_end = max(timeline.frame_end, first + math.ceil(scene.lasting * rate))
+    timeline.frame_set(first)
+    if not any(scene.list_parts("fingertip")):
+        for tip in fingertips_of(bed).values():
+            tip.hide_viewport = tip.hide_render = True
+        repair.follow_visibility()
 
 
 class OpenScene(AddSceneAction, FileAction, Operator):

@@ -8,17 +8,20 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from ..core.base.errors import DigiclayError
+from ..core.engine.bodies import Knot, give_bodies
 from ..core.engine.simulation import begin
 from ..core.model.trajectory import sample_poses
 from ..core.scene.assembly import assemble
 from ..core.scene.schema import Scene
 from ..core.session import snapshot
+from ..core.session.given_bodies import place_bodies
 from ..core.session.live_session import simulate_path
 from ..core.session.take import Take, from_bytes, make_take, to_bytes
 from ..roles import fingertips_of
 from ..sessions.running import Running
 from ..sessions.sculpting import pack
 from ..ui_text import localize
+from .bake import INTERVAL
 
 if TYPE_CHECKING:
     from bpy.types import Object
@@ -128,11 +131,16 @@ def simulate(scene: Scene) -> Take | None:
     """Return the session of a scene, from rest to its end; None when that would take too long."""
     if scene.cells * scene.periods > MOST:
         return None
+    knots: tuple[Knot, ...] = ()
+    if scene.bodies:
+        every = max(1, int(INTERVAL / scene.simulation.control_period))
+        scene, knots = place_bodies(scene, [*range(0, scene.periods, every), scene.periods])
     system = assemble(scene)
+    give_bodies(system, knots)
     times = np.arange(scene.periods + 1) * scene.simulation.control_period
     poses = sample_poses(scene.trajectories(), times)
     state = begin(system)
     start = snapshot.dump(system, state)
     # Only the last state is wanted: the others' arrays are used up.
     (state,) = deque(simulate_path(system, state, poses), maxlen=1)
-    return Take(scene, start, poses, snapshot.dump(system, state))
+    return Take(scene, start, poses, snapshot.dump(system, state), knots=knots)

@@ -204,3 +204,19 @@ def make_matrices(quaternions: Floats) -> Floats:
         [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
     ]
     return np.moveaxis(np.array(matrices), 2, 0)
+
+
+def find_quaternions(matrices: Floats) -> Floats:
+    """Return unit quaternions (k, 4), w first, of rotation matrices (k, 3, 3)."""
+    (a, b, c), (d, e, f), (g, h, i) = np.moveaxis(matrices, 0, 2)
+    # Four times the products of each two of its parts.
+    products = [
+        [1 + a + e + i, h - f, c - g, d - b],
+        [h - f, 1 + a - e - i, b + d, c + g],
+        [c - g, b + d, 1 - a + e - i, f + h],
+        [d - b, c + g, f + h, 1 - a - e + i],
+    ]
+    rows = np.moveaxis(np.array(products), 2, 0)
+    largest = np.einsum("kii->ki", rows).argmax(axis=1)
+    chosen: Floats = rows[np.arange(len(rows)), largest]
+    return chosen / np.linalg.norm(chosen, axis=1, keepdims=True)

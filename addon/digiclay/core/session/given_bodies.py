@@ -10,12 +10,14 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.arrays import Array
+from ..base.arrays import Array, Floats
 from ..engine.bodies import Given, Knot, PlacedMesh
 from ..files.formats import inflate
+from ..model.fingertip import find_quaternions, make_matrices
 from ..model.laws import import_part
 from ..model.underside import Mesh, check_mesh
 from ..scene.schema import BODY, Presser, Scene
+from ..shapes.body import read_bodies
 
 #: Arrays: parameters of the bodies, as JSON, the periods of the knots, and undersides, of all knots
 #: in version 5.
@@ -25,6 +27,8 @@ BODIES, KNOTS, PACKED = "bodies", "knots", "undersides"
 NUMBERS, VERTICES, TRIANGLES, SIZES, PLACES = "meshes", "vertices", "triangles", "sizes", "places"
 GIVEN = BODIES, KNOTS, PACKED, NUMBERS, VERTICES, TRIANGLES, SIZES, PLACES
 NONE = -1
+#: Largest difference of squares of lengths, of 1, in a mesh that is rigid: places have 32 bits.
+UNEVEN = 1e-4
 
 
 def pack_bodies(scene: Scene, knots: Sequence[Knot]) -> dict[str, Array]:
@@ -49,6 +53,38 @@ def pack_bodies(scene: Scene, knots: Sequence[Knot]) -> dict[str, Array]:
         PLACES: _pack([body.matrix.astype("<f4").view("<i4").reshape(1, -1) for body in placed]),
         PACKED: _pack([body[None] for body in given if not isinstance(body, PlacedMesh)]),
     }
+
+
+def place_bodies(scene: Scene, periods: Sequence[int]) -> tuple[Scene, tuple[Knot, ...]]:
+    """Return a scene whose bodies are given, and those of a scene with meshes when some periods begin."""
+    times = np.array(periods) * scene.simulation.control_period
+    columns, pressers = [], []
+    for each, mesh in zip(scene.bodies, read_bodies(p.body for p in scene.bodies), strict=True):
+        # Of 32 bits, as a take keeps them.
+        mesh = mesh._replace(vertices=mesh.vertices.astype("<f4").astype(np.float64))
+        poses = each.trajectory.trajectory().poses(times)
+        places = np.concatenate([make_matrices(poses[:, 3:]), poses[:, :3, None]], axis=2)
+        columns.append([PlacedMesh(mesh, place) for place in places.astype(np.float32)])
+        pressers.append(replace(each, body=each.body.without_mesh()))
+    given = replace(scene, bodies=tuple(pressers))
+    return given, tuple(zip(periods, zip(*columns, strict=True), strict=True))
+
+
+def find_motion(given: Sequence[Given]) -> tuple[Mesh, Floats] | None:
+    """Return the mesh of a rigid body, m, and its poses (k, 7); None: it deforms or changes its size."""
+    placed = [body for body in given if isinstance(body, PlacedMesh)]
+    if len(placed) < len(given) or len({id(body.mesh) for body in placed}) > 1:
+        return None
+    places = np.array([body.matrix for body in placed], np.float64)
+    # The first place is a turn of a stretch: that belongs to the mesh.
+    left, sizes, right = np.linalg.svd(places[0, :, :3])
+    stretch = right.T @ np.diag(sizes) @ right * np.linalg.det(left @ right)
+    turns = places[:, :, :3] @ np.linalg.inv(stretch)
+    if np.abs(turns @ turns.swapaxes(1, 2) - np.eye(3)).max() > UNEVEN:
+        return None
+    mesh = placed[0].mesh
+    stretched = mesh._replace(vertices=mesh.vertices @ stretch)
+    return stretched, np.concatenate([places[:, :, 3], find_quaternions(turns)], axis=1)
 
 
 def unpack_bodies(scene: Scene, arrays: Mapping[str, Array]) -> tuple[Scene, tuple[Knot, ...]]:

@@ -24,10 +24,11 @@ from ..files.formats import BROKEN_ZIP, read_array, read_heads
 from ..files.tables import parse_tables
 from ..model.trajectory import Path, Waypoint
 from ..scene.assembly import assemble
-from ..scene.schema import Scene
+from ..scene.schema import Presser, Scene
 from ..scene.toml_table import format_scene, resolve
+from ..shapes.body import pack_mesh
 from . import snapshot
-from .given_bodies import BODIES, GIVEN, pack_bodies, unpack_bodies
+from .given_bodies import BODIES, GIVEN, find_motion, pack_bodies, unpack_bodies
 from .live_session import AWAY, Recording, simulate_path
 
 #: Waypoints this close to the straight line between their neighbors are left out, m and 1.
@@ -166,11 +167,6 @@ def to_scene(take: Take, name: str) -> Scene:
             f"The take {name!r} has strokes in which the valves drive pins by themselves, and a scene file "
             "holds the fingertip's path alone: record a take of the fingertip for export."
         )
-    if take.scene.bodies:
-        raise OutputError(
-            f"The take {name!r} has pressers, whose undersides it holds, and a scene file holds meshes and "
-            "paths: bake the take, or record one of the fingertip alone for export."
-        )
     whole = take.scene.with_fingers(take.poses.shape[1])
     system = assemble(take.scene)
     if not _is_at_rest(system, take.start):
@@ -184,14 +180,35 @@ def to_scene(take: Take, name: str) -> Scene:
         replace(finger, trajectory=_make_path(times, take.poses[:, number]))
         for number, finger in enumerate(whole.fingers)
     )
-    return replace(take.scene, name=name, simulation=lasting, fingers=fingers)
+    bodies = _trace_bodies(take, name, snapshot.load(system, take.start).period)
+    return replace(take.scene, name=name, simulation=lasting, fingers=fingers, bodies=bodies)
+
+
+def _trace_bodies(take: Take, name: str, first: int) -> tuple[Presser, ...]:
+    """Return the bodies of a take, from a period on, with meshes and paths; OutputError unless rigid."""
+    # A body that has jumped is where it was last.
+    knots = {max(0, period - first): bodies for period, bodies in take.knots}
+    times = np.array(list(knots)) * take.scene.simulation.control_period
+    traced = []
+    for each, given in zip(take.scene.bodies, zip(*knots.values(), strict=True), strict=True):
+        motion = find_motion(given)
+        if motion is None:
+            raise OutputError(
+                f"The take {name!r} has a presser that deforms or changes its size, and a body of a scene "
+                "file is rigid: bake the take, or record rigid pressers for export."
+            )
+        mesh, poses = motion
+        body = replace(each.body, mesh=pack_mesh(*mesh))
+        traced.append(Presser(body, _make_path(times, poses)))
+    return tuple(traced)
 
 
 def _make_path(times: Floats, poses: Floats) -> Path:
-    """Return a fingertip's poses (t, 7) at evenly spaced times (t,), s, as the path of a scene."""
+    """Return poses (t, 7) at times (t,), s, as the path of a scene."""
     needed = np.ones(len(poses), bool)
-    bend = np.abs(poses[2:] - 2.0 * poses[1:-1] + poses[:-2]).max(axis=1)
-    needed[1:-1] = bend > STRAIGHT  # else a straight line passes through it
+    part = ((times[1:-1] - times[:-2]) / (times[2:] - times[:-2]))[:, None]
+    straight = poses[:-2] + part * (poses[2:] - poses[:-2])
+    needed[1:-1] = 2.0 * np.abs(poses[1:-1] - straight).max(axis=1) > STRAIGHT
     waypoints = (
         Waypoint(float(times[row]), tuple(poses[row, :3].tolist()), tuple(poses[row, 3:].tolist()))
         for row in np.flatnonzero(needed)

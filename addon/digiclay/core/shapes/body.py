@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 import zlib
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -70,6 +70,10 @@ class Body(Parameters):
     def given(self) -> bool:
         """Whether it has no mesh: its underside is given, see `engine.bodies.GivenUndersides`."""
         return not (self.file or self.mesh)
+
+    def without_mesh(self) -> Body:
+        """Return the same contact, of a body that is given."""
+        return replace(self, file="", mesh="", up=AUTO, unit=AUTO, scale=1.0)
 
     @property
     def contact(self) -> Contact:
