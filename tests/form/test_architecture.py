@@ -39,7 +39,7 @@ ROOMS = {
     "control": "base files model shapes",
     "metrics": "base model",
     "scene": "base files model engine shapes control",
-    "session": "base files model engine control metrics scene",
+    "session": "base files model engine shapes control metrics scene",
     "batch": "base model steppers engine control metrics scene session",
     "studies": "base files model engine mesh_io shapes control metrics scene session batch",
 }

@@ -352,7 +352,7 @@ def add_bodies(timeline: Timeline, bed: Object, scene: Scene) -> None:
     first, rate = timeline.frame_start, read_rate(timeline)
     meshes = read_bodies(replace(each.body, scale=1.0) for each in scene.bodies)
     for row, (each, mesh) in enumerate(zip(scene.bodies, meshes, strict=True), 1):
-        name = f"Body {row} {title(Path(each.body.file).stem)}".rstrip()
+        name = " ".join(("Body", str(row), title(Path(each.body.file).stem))).rstrip()
         make_presser(bed, name, each, mesh, first, rate)
     timeline.frame_end = max(timeline.frame_end, first + math.ceil(scene.lasting * rate))
     timeline.frame_set(first)
