@@ -1,9 +1,10 @@
-"""Played by `driver`: draws the tab in German at two scales, and measures what its rows need and have."""
+"""Played by `driver`: draws the tab in German and English, and measures what its rows need and have."""
 
 import blf
 import bpy
 
-SCALES = (1.0, 1.5)
+#: Languages and scales.
+LOOKS = (("de_DE", 1.0), ("de_DE", 1.5), ("en_US", 1.0))
 #: Panels that are unfolded one after another, and sections of them.
 PANELS = {
     "DIGICLAY_PT_session": "",
@@ -40,6 +41,13 @@ def find_need(part, scale, margin=ICON):
     return (sum(need for need, _ in needs), longest[1]) if part["type"] == "LAYOUT_ROW" else longest
 
 
+def list_texts(part):
+    """Return all texts in a part of a layout."""
+    if "items" not in part:
+        return [part["draw_string"]]
+    return [text for item in part["items"] for text in list_texts(item)]
+
+
 def script(blender):
     """Unfold each panel, then those of a session that records; look at all of the overlay."""
     yield from blender.empty_scene()
@@ -53,6 +61,8 @@ def script(blender):
         blf.size(0, points * scale)
         (root,) = panel.layout.introspect()
         need, text = find_need(root, scale)
+        if preferences.view.language == "de_DE":
+            blender.SEEN["texts"] = sorted({*blender.SEEN.get("texts", ()), *list_texts(root)})
         drawn[f"{type(panel).__name__}, {scale}: {text}"] = (
             need,
             context.region.width - TABS * scale,
@@ -64,14 +74,15 @@ def script(blender):
     yield from unfold(blender, "DIGICLAY_PT_start", "")
     blender.shot("german_start")
     yield from blender.add_paper_bed()
-    bpy.ops.mesh.primitive_monkey_add(location=(0.0, 0.0, 3.0))
+    bpy.ops.mesh.primitive_cube_add(location=(0.0, 0.0, 3.0))
+    bpy.context.object.name = "Cube"  # a word that Blender translates
     yield None
     blender.call(bpy.ops.digiclay.add_presser)
-    for scale in SCALES:
-        preferences.view.ui_scale = scale
+    for language, scale in LOOKS:
+        preferences.view.language, preferences.view.ui_scale = language, scale
         for root, sections in PANELS.items():
             yield from unfold(blender, root, sections)
-    preferences.view.ui_scale = 1.0
+    preferences.view.language, preferences.view.ui_scale = LOOKS[0]
     blender.beds()[0].digiclay_display.overlay_full = True
     yield from blender.start()
     blender.call(bpy.ops.digiclay.take_record)

@@ -75,9 +75,8 @@ def features(sidebar: Sidebar, context: Context) -> None:
     column.label(
         text="Measured from the kept surface" if has_reference else "Measured from the bed at rest"
     )
-    row = column.row(align=True)
-    row.operator("digiclay.keep_surface")
-    row.operator("digiclay.forget_surface")
+    column.operator("digiclay.keep_surface")
+    column.operator("digiclay.forget_surface")
 
 
 CLASSES = (shapes, export, features)

@@ -226,8 +226,7 @@ def _draw_cursor(context: Context, tool: WorkSpaceTool, xy: tuple[int, int]) -> 
     if target is None:
         return
     if hider is not None:
-        if hider not in list_pressers(target.bed):  # which is there to be seen and moved
-            cursor([], make_label(context, localize("{} hides the bed", hider.name), xy, corner))
+        cursor([], make_label(context, name_hider(target.bed, hider), xy, corner))
         return
     if fingertip_of(target.bed) is None:
         return
@@ -240,6 +239,11 @@ def _draw_cursor(context: Context, tool: WorkSpaceTool, xy: tuple[int, int]) -> 
     text = describe(target.bed, settings) if preferences.get(context).show_cursor_text else ""
     color = SMOOTHING if brush in RINGED else LIGHT
     draw_on_bed(context, target.bed, paths, text, xy, color, corner)
+
+
+def name_hider(bed: Object, hider: Object) -> str:
+    """Return what is said of an object that hides a bed; nothing of a presser, which belongs there."""
+    return "" if hider in list_pressers(bed) else localize("{} hides the bed", hider.name)
 
 
 def describe(bed: Object, settings: OperatorProperties) -> str:

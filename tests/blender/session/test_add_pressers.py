@@ -4,6 +4,7 @@ import bpy
 import numpy as np
 import pytest
 from digiclay.device.pressers import read_cage
+from digiclay.press.tool import name_hider
 from digiclay.roles import bed_of, list_pressers
 
 from tests.blender.at_hand import delete, looked, save_and_open, select
@@ -46,6 +47,11 @@ def test_an_armature_that_moves_a_mesh_shows_the_panels_of_its_bed(bed, ball):
     ball.modifiers.new("Armature", "ARMATURE").object = armature
     bpy.ops.object.mode_set(mode="POSE")
     assert bed_of(bpy.context) == bed
+
+
+def test_a_mesh_that_presses_is_not_told_to_hide_the_bed(bed, ball):
+    assert name_hider(bed, bpy.data.objects["Cube"]) == "Cube hides the bed"
+    assert name_hider(bed, ball) == ""
 
 
 def test_without_its_bed_a_presser_is_a_mesh_like_any_other_and_may_press_the_next(bed, ball):
