@@ -150,6 +150,8 @@ def test_pins_where_other_lines_and_columns_cross_are_half_selected_too():
     corner = np.flatnonzero((np.abs(x - 9e-3) < 1e-4) & (np.abs(y - 9e-3) < 1e-4))
     moved = (run.height[-1] - 40e-3)[corner] / system.fastest / 2e-3
     assert moved == pytest.approx(9.0, rel=0.02)
+    # Commands are told where they act: those of a shut line are 0.
+    assert np.count_nonzero(run.command[:-1]) == len(run.command) - 1
     assert run.last.active.cells.size < 121
 
 

@@ -34,11 +34,13 @@ class GatedCommands(NamedTuple):
     mode: Modes
     command: Floats
     gate: Floats
+    others: Floats
+    """Commands of the column gates while other lines are addressed."""
 
     @property
     def queued(self) -> tuple[Floats, ...]:
         """What is queued of it in a control period."""
-        return self.gate, self.command
+        return self.gate, self.others, self.command
 
 
 class GatedAddressing(NamedTuple):
@@ -112,13 +114,13 @@ class GatedDrive:
         block, move = self.workspace
         block[:] = state.cells
         queue = block[self.rows.commands]
-        queue[:-2], queue[-2:] = queue[2:].copy(), 0.0
+        queue[:-3], queue[-3:] = queue[3:].copy(), 0.0
         addressed = addressing.served[line]
-        queue[-2, line[addressed]] = 1.0
-        queue[-1, column[addressed]] = self.gates.command(orders.command[addressed])
-        commands: Any = GatedCommands(
-            orders.target, orders.mode, queue[-1, column], queue[-2, line]
-        )
+        queue[-3, line[addressed]] = 1.0
+        command = self.gates.command(orders.command)
+        queue[-2, column[addressed]] = command[addressed]
+        others = np.where(addressed, 0.0, queue[-2, column])
+        commands: Any = GatedCommands(orders.target, orders.mode, command, queue[-3, line], others)
         move(np.empty((self.instants, 0)))
         return GatedAddressing(*addressing, block.copy(), state.aged), commands
 
@@ -152,10 +154,17 @@ class GatedSelection(Selection):
         peak = max(state.peak, float(height.max()))
         return super().renew(state._replace(addressing=addressing, peak=peak), active, window, disc)
 
+    @cached_property
+    def of_gates(self) -> tuple[list[int], list[int]]:
+        """Rows of the lines' gates and of the columns', with their commands."""
+        first, queue = self.cell.lag_rows.start, range(self.rows.physics, self.rows.target)
+        return [first, *queue[::3]], [first + 1, *queue[1::3], *queue[2::3]]
+
     def find_driven(self, block: Floats) -> Flags:
         """Return the cells whose two gates are open, or will be by queued commands."""
-        first, end = self.cell.lag_rows.start, self.rows.target
-        return block[first:end:2].any(axis=0) & block[first + 1 : end : 2].any(axis=0)
+        lines, columns = (block[rows].any(axis=0) for rows in self.of_gates)
+        driven: Flags = lines & columns
+        return driven
 
     def pick(
         self, active: ActiveSet, moving: Flags, reach: Discs | None, control: Discs | None
@@ -164,18 +173,17 @@ class GatedSelection(Selection):
         cells, near = super().pick(active, moving, reach, control)
         lines = self.drive.lines
         line, place = lines.parameters.locate(lines.layout, np.arange(self.grid.count))
-        first, end = self.cell.lag_rows.start, self.rows.target
-        still_open = active.cells[active.block[first:end:2].any(axis=0)]
+        still_open = active.cells[active.block[self.of_gates[0]].any(axis=0)]
         crossing = np.isin(line, line[np.append(cells, still_open)]) & np.isin(place, place[cells])
         crossing[cells] = False
         return np.concatenate([cells, np.flatnonzero(crossing)]), near
 
     def take(self, state: State, chosen: ActiveSet) -> ActiveSet:
-        """Return the chosen set with its rows: gates are those of the lines and columns."""
+        """Return the chosen set with its rows; gates of new cells are those of lines and columns."""
         active, addressing = super().take(state, chosen), state.addressing
-        line, column = self.drive.find_gates(active.cells)
-        first, end = self.cell.lag_rows.start, self.rows.target
+        new = np.flatnonzero(np.isin(active.cells, state.active.cells, invert=True))
+        line, column = self.drive.find_gates(active.cells[new])
         gates: Floats = addressing.cells  # type: ignore[union-attr]
-        active.block[first:end:2] = gates[first:end:2, line]
-        active.block[first + 1 : end : 2] = gates[first + 1 : end : 2, column]
+        for rows, owner in zip(self.of_gates, (line, column), strict=True):
+            active.block[np.array(rows)[:, None], new] = gates[rows][:, owner]
         return active

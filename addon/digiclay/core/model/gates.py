@@ -22,7 +22,11 @@ LAGS = (0.0, 1.0, 3.0, 8.0)
 
 @dataclass(frozen=True, eq=False)
 class Gates:
-    """Openings of the gates of a cell: that of its line, 0 to 1, and that of its column, -1 to 1."""
+    """Openings of the gates of a cell: that of its line, 0 to 1, and that of its column, -1 to 1.
+
+    Three commands of a control period are queued: of the line, of the column if other lines are
+    addressed, and of the column for this cell; the sum of the last two acts.
+    """
 
     line: ValveLag
     column: ValveLag
@@ -38,11 +42,16 @@ class Gates:
     def response(self, queue: Queue, times: Sequence[float]) -> Floats:
         """Return the map from the gates and their commands to the gates at times, line and column in turn."""
         length = max(self.queue.length, queue.length)
-        response = np.zeros((2 * len(times), 2 + 2 * length))
-        for gate, (lag, own) in enumerate(((self.line, self.queue), (self.column, queue))):
+        response = np.zeros((2 * len(times), 2 + 3 * length))
+        gates = (
+            (0, 0, self.line, self.queue),
+            (1, 1, self.column, queue),
+            (1, 2, self.column, queue),
+        )
+        for gate, command, lag, own in gates:
             given = lag.response(own, times)
             response[gate::2, gate] = given[:, 0]
-            response[gate::2, 2 * (1 + length - own.length) + gate :: 2] = given[:, 1:]
+            response[gate::2, 2 + 3 * (length - own.length) + command :: 3] = given[:, 1:]
         return response
 
     def list_cuts(self, queue: Queue) -> tuple[float, ...]:

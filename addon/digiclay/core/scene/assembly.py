@@ -134,7 +134,7 @@ def _add_gates(scene: Scene, motion: Motion, system: System) -> System:
     gates: Any = Gates(ValveLag(drive.line_lag), lag, queue, drive.leak, power)
     cell = replace(motion.cell, lag=gates)
     plan = motion.stepper.plan(cell, motion.line, motion.steps)
-    commands = 2 * max(queue.length, motion.line.length)
+    commands = 3 * max(queue.length, motion.line.length)
     rows = replace(system.rows, physics=cell.rows, queue=commands)
     shut = gates.join(np.zeros((2, 1)), 1)[0]
     flow = cell.flow.flow(shut, cell.supply.pressure(shut))
