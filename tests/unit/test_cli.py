@@ -439,6 +439,23 @@ def test_the_refresh_of_a_matrix_drive_is_that_of_its_lines_in_turn(capsys):
     assert (turns, filled) == (2, pytest.approx(risen, rel=0.02))
 
 
+def test_the_leak_per_minute_is_that_of_a_bed_at_rest(capsys):
+    changes = {
+        "layout.rows": 3,
+        "layout.columns": 3,
+        "drive.line_lag": 2e-3,
+        "drive.leak": 1e-3,
+        "drive.sections": 1,
+        "control": "absent",
+        "fingertip": "absent",
+        "simulation.duration": 6.0,
+    }
+    said = described(capsys, *(f"{key}={value}" for key, value in changes.items()))
+    height = digiclay.run(digiclay.scene({}, changes)).history["height"]
+    sunk = 1e3 * (height[0] - height[-1])
+    assert 10.0 * sunk == pytest.approx(numbers(said["command 0"])[0], rel=0.02)
+
+
 def test_the_stiffness_felt_is_the_slope_of_a_quick_press_on_a_shut_pin(capsys):
     first, pressed, force = numbers(described(capsys)["felt"])
     # 5 µm a period, of a pulp that does not relax.

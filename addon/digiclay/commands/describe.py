@@ -179,7 +179,8 @@ def _pins(scene: Scene, system: System) -> Iterator[tuple[str, str]]:
     lift, pull = supply.high * actuator.area, (0.0 - supply.low) * actuator.area
     yield "stall", f"{lift:.3g} N up, {pull:.3g} N down, {full}"
     if supply.locks:
-        yield "command 0", "holds any load, rigid; 0 mm of leak per minute"
+        leak = 60e3 * down * (drive.leak if drive else 0.0)
+        yield "command 0", f"holds any load, rigid; leak without load: {leak:.3g} mm per minute"
     else:
         yield "command 0", f"yields {1e3 * up / lift:.3g} mm/s per N"
     for fingers, contact in _list_parts(scene, "contact"):
