@@ -178,6 +178,7 @@ def carry_out(arguments: argparse.Namespace) -> int:
             "takes": list(writer.efforts.values()) if writer else [],
         }
     if arguments.report is not None:
+        arguments.report.parent.mkdir(parents=True, exist_ok=True)
         write_whole(arguments.report, format_json({**figures, "diverged": session.diverged}))
     if not arguments.quiet:
         for line in _summary(figures):

@@ -6,6 +6,7 @@ from time import thread_time
 
 import numpy as np
 import pytest
+from digiclay.cli import main
 from digiclay.core.base.errors import OutputError
 from digiclay.core.model.fingertip import LEVEL
 from digiclay.core.scene.toml_table import resolve
@@ -413,6 +414,13 @@ FEW_PINS = ["--set", "layout.rows=3", "--set", "layout.columns=3", "--set", "con
 def test_a_wrong_option_is_refused_in_one_line(words, message, here, refused):
     refused(["serve", "--seconds", "0", *words.split()], message)
     assert left(here) == []
+
+
+def test_a_report_makes_its_folder(here):
+    ports = ("--port", "0", "--osc-port", "0")
+    options = ("--seconds", "0", "--report", "new/report.json", "--quiet")
+    assert main(["serve", *FEW_PINS, *ports, *options]) == 0
+    assert (here / "new" / "report.json").is_file()
 
 
 def test_what_cannot_be_opened_is_told_in_a_line(here, refused):
