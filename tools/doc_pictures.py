@@ -158,6 +158,13 @@ def draw_instant(folder: Path, name: str, size: str, color: str = "neutral") -> 
     return drawn
 
 
+def draw_closing_hand(folder: Path) -> None:
+    """Draw a hand that has closed in the pins."""
+    from closing_hand import main as close_hand
+
+    save_jpeg(close_hand(folder), "closing_hand.jpg", 85)
+
+
 def draw_hands(folder: Path, name: str) -> None:
     """Draw an instant of a scene of several fingers or of bodies."""
     save_jpeg(draw_instant(folder, name, "900x563"), f"{name}.jpg", 85)
@@ -299,6 +306,7 @@ DRAWN: dict[str, Callable[[Path], None]] = {
     "export.jpg": draw_export,
     "shapes.jpg": draw_shapes,
     **{f"{name}.jpg": partial(draw_hands, name=name) for name in (*HANDS, *BODIES)},
+    "closing_hand.jpg": draw_closing_hand,
     **{f"samples/{name}.jpg": partial(draw_sample, name=name) for name in list_samples()},
     "two_hands.webp": partial(
         draw_scene_film, scene="two_hands_bowl", speed=3.0, frames=53, name="two_hands.webp"
