@@ -180,7 +180,8 @@ def _pins(scene: Scene, system: System) -> Iterator[tuple[str, str]]:
     yield "stall", f"{lift:.3g} N up, {pull:.3g} N down, {full}"
     if supply.locks:
         leak = 60e3 * down * (drive.leak if drive else 0.0)
-        yield "command 0", f"holds any load, rigid; leak without load: {leak:.3g} mm per minute"
+        leaks = "" if electric else f"; leak without load: {leak:.3g} mm per minute"
+        yield "command 0", f"holds any load, rigid{leaks}"
     else:
         yield "command 0", f"yields {1e3 * up / lift:.3g} mm/s per N"
     for fingers, contact in _list_parts(scene, "contact"):
