@@ -227,7 +227,7 @@ def folder(extension, files, monkeypatch):
 def make_files(folder):
     bed = new_bed(rows=5, columns=5)
     (folder / "strokes.toml").write_text(
-        "[[stroke]]\ndepth = 0.001\nmoves = [[0, 0, 0], [0.1, 0.002, 0]]\n"
+        '[[stroke]]\nbrush = "lock"\nmoves = [[0, 0, 0], [0.1, 0.002, 0]]\n'
     )
     np.save(folder / "ramp.npy", np.linspace(0.0, 1.0, 25).reshape(5, 5))
     (folder / "fitted.toml").write_text("[contact]\nstiffness = 330.0\n")

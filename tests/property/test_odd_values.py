@@ -270,7 +270,7 @@ def evaluate_run(draw):
 
 @pytest.mark.parametrize(
     "use, count",
-    [(begin_scene, 200), (go_on, 120), (replay_take, 80), (evaluate_run, 80)],
+    [(begin_scene, 120), (go_on, 80), (replay_take, 50), (evaluate_run, 50)],
 )
 def test_what_is_odd_is_taken_or_refused_in_one_line(use, count):
     refusals = []

@@ -281,7 +281,7 @@ STROKES = {
 def test_a_stroke_goes_the_same_way_when_all_it_reads_is_shaken(name):
     poses, nominal = STROKES[name].form(None)
     assert len(poses) > 3
-    for seed in range(4):
+    for seed in range(2):
         shaken_poses, shaken_nominal = STROKES[name].form(np.random.default_rng(seed))
         assert_near(shaken_nominal, nominal, HEIGHT)
         assert len(shaken_poses) == len(poses)

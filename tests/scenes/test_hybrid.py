@@ -121,10 +121,10 @@ SIZES = ("length", "width", "height")
 #: By what numbers of a part are multiplied in the device that a controller is made for.
 MODELS = {
     # The laminar flow goes with the fourth power of the diameter.
-    **{f"valve × {by}": ("valve", {"orifice_diameter": by**0.25}) for by in (0.7, 1.3, 3)},
-    **{f"pulp stiffness × {by}": ("contact", {"stiffness": by}) for by in (0.5, 2)},
-    **{f"exponent × {by}": ("contact", {"exponent": by}) for by in (0.7, 1.4)},
-    **{f"fingertip × {by}": ("fingertip", dict.fromkeys(SIZES, by)) for by in (0.75, 1.3)},
+    **{f"valve × {by}": ("valve", {"orifice_diameter": by**0.25}) for by in (0.7, 3)},
+    **{f"pulp stiffness × {by}": ("contact", {"stiffness": by}) for by in (2,)},
+    **{f"exponent × {by}": ("contact", {"exponent": by}) for by in (0.7,)},
+    **{f"fingertip × {by}": ("fingertip", dict.fromkeys(SIZES, by)) for by in (0.75,)},
     "length × 1.5": ("fingertip", {"length": 1.5}),
     "width × 0.6": ("fingertip", {"width": 0.6}),
 }
@@ -174,8 +174,8 @@ def test_the_trim_stays_within_half_the_set_point():
 
 @pytest.mark.parametrize(
     "sensors",
-    [{"force_noise": 2e-3}, {"force_noise": 15e-3}, {"delay": 1}],
-    ids=["noise", "most noise", "delay"],
+    [{"force_noise": 15e-3}, {"delay": 1}],
+    ids=["most noise", "delay"],
 )
 def test_noise_and_delay_of_the_sensors_lose_no_finger(sensors):
     found = run(along(device(sensors=sensors), *STROKE)).metrics

@@ -149,7 +149,6 @@ SLIDE, LOCKED, QUICK = (15, 0.3, 1, 45), (1, 0.0, 1, 30), (5, 0.5, 5, 30)
 #: In how many periods two fingers press the pin, at least; largest errors, m and N.
 CASES = {
     # What is asked for: 3 µm and 3 mN.
-    "5 mm apart": (SLIDE, {}, partial(slide, apart=5e-3), (FINGER, FINGER), (10, 3e-6, 3e-3)),
     "7 mm apart": (SLIDE, {}, partial(slide, apart=7e-3), (FINGER, FINGER), (10, 3e-6, 3e-3)),
     "another exponent": (SLIDE, {}, partial(slide, apart=6e-3), (FINGER, SOFT), (10, 3e-6, 3e-3)),
     "another size and relaxation": (
@@ -170,7 +169,6 @@ CASES = {
     # (docs/stability.md).
     "bore 0.2 mm": (QUICK, NARROW, rock, (FINGER, FINGER), (1, 0.1e-3, 5e-3)),
     "bore 0.2 mm, three unlike": (QUICK, NARROW, rock, (FINGER, SOFT, LONG), (0, 0.2e-3, 5e-3)),
-    "orifice 2 mm": (QUICK, WIDE, rock, (FINGER, FINGER), (5, 0.1e-3, 50e-3)),
     "orifice 2 mm, three unlike": (QUICK, WIDE, rock, (FINGER, SOFT, LONG), (5, 0.1e-3, 50e-3)),
 }
 
@@ -192,9 +190,15 @@ def test_a_pin_that_several_fingers_press_agrees_with_scipy(bed, parts, motion, 
     assert_near(forces[:, cell], force, force_apart)
 
 
-@pytest.mark.parametrize("seed", [0, 3])
-@pytest.mark.parametrize("parts", [NARROW, WIDE], ids=["bore", "orifice"])
-@pytest.mark.parametrize("fingers", [(FINGER,) * 2, (FINGER,) * 3, (FINGER, STEEP, SOFT)])
+@pytest.mark.parametrize(
+    "fingers, parts, seed",
+    [
+        ((FINGER,) * 2, NARROW, 0),
+        ((FINGER,) * 3, WIDE, 3),
+        ((FINGER, STEEP, SOFT), NARROW, 3),
+        ((FINGER, STEEP, SOFT), WIDE, 0),
+    ],
+)
 def test_a_pin_that_rises_into_several_fingertips_is_pressed_at_most_as_by_each_alone(
     fingers, parts, seed
 ):

@@ -25,7 +25,7 @@ pytestmark = pytest.mark.usefixtures("quick_machine")
 
 ENDS = [(-12.0, -3.0), (12.0, 4.0)]
 #: Brushes that a fingertip leads, and their depth or height, mm.
-PRESSED = {Brush.RAISE: 15.0, Brush.LOWER: 4.0}
+PRESSED = {Brush.RAISE: 8.0, Brush.LOWER: 4.0}
 #: Rounding of the mean of some hundred squares.
 ROUNDING = 1e-12
 

@@ -241,7 +241,7 @@ def test_what_a_brush_is_to_leave_of_a_pin_is_the_share_that_its_lock_leaves(str
 
 HALF = 0.5 * (SHARES > 0.5)
 FORMED = [
-    pytest.param(lay(Brush.RAISE, CROSS, amount=9e-3), SHARES, id="a finger, to the nominal form"),
+    pytest.param(lay(Brush.RAISE, CROSS, amount=5e-3), SHARES, id="a finger, to the nominal form"),
     pytest.param(lay(Brush.LOWER, CROSS, as_left=True), HALF, id="a finger, as it leaves them"),
     pytest.param(lay(Brush.ERASE, CROSS), HALF, id="valves that erase"),
     pytest.param(lay(Brush.SMOOTH, CROSS), HALF, id="valves that smooth"),

@@ -249,8 +249,10 @@ def lock(verb, x=0.0, radius=7e-3):
     return Orders(repeat_order(1, verb, x, 0.0, radius))
 
 
-@pytest.mark.parametrize("shape", [False, True])
-@pytest.mark.parametrize("method", [*METHODS, "absent"])
+@pytest.mark.parametrize(
+    "method, shape",
+    [*((method, False) for method in METHODS), ("virtual_master", True), ("absent", True)],
+)
 def test_a_locked_pin_stays_whatever_the_method_and_orders_command(method, shape):
     if shape:
         pytest.importorskip("PIL.Image", reason="the shape is a picture")

@@ -122,8 +122,7 @@ DESIGN = make_device("hybrid", "design", "design")
 @pytest.mark.parametrize(
     "method, bed, preset",
     [
-        ("hybrid", "design", "design"), ("hybrid", "fine", "design"), ("hybrid", "paper", "paper"),
-        ("virtual_master", "design", "design"), ("virtual_master", "paper", "paper"),
+        ("hybrid", "design", "design"), ("hybrid", "fine", "design"), ("virtual_master", "paper", "paper"),
         ("cell_states", "design", "design"),
     ],
 )  # fmt: skip

@@ -27,7 +27,7 @@ PARTS = {
     "Method I on the paper's bed": (25, "paper", "aligned", "virtual_master"),
     "Method III": (41, "design", "aligned", "hybrid"),
     "Method I, rows shifted": (41, "design", "staggered", "virtual_master"),
-    "Method II on fine pins": (61, "fine", "aligned", "cell_states"),
+    "Method II on fine pins": (45, "fine", "aligned", "cell_states"),
     "without a blister": (41, "design", "aligned", "plastic"),
 }
 
@@ -43,7 +43,6 @@ def begin(name):
 #: Strokes of one session: brush, height or depth, m, path, m, and images. The last valley is
 #: pressed with more than `motion.FIRM`, at which the fingertip waits for the pins.
 DRAWN = {
-    "a mirrored ring": [(Brush.RAISE, 3e-3, lay_ring((4e-3, 0.0), (12e-3, 5e-3)), "X")],
     "across the mirror": [
         (Brush.RAISE, 3e-3, np.linspace([-12e-3, -7e-3], [15e-3, 8e-3], 20), "X")
     ],
@@ -102,10 +101,10 @@ QUEUES = {
 RIDGE, RINGS, TURNED, LEVEL_RIDGE, LEANING = QUEUES
 CASES = [
     *(("Method III", queue) for queue in QUEUES),
-    ("Method I on the paper's bed", RINGS),
+    ("Method I on the paper's bed", RIDGE),
     *(("Method I, rows shifted", queue) for queue in (TURNED, LEANING)),
     ("Method II on fine pins", LEVEL_RIDGE),
-    *(("without a blister", queue) for queue in (TURNED, LEANING)),
+    ("without a blister", TURNED),
 ]
 
 

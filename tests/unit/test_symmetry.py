@@ -101,7 +101,6 @@ TURNED = {
     "x": (make_images("X"), np.fliplr, (0, 0)),
     "y of another axis": (make_images("Y", center=(0.0, -3e-3)), np.flipud, (-2, 0)),
     "a diagonal": (make_images("Y", angle=math.pi / 4), np.transpose, (0, 0)),
-    "both": (make_images("XY"), np.fliplr, (0, 0)),
 }
 
 
@@ -115,7 +114,6 @@ def alone(method, brush):
     "method, brush, images",
     [
         ("virtual_master", Brush.LOWER, "four turns"),
-        ("virtual_master", Brush.LOWER, "both"),
         ("virtual_master", Brush.RAISE, "a diagonal"),
         ("hybrid", Brush.RAISE, "four turns about another place"),
         ("hybrid", Brush.LOWER, "y of another axis"),
@@ -143,7 +141,6 @@ def test_images_form_alike_in_the_time_of_one_and_are_replayed_bit_for_bit(metho
 
 ONE, LOWER, RAISE = "virtual_master", Brush.LOWER, Brush.RAISE
 X, TURNED_X = make_images("X"), make_images("X", center=(0.7e-3, -0.4e-3), angle=0.4)
-STEEP = line(-7.7, -6.4, 7.7, 6.4)
 RAYS = make_images("RADIAL", 8, (1.1e-3, -0.7e-3))
 #: As a hand draws along an axis: up to 1.4 mm beside it.
 WAVE = np.column_stack([0.9 + 0.5 * np.sin(np.linspace(0, 9, 30)), np.linspace(-9, 9, 30)])
@@ -169,11 +166,9 @@ MEETING = {
     "on the axis one presses": ("hybrid", RAISE, line(0, -9, 0, 9), X, 1.1),
     "a click in the middle is one": (ONE, LOWER, line(0, 0, 0, 0), make_images("RADIAL", 6), 1.05),
     "side by side, as near as two are told apart": (ONE, RAISE, line(2.6, -6, 2.6, 6), X, 1.05),
-    "the same with Method III": ("hybrid", LOWER, line(2.6, -6, 2.6, 6), X, 1.05),
     "Method II, at forces at which others wait": ("cell_states", LOWER, line(4, -6, 4, 6), X, 1.05),
     "nearer, one follows": (ONE, LOWER, line(1.6, -6, 1.6, 6), X, 1.6),
     "by hand along the axis, one presses": (ONE, LOWER, WAVE, X, 1.15),
-    "the same, raised": ("hybrid", RAISE, WAVE, X, 1.05),
     "a click in a small ring, every other one": (
         ONE,
         LOWER,
@@ -184,17 +179,8 @@ MEETING = {
     "towards the axis, nearer than one may come down": (ONE, LOWER, line(11, -9, 1, 9), X, 1.1),
     "from another axis, turned": (ONE, LOWER, line(9, 6, 1, -8), TURNED_X, 1.4),
     "across the axis both go on": (ONE, LOWER, line(-18, -9, 18, 9), X, 1.15),
-    "across the axis, raised": (ONE, RAISE, STEEP, X, 1.15),
     "from the axis one begins at its end": ("hybrid", RAISE, line(0, -9, 18, 9), X, 1.15),
-    "all rays from the middle but one do": (
-        "hybrid",
-        RAISE,
-        line(0, 0, 18, 4),
-        make_images("RADIAL", 4),
-        1.15,
-    ),
     "so with Method I, about another place": (ONE, LOWER, line(2, 1, 18, -6), RAYS, 1.15),
-    "rays towards the middle": (ONE, LOWER, line(12, 1, 1, 0), make_images("RADIAL", 6), 1.2),
     "lines that pass each other": (ONE, LOWER, line(-10, 1, 10, 1), make_images("RADIAL", 3), 1.3),
     "many": ("hybrid", RAISE, line(24, 0, 24, 1), make_images("RADIAL", 24), 1.1),
 }
@@ -258,19 +244,16 @@ def test_no_fingertip_lifts_again_for_another_one_that_is_down():
     assert lifted == 0
 
 
-@pytest.mark.parametrize(
-    "name", ["lines that pass each other", "so with Method I, about another place"]
-)
-def test_what_near_images_leave_does_not_depend_on_the_periods_of_a_tick(name):
+def test_what_near_images_leave_does_not_depend_on_the_periods_of_a_tick():
+    name = "lines that pass each other"
     method, brush, path, images, _ = MEETING[name]
     *_, left = follow_to_the_end(queue(begin(method), path, images, brush), 1)
     assert_array_equal(left, meet(name)[2])
 
 
-@pytest.mark.parametrize("drawn", [0, 12])
-def test_rays_leave_their_nominal_surface_whenever_the_hand_lets_go(drawn):
+def test_rays_leave_their_nominal_surface_although_the_hand_pauses():
     path = line(2, 1, 18, -6)
-    session = queue(begin("hybrid"), path[: drawn + 1], RAYS, RAISE, held=True)
+    session = queue(begin("hybrid"), path[:13], RAYS, RAISE, held=True)
     for _ in range(40):  # as far as the hand has drawn
         session = follow_finger(session, session.poses, 8)
     session = change_stroke(session, 1, partial(lay_path, points=1e-3 * path))
