@@ -72,7 +72,6 @@ def script(blender):
         if issubclass(kind, bpy.types.Panel):
             kind.append(measure)
     yield from unfold(blender, "DIGICLAY_PT_start", "")
-    blender.shot("german_start")
     yield from blender.add_paper_bed()
     bpy.ops.mesh.primitive_cube_add(location=(0.0, 0.0, 3.0))
     bpy.context.object.name = "Cube"  # a word that Blender translates
@@ -89,6 +88,7 @@ def script(blender):
     for root in LIVE:
         yield from unfold(blender, root, "")
     yield from blender.open_sidebar()
+    blender.part("overlay.views").follow()  # which went with the panels
     blender.shot("german_overlay")
 
 
