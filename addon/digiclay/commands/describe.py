@@ -170,7 +170,7 @@ def _pins(scene: Scene, system: System) -> Iterator[tuple[str, str]]:
     count, words = scene.cells, "one per pin"
     if drive is not None:
         lines, count = drive.count_lines(scene.layout), drive.count_valves(scene.layout)
-        turns = 1 if drive.share else math.ceil(lines / drive.sections)
+        turns = drive.count_turns(scene.layout)
         words = f"for {scene.cells} pins in {lines} lines"
     yield "motors" if electric else "valves", f"{count}, {words}"
     full = "at full command" if electric else "valve wide open"

@@ -8,6 +8,7 @@ column commands. The valves of all other cells stay shut.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -30,6 +31,20 @@ POLICIES: dict[str, Urgency] = {
     "one_time": lambda effort, served: np.sign(effort) * (1.0 + served),
     "round_robin": lambda effort, served: 0.0 * effort,
 }
+#: Parameters by kind of drive.
+KINDS = {
+    "matrix": (
+        "sections",
+        "axis",
+        "slot",
+        "policy",
+        "share",
+        "line_lag",
+        "overlap",
+        "leak",
+    ),
+    "servo": ("frame", "dead_zone", "height_step", "servo_gain"),
+}
 #: Weight of a line under a fingertip, with the policy *pressed*.
 PRESSED = 5.0
 
@@ -38,7 +53,11 @@ PRESSED = 5.0
 class MatrixDrive(Parameters):
     """Valves for lines and columns of cells."""
 
-    kind: str = quantity("matrix", "how valves belong to cells", choices=("matrix",))
+    kind: str = quantity(
+        "matrix",
+        "how valves belong to cells: to their lines and columns, or each to a servo of its own",
+        choices=tuple(KINDS),
+    )
     sections: int = quantity(
         4,
         "interleaved sets of column valves; one per line: a valve per cell",
@@ -89,8 +108,35 @@ class MatrixDrive(Parameters):
         below=1.0,
     )
 
+    frame: float = quantity(
+        0.0,
+        "time for which servos hold commanded heights, whole control periods; 0: one of them",
+        unit="s",
+        symbol="T_f",
+        at_least=0.0,
+    )
+    dead_zone: float = quantity(
+        0.0, "height error without a command of the servo", unit="m", symbol="δ_s", at_least=0.0
+    )
+    height_step: float = quantity(
+        0.0, "step of commanded heights; 0: none", unit="m", symbol="q_s", at_least=0.0
+    )
+    servo_gain: float = quantity(
+        500.0, "proportional gain of the servo", unit="1/m", symbol="K_s", above=0.0
+    )
+
+    def list_idle(self) -> frozenset[str]:
+        """Return the parameters of other kinds."""
+        kinds = (names for kind, names in KINDS.items() if kind != self.kind)
+        return frozenset(name for names in kinds for name in names)
+
     def check(self) -> None:
-        """Refuse properties of gates without gates."""
+        """Refuse parameters of another kind, and properties of gates without gates."""
+        for name in self.list_idle():
+            value, default = getattr(self, name), type(self).__dataclass_fields__[name].default
+            if value != default:
+                rule = f"must be left out with drive.kind = {self.kind}"
+                raise ParameterError("drive", name, rule, str(value))
         for name in ("overlap", "leak"):
             value = getattr(self, name)
             if value and not self.line_lag:
@@ -103,8 +149,13 @@ class MatrixDrive(Parameters):
 
     def count_valves(self, layout: Layout) -> int:
         """Return the number of valves, n + k m."""
-        lines = self.count_lines(layout)
-        return lines + self.sections * (layout.rows * layout.columns // lines)
+        lines, cells = self.count_lines(layout), layout.rows * layout.columns
+        return cells if self.kind == "servo" else lines + self.sections * (cells // lines)
+
+    def count_turns(self, layout: Layout) -> int:
+        """Return in how many turns all lines are addressed."""
+        at_once = self.share or self.kind == "servo"
+        return 1 if at_once else math.ceil(self.count_lines(layout) / self.sections)
 
     def locate(self, layout: Layout, cells: Cells) -> tuple[Cells, Cells]:
         """Return the lines of cells (m,), and their places along them."""
@@ -117,6 +168,12 @@ class MatrixDrive(Parameters):
 
     def check_device(self, layout: Layout, period: float, dead_time: float) -> None:
         """Refuse more sections than lines, and slots that do not fit the control period or dead time, s."""
+        if self.kind == "servo":
+            frame = round(self.frame / period) * period
+            if abs(self.frame - frame) > TIE * period:
+                rule = f"must be a whole number of control periods, {period:g} s, or 0"
+                raise ParameterError("drive", "frame", rule, f"{self.frame:g} s")
+            return
         lines = self.count_lines(layout)
         if self.sections > lines:
             rule = f"must be at most the number of layout.{self.axis}, {lines}"

@@ -341,10 +341,16 @@ def _make_drive(scene: Scene) -> Drive:
     """Return the valves between the controller and the cells."""
     if scene.drive is None:
         return DirectDrive()
+    period = scene.simulation.control_period
+    if scene.drive.kind == "servo":
+        from ..model.servo_drive import make_servos
+
+        heights = np.full(scene.cells, scene.actuator.rest_height)
+        return make_servos(scene.drive, scene.drive.count_lines(scene.layout), heights, period)
     from ..model.matrix_drive import make_addressing
 
     floor = scene.sensors.force_floor if scene.sensors else 0.0
-    return make_addressing(scene.drive, scene.layout, scene.simulation.control_period, floor)
+    return make_addressing(scene.drive, scene.layout, period, floor)
 
 
 def _make_controller(scene: Scene, bed: Grid, cells: tuple[Cell, ...]) -> Controller:

@@ -1,0 +1,138 @@
+"""The servo drive: commanded heights frame by frame, a dead zone, quantized heights."""
+
+import tomllib
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from digiclay.core.base.errors import DigiclayError
+from digiclay.core.base.modes import Mode
+from digiclay.core.engine.simulation import begin, periods
+from digiclay.core.model.control_interface import Commands
+from digiclay.core.scene.assembly import assemble
+from digiclay.core.scene.toml_table import format_scene, resolve
+from digiclay.core.session import snapshot
+from digiclay.core.session.run_scene import run
+
+from tests.assemble import AWAY, over_middle, record, refused_in_a_line, replace, table
+
+PERIOD = 5e-3
+MOTOR = {"valve": {"law": "motor", "hold": "braked", "free_speed": 0.2}, "conduit": "absent"}
+
+
+@dataclass(frozen=True)
+class Wave:
+    """Controller that asks all pins for heights that grow with time, and for no valve command."""
+
+    speed: float
+    rows = 0
+
+    def begin(self):
+        return 0
+
+    def locate(self, memory, touched):
+        return memory, (0.0, 0.0, 1.0)
+
+    def command(self, memory, seen):
+        target = np.full(seen.height.shape, 40e-3 + self.speed * memory * PERIOD)
+        modes = np.full(target.size, Mode.HOLD, np.int8)
+        return memory + 1, Commands(target, modes, np.zeros(target.size))
+
+
+def servo(**known):
+    given = {"kind": "servo", **known}
+    return resolve(
+        {
+            **MOTOR,
+            "layout": {"rows": 5, "columns": 5},
+            "control": "absent",
+            "drive": given,
+            "trajectory": {"waypoints": over_middle((0.0, 0.5), (1.0, 0.5))},
+        }
+    )
+
+
+def follow(scene, speed, count=120):
+    system = replace(assemble(scene), controller=Wave(speed))
+    return record(system, AWAY, count).height[:, 0]
+
+
+def test_a_servo_lags_a_moving_height_by_the_speed_over_its_gain():
+    # v = v0 K_s e: 0.1 m/s per mm.
+    height = follow(servo(), 20e-3)
+    behind = 40e-3 + 20e-3 * PERIOD * np.arange(121) - height
+    assert behind[-1] == pytest.approx(20e-3 / (0.2 * 500.0), rel=1e-6)
+    assert behind[-1] == pytest.approx(behind[-20], rel=1e-6)
+
+
+def test_heights_are_held_for_a_frame():
+    speed, frame = 20e-3, 60e-3
+    height = follow(servo(frame=frame), speed)
+    # At the end of a frame a pin has arrived at the height of its start.
+    ends = height[12::12]
+    starts = 40e-3 + speed * frame * np.arange(ends.size)
+    assert np.abs(ends - starts).max() < 10e-6
+    # The pole of 0.2 m/s * 500 1/m: exp(-5.2) of a step of 1.2 mm after 52 ms.
+
+
+@pytest.mark.parametrize("zone", [0.2e-3, 1e-3])
+def test_within_the_dead_zone_a_pin_is_not_moved(zone):
+    height = follow(servo(dead_zone=zone), zone / (100 * PERIOD) * 0.9, 101)
+    assert np.abs(height - 40e-3).max() == 0.0
+    height = follow(servo(dead_zone=zone), zone / (100 * PERIOD) * 1.5, 101)
+    # The valve is shut within its dead time and lag of the edge of the dead zone.
+    left = 40e-3 + 1.5 * zone - height[-1]
+    assert 0.0 < left <= 1.02 * zone
+
+
+def test_heights_are_multiples_of_the_step_of_heights():
+    height = follow(servo(height_step=1e-3), 10e-3, 81)[-1]
+    assert height == pytest.approx(44e-3, abs=5e-6)
+
+
+def test_pins_follow_a_shape_after_the_method_has_commanded_them_and_a_state_keeps_their_heights():
+    drive = {"kind": "servo", "frame": 50e-3, "dead_zone": 5e-6}
+    sections = {
+        "layout": {"rows": 9, "columns": 9},
+        "control": {"method": "shape_display"},
+        "shape": {"rise": 5e-3},
+        "trajectory": {"waypoints": over_middle((0.0, 0.5), (1.0, 0.5))},
+    }
+    scene = resolve({**MOTOR, **sections, "drive": drive})
+    plain, driven = (
+        run(one).history["height"][-1] for one in (scene.with_sections(drive=None), scene)
+    )
+    assert np.ptp(plain) > 1e-3
+    assert np.abs(driven - plain).max() < 20e-6
+    system = assemble(scene)
+    *_, state = periods(system, scene.trajectories(), begin(system), 33)
+    again = snapshot.load(system, snapshot.dump(system, state))
+    ends = [
+        [after.row(0) for after in periods(system, scene.trajectories(), one.copy(), 50)][-1]
+        for one in (state, again)
+    ]
+    assert np.array_equal(*ends)
+    assert resolve(tomllib.loads(format_scene(scene))) == scene
+    assert "sections" not in format_scene(scene)
+
+
+@table(
+    "drive, said",
+    {
+        "lines of a matrix": (
+            {"sections": 3},
+            "drive.sections must be left out with drive.kind = s",
+        ),
+        "a frame of 7 ms": (
+            {"frame": 7e-3},
+            "drive.frame must be a whole number of control periods",
+        ),
+        "a frame below 0": ({"frame": -1.0}, "frame must be at least 0 s"),
+        "no gain": ({"servo_gain": 0.0}, "servo_gain must be above 0 1/m"),
+        "a misspelt kind": ({"kind": "sevro"}, "kind must be one of matrix, servo"),
+        "a dead zone of a matrix": ({"kind": "matrix", "dead_zone": 1e-3}, "must be left out with"),
+    },
+)
+def test_what_a_servo_has_not_is_refused(drive, said):
+    with refused_in_a_line(DigiclayError, said):
+        servo(**drive)
