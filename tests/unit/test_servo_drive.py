@@ -91,12 +91,12 @@ def test_heights_are_multiples_of_the_step_of_heights():
 
 
 def test_pins_follow_a_shape_after_the_method_has_commanded_them_and_a_state_keeps_their_heights():
-    drive = {"kind": "servo", "frame": 50e-3, "dead_zone": 5e-6}
+    drive = {"kind": "servo", "frame": 0.3, "dead_zone": 5e-6}
     sections = {
         "layout": {"rows": 9, "columns": 9},
         "control": {"method": "shape_display"},
         "shape": {"rise": 5e-3},
-        "trajectory": {"waypoints": over_middle((0.0, 0.5), (1.0, 0.5))},
+        "trajectory": {"waypoints": over_middle((0.0, 0.5), (3.0, 0.5))},
     }
     scene = resolve({**MOTOR, **sections, "drive": drive})
     plain, driven = (
@@ -136,3 +136,22 @@ def test_pins_follow_a_shape_after_the_method_has_commanded_them_and_a_state_kee
 def test_what_a_servo_has_not_is_refused(drive, said):
     with refused_in_a_line(DigiclayError, said):
         servo(**drive)
+
+
+class Once(Wave):
+    """Controller that asks for a height in the first periods alone, after those of a frame's start."""
+
+    def locate(self, memory, touched):
+        return memory, (0.0, 0.0, 1.0) if memory < 5 else None
+
+    def command(self, memory, seen):
+        memory, orders = super().command(memory, seen)
+        target = np.full(seen.height.shape, 41e-3 if memory > 1 else 40e-3)
+        return memory, orders._replace(target=target, mode=np.zeros(target.size, np.int8))
+
+
+def test_a_pin_waits_for_its_frame():
+    system = replace(assemble(servo(frame=0.5)), controller=Once(0.0))
+    height = record(system, AWAY, 200).height[:, 12]
+    assert height[100] == 40e-3
+    assert height[-1] == pytest.approx(41e-3, abs=5e-6)
