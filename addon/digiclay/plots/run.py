@@ -75,7 +75,7 @@ def session_figure(history: History, set_point: SetPoint | None) -> Figure:
     from it is shown. The axes are, by label: ``heights``, ``force``, ``map`` with its ``scale``,
     and ``figures``.
     """
-    several = "finger_force" in history
+    several, marked = "finger_force" in history, ", bars: served" if "served" in history else ""
     letters = [str(number) for number in range(1, len(LINES) + 1)] if several else LETTERS
     time, height = array(history, "time"), array(history, "height")
     with canvas(12.5, 6.3) as (figure, place):
@@ -100,7 +100,7 @@ def session_figure(history: History, set_point: SetPoint | None) -> Figure:
             )
         heights.set_ylim(ends(np.array(heights.get_ylim()), 2.0))
         heights.set(ylabel="height (mm)", xlim=ends(time, 0.1))
-        heights.set_title("Heights of cells under the fingers" if several else "Heights of cells")
+        heights.set_title("Heights of cells" + (" under the fingers" if several else marked))
         heights.tick_params(labelbottom=False)
         shade_contact(heights, history)
         wanted, label = None, ""
@@ -162,9 +162,9 @@ def shade_contact(axes: Axes, history: History, label: str | None = None) -> Non
 def _mark_served(axes: Axes, time: ArrayLike, served: Any, color: str) -> None:
     """Draw a strip below the former ones at the top of the axes: when a cell's line is addressed."""
     top = 1.0 - 0.02 * len(axes.collections)
-    strip: dict[str, Any] = {"color": color, "linewidth": 0, "step": "post"}
-    across = axes.get_xaxis_transform()
-    axes.fill_between(time, top, top - 0.015, where=served, transform=across, **strip)
+    upper, across = np.where(served, top, top - 0.015), axes.get_xaxis_transform()
+    strip: dict[str, Any] = {"color": color, "linewidth": 0, "step": "post", "zorder": 1.5}
+    axes.fill_between(time, top - 0.015, upper, transform=across, **strip)
 
 
 def surface_figure(history: History) -> Figure:
