@@ -36,6 +36,7 @@ waypoints = [
   { time = 0, position = [-0.009, 0, 0.049] },
   { time = 0.4, position = [-0.009, 0.002, 0.044], orientation = [0.7, 0, 0, 0.7] },
   { time = 0.5, position = [-0.009, 0.002, 0.044], orientation = [0.7, 0, 0, 0.7] },
+  { time = 0.8, position = [-0.009, 0.001, 0.06], orientation = [-0.2, 0.9, 0.1, 0.1] },
   { time = 0.9, position = [-0.009, 0, 0.07], orientation = [-0.2, 0.9, 0.1, 0.1] },
 ]
 [[body]]
