@@ -171,7 +171,7 @@ def _pins(scene: Scene, system: System) -> Iterator[tuple[str, str]]:
     if drive is not None:
         lines, count = drive.count_lines(scene.layout), drive.count_valves(scene.layout)
         turns = drive.count_turns(scene.layout)
-        words = f"for {scene.cells} pins in {lines} lines"
+        words = f"for {scene.cells} pins in {lines} lines" if count < scene.cells else words
     yield "motors" if electric else "valves", f"{count}, {words}"
     full = "at full command" if electric else "valve wide open"
     speeds = f"{up * 1e3:.3g} mm/s up, {down * 1e3:.3g} mm/s down"
