@@ -69,8 +69,16 @@ IMPORTERS = {
 }
 
 
-@pytest.mark.parametrize("kind", ["solid", "surface", "pins", "features"])
-@pytest.mark.parametrize("file_format", IMPORTERS)
+@pytest.mark.parametrize(
+    "file_format, kind",
+    [
+        *((file_format, kind) for file_format in IMPORTERS for kind in ("solid", "features")),
+        ("stl", "surface"),
+        ("glb", "surface"),
+        ("obj", "pins"),
+        ("ply", "pins"),
+    ],
+)
 def test_blenders_own_importers_read_what_was_exported(bed, tmp_path, kind, file_format):
     path = tmp_path / f"bed{find_suffix(file_format)}"
     done = bpy.ops.export_mesh.digital_clay(filepath=str(path), kind=kind, file_format=file_format)

@@ -52,7 +52,6 @@ SLANTING = [(-19.0, -5.0), (17.0, 6.0)]
 CASES = {
     "2 mm deep": (Brush.LOWER, 2.0, {}),
     "8 mm deep": (Brush.LOWER, 8.0, {}),
-    "15 mm deep": (Brush.LOWER, 15.0, {}),
     "15 mm high": (Brush.RAISE, 15.0, {}),
     "by slow valves": (Brush.RAISE, 15.0, {"preset": "viscous"}),
     "by Method II": (Brush.RAISE, 15.0, {"control": {"method": "cell_states"}}),

@@ -113,10 +113,8 @@ def test_the_finger_goes_along_the_whole_path_however_quick_the_hand(moves):
     assert np.diff(down[:, 0]).max() <= motion.DRAG * PERIOD + 1e-12
 
 
-@pytest.mark.parametrize(
-    "shown", [1, 3, 11, 20], ids=lambda count: f"{count} of 21 places drawn first"
-)
-@pytest.mark.parametrize("chunk", [1, 7, 4000], ids=lambda count: f"{count} periods at a time")
+#: Of 21 places, how many are drawn first, and periods at a time.
+@pytest.mark.parametrize("shown, chunk", [(1, 7), (3, 1), (11, 4000), (20, 7)])
 @pytest.mark.parametrize("fingers", [1, 2])
 @pytest.mark.parametrize("away", [0.0, 20e-3], ids=["from the axis", "apart"])
 def test_the_way_follows_from_the_path_alone_and_is_never_ahead_of_the_hand(

@@ -180,7 +180,6 @@ MEETING = {
     "from another axis, turned": (ONE, LOWER, line(9, 6, 1, -8), TURNED_X, 1.4),
     "across the axis both go on": (ONE, LOWER, line(-18, -9, 18, 9), X, 1.15),
     "from the axis one begins at its end": ("hybrid", RAISE, line(0, -9, 18, 9), X, 1.15),
-    "so with Method I, about another place": (ONE, LOWER, line(2, 1, 18, -6), RAYS, 1.15),
     "lines that pass each other": (ONE, LOWER, line(-10, 1, 10, 1), make_images("RADIAL", 3), 1.3),
     "many": ("hybrid", RAISE, line(24, 0, 24, 1), make_images("RADIAL", 24), 1.1),
 }

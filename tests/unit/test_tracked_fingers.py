@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from digiclay_serve.tracked_fingers import (
+    CLEAR,
     PARKED,
     Felt,
     Tracking,
@@ -43,6 +44,18 @@ def test_a_finger_that_is_not_named_lifts_after_100_ms_and_its_fingertip_is_free
     assert [both.index(True, 1) for both in zip(*lifted, strict=True)] == [38, 19]
     tracks = name_fingers(tracks, [(9, (*PLACE, *LEVEL))])
     assert tracks.identities.tolist() == [9, -1]
+
+
+@pytest.mark.parametrize(
+    "above, there", [(-1e-3, False), (0.9 * CLEAR, False), (1.1 * CLEAR, True)]
+)
+def test_a_fingertip_comes_to_its_finger_from_above_all_pins_alone(above, there):
+    simulated = np.array([[0.0, 0.0, 0.04 + above, *LEVEL]])
+    tracks = name_fingers(begin_tracks(simulated), at((0.0, 0.0, 0.038)))
+    tracks, _ = advance(tracks, Tracking(), felt(simulated), 5e-3)
+    assert tracks.there.tolist() == [there]
+    _, targets = advance(tracks, Tracking(), felt(simulated), 5e-3)
+    assert (targets[0, 2] < PARKED) == there
 
 
 EXCHANGED = {

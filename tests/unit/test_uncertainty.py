@@ -289,7 +289,6 @@ SHORT = scene_text(5, 5, (0.0, 0.0405), (0.02, 0.038), parts=SMALL_BLISTER)
 @table(
     "scene, method, fingers",
     {
-        "Method II": (SCENE, "cell_states", 1),
         "Method III": (SCENE, "hybrid", 1),
         "two fingers with Method I": (SHORT, "virtual_master", 2),
     },
