@@ -18,6 +18,7 @@ from digiclay.core.model.relaxation import Relaxation
 from digiclay.core.model.valve import Fluid, Valve
 from digiclay.core.steppers.explicit import RungeKutta4
 from scipy.integrate import quad
+from scipy.optimize import brentq
 
 from tests.assemble import AWAY, Motion, make_system, one_cell, path, record, scripted, table, under
 
@@ -215,6 +216,37 @@ def test_commands_kept_and_the_cut_make_up_the_dead_time_and_steps_fill_the_peri
     for part in parts:
         wanted = [part.start + node * part.length for node in stepper.nodes]
         assert instants[list(part.nodes)] == pytest.approx(wanted, abs=1e-15)
+
+
+@table(
+    "modulus, stiffness, felt",
+    {
+        "oil": (1e9, 78540.0, 0.998),
+        "oil with 1 % air": (1.0 / (0.99 / 1e9 + 0.01 / 1e5), 778.0, 0.81),
+        "air": (1e5, 7.85, 0.0407),
+    },
+)
+def test_compressible_fluid_would_soften_a_shut_pin_as_the_page_on_equations_says(
+    modulus, stiffness, felt
+):
+    actuator, contact = Actuator(), Contact()
+    spring = modulus * actuator.area**2 / (actuator.area * 40e-3)
+    assert spring == pytest.approx(stiffness, rel=1e-3)
+
+    def find_travel(force, give):
+        """Return how far a finger presses, m, a pin that gives way, m/N, to a force."""
+
+        def miss(travel):
+            depth = travel - give * force
+            return contact.share * float(contact.tension(np.array([depth]))[0]) - force
+
+        return brentq(miss, 0.0, 1.0, xtol=1e-15)
+
+    slopes = [
+        2e-4 / (find_travel(50.1e-3, give) - find_travel(49.9e-3, give))
+        for give in (0.0, 1.0 / spring)
+    ]
+    assert slopes[1] / slopes[0] == pytest.approx(felt, rel=5e-3)
 
 
 TIMES, WEIGHTS = (4e-3, 70e-3, 1.4), (0.08, 0.62, 0.20, 0.10)
