@@ -26,6 +26,8 @@ from digiclay.core.scene.scene_source import find, list_samples, load  # noqa: E
 from digiclay.core.scene.schema import SECTIONS, import_parameters  # noqa: E402
 from digiclay.core.session.finished_run import HISTORY_ARRAYS, KINDS  # noqa: E402
 from digiclay.core.studies.evaluation import FIGURES  # noqa: E402
+from digiclay.core.studies.job_table import PICTURES  # noqa: E402
+from digiclay.core.studies.speed_limits import Stroke  # noqa: E402
 from manual import make_anchor  # noqa: E402
 from mkdocs.structure.files import File  # noqa: E402
 
@@ -201,10 +203,9 @@ def write_table(*rows: Sequence[str]) -> str:
     return "\n".join(("", head, "|---" * len(rows[0]) + "|", *body, ""))
 
 
-def _section(name: str, method: str) -> list[str]:
-    """Return the heading and the table of one section of a scene file."""
-    kind: type[Parameters] = import_parameters(name, method)
-    title = f"## [{name}]" + (f' with method = "{method}"' if name == "control" else "")
+def _section(name: str, kind: type[Parameters], which: str = "") -> list[str]:
+    """Return the heading and the table of one section of a file."""
+    title = f"## [{name}]{which}"
     rows: list[Sequence[str]] = [
         ("Symbol", "Name", "Unit", "Meaning", "Range", "Default", "Source")
     ]
@@ -227,8 +228,14 @@ def make_parameters_page() -> str:
     extents = [(unit or "1", f"{least:g}", f"{most:g}") for unit, (least, most) in EXTENTS.items()]
     lines = [AHEAD + PARAMETERS, write_table(("Unit", "Least above 0", "Most"), *extents)]
     for name in (*SECTIONS, "body"):
-        for method in METHODS if name == "control" else ("virtual_master",):
-            lines += _section(name, method)
+        if name != "control":
+            lines += _section(name, import_parameters(name, ""))
+            continue
+        for method in METHODS:
+            lines += _section(name, import_parameters(name, method), f' with method = "{method}"')
+    lines += ["", "Sections of [JOBS](../job-series.md) and [STUDY](../valves.md) files:"]
+    for name, kind in {**PICTURES, "stroke": Stroke}.items():
+        lines += _section(name, kind)
     return "\n".join(lines) + "\n"
 
 

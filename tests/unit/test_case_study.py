@@ -123,7 +123,7 @@ def test_a_study_that_was_stopped_goes_on_to_the_same_table_and_another_referenc
         ((1.0, 2.0, 3.0), (0.9, 1.5, 0.5), 0),  # although a larger one fails
         ((3.0, 2.0, 2.0), (0.1, 0.9, 0.8), 2),  # of equal ones the better
         ((1.0, 2.0), (7.0, 4.0), 1),  # none meets: the nearest
-        ((1.0, 2.0), (math.inf, 1.0), 1),  # a limit itself is met
+        ((1.0, 2.0), (1.0, 0.5), 0),  # a limit itself is met
     ],
 )
 def test_the_least_candidate_is_that_with_the_smallest_amount_within_all_limits(
