@@ -39,6 +39,8 @@ class DeviceInfo:
     """Noise floor of a cell's force, N, and largest error of a height reading, m."""
     dead_time: float = 0.0
     """Dead time of valve commands, s."""
+    commands_wait: bool = False
+    """Whether a command may wait in a drive before it acts."""
 
     @cached_property
     def rim(self) -> Rim:

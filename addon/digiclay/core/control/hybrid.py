@@ -232,8 +232,9 @@ class HybridControl:
             lead[:] = speeds[:] = 0.0
             master, commands = self.substitute.command(memories[0].master, unled)
             return [memories[0]._replace(master=master, led_radius=0.0)], commands
-        # A valve whose line waited in the last period, or that is locked, has stayed shut.
-        speeds[0] *= seen.command != 0.0
+        if self.device.commands_wait:
+            # A valve whose line waited in the last period has stayed shut.
+            speeds[0] *= seen.command != 0.0
         coasting = Coasting(
             self.servo.find_limits(seen.force), self.servo.coast(seen.height, speeds)
         )
