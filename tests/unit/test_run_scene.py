@@ -44,13 +44,15 @@ def result():
     return run(scene())
 
 
-@pytest.mark.parametrize("fingers", [1, 2])
-def test_the_arrays_of_a_history_are_the_declared_ones_and_are_read_again(fingers, tmp_path):
+@pytest.mark.parametrize(("fingers", "drive"), [(1, {}), (2, {}), (1, {"drive": {"sections": 2}})])
+def test_the_arrays_of_a_history_are_the_declared_ones_and_are_read_again(fingers, drive, tmp_path):
     beyond = over_middle((0, 0.041), (0.1, 0.034), (0.2, 0.041))
     finger = {"trajectory": {"waypoints": beyond}}
     motion = finger if fingers == 1 else {"finger": [finger, finger]}
-    done = run(resolve({"layout": TABLE["layout"], "blister": SMALL, **motion}))
+    done = run(resolve({"layout": TABLE["layout"], "blister": SMALL, **motion, **drive}))
     save(done, tmp_path)
+    absent = {"finger_force"} if fingers == 1 else set()
+    absent |= set() if drive else {"served"}
     sizes = {"t": 41, "n": 12, "f": fingers}
     assert {name: array.shape for name, array in done.history.items()} == {
         name: tuple(
@@ -59,7 +61,7 @@ def test_the_arrays_of_a_history_are_the_declared_ones_and_are_read_again(finger
             if axis != "f" or fingers > 1
         )
         for name, declared in HISTORY_ARRAYS.items()
-        if (fingers > 1 or name != "finger_force") and not name.startswith("body")
+        if name not in absent and not name.startswith("body")
     }
     again = read_run(tmp_path, *HISTORY_ARRAYS).history
     assert all(np.array_equal(again[name], array) for name, array in done.history.items())

@@ -44,7 +44,8 @@ def change(group, name):
     elif known.type == "STRING":
         other = f"{value}, 1"
     else:
-        other = value + 1 if value + 1 <= known.hard_max else value / 2 if value else known.hard_min
+        middle = 0.5 * (known.hard_min + known.hard_max)
+        other = value + 1 if value + 1 <= known.hard_max else 0.5 * value or middle
     setattr(group, name, other)
     assert getattr(group, name) != value, name
 
