@@ -7,14 +7,17 @@ import numpy as np
 import pytest
 from digiclay.core.base.errors import DigiclayError
 from digiclay.core.base.modes import Mode
+from digiclay.core.control.methods import METHODS
+from digiclay.core.control.orders import share
 from digiclay.core.engine.simulation import begin, periods
 from digiclay.core.model.control_interface import Commands
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.toml_table import format_scene, resolve
 from digiclay.core.session import snapshot
+from digiclay.core.session.live_session import simulate_path
 from digiclay.core.session.run_scene import run
 
-from tests.assemble import AWAY, over_middle, record, refused_in_a_line, replace, table
+from tests.assemble import AWAY, assert_near, over_middle, record, refused_in_a_line, replace, table
 
 PERIOD = 5e-3
 MOTOR = {"valve": {"law": "motor", "hold": "braked", "free_speed": 0.2}, "conduit": "absent"}
@@ -116,6 +119,13 @@ def test_pins_follow_a_shape_after_the_method_has_commanded_them_and_a_state_kee
     assert "sections" not in format_scene(scene)
 
 
+def test_a_gain_at_which_pins_would_swing_is_refused():
+    # K_s v0 T_c = 1 brings a pin without load to its height within a period.
+    assert assemble(servo(servo_gain=1000.0)).drive.parameters.servo_gain == 1000.0
+    with refused_in_a_line(DigiclayError, "drive.servo_gain must be at most 1e.03 1/m at this con"):
+        assemble(servo(servo_gain=1010.0))
+
+
 @table(
     "drive, said",
     {
@@ -155,3 +165,69 @@ def test_a_pin_waits_for_its_frame():
     height = record(system, AWAY, 200).height[:, 12]
     assert height[100] == 40e-3
     assert height[-1] == pytest.approx(41e-3, abs=5e-6)
+
+
+class Late(Once):
+    """Controller that asks for a height from the middle of a frame on."""
+
+    def locate(self, memory, touched):
+        return memory + 1, (0.0, 0.0, 1.0) if memory >= 150 else None
+
+
+def test_a_formed_pin_that_a_method_reaches_within_a_frame_holds_until_its_end():
+    scene = servo(frame=0.5)
+    formed = begin(assemble(scene))
+    formed.rows[0] = formed.rows[formed.active.rows.target] = 45e-3
+    system = replace(assemble(scene), controller=Late(0.0))
+    start = snapshot.transfer_heights(system, snapshot.dump(assemble(scene), formed))
+    *_, state = periods(system, scene.trajectories(), start, 190)
+    assert np.array_equal(state.row(0), formed.row(0))
+    *_, state = periods(system, scene.trajectories(), state, 60)
+    assert_near(state.row(0), 41e-3, 5e-6)
+
+
+@pytest.mark.parametrize("hold", ["braked", "back_drivable"])
+def test_a_locked_pin_stays_whatever_its_servo_followed(hold):
+    drive = {"frame": 0.2, "height_step": 2e-3}
+    scene = servo(**drive).with_sections(
+        valve=replace(servo().section("valve"), hold=hold), delay=None
+    )
+    system = replace(assemble(scene), controller=Wave(20e-3))
+    *_, state = periods(system, scene.trajectories(), begin(system), 43)
+    poses = np.tile([0.0, 0.0, 0.5, 1.0, 0.0, 0.0, 0.0], (101, 1, 1))
+    *_, state = simulate_path(system, state, poses[:2], share(np.ones(25)))
+    *_, state = simulate_path(system, state, poses[:5])  # its motor stops
+    there = state.row(0).copy()
+    *_, state = simulate_path(system, state, poses)
+    assert 42.2e-3 < there[0] < 43.8e-3  # no multiple of the step, and its servo followed 44 mm
+    assert_near(state.row(0), there, 1e-7)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_servo_follows_methods_that_command_heights_and_others_are_refused(method):
+    damping = (
+        {"damping": 50.0} if method in ("elastic", "plastic", "viscous", "force_display") else {}
+    )
+    tables = {
+        **MOTOR,
+        "layout": {"rows": 15, "columns": 15},
+        "control": {"method": method, **damping},
+    }
+    path = over_middle((0, 44e-3), (0.5, 38e-3), (1.0, 38e-3))
+    tables |= {
+        "trajectory": {"waypoints": path},
+        "valve": {**MOTOR["valve"], "free_speed": 50e-3},
+    }
+    if METHODS[method].by_speed:
+        with refused_in_a_line(
+            DigiclayError, f"drive.kind must be matrix: control.method = {method}"
+        ):
+            resolve({**tables, "drive": {"kind": "servo"}})
+        return
+    plain, driven = (
+        run(resolve({**tables, **drive})).history["height"][-1]
+        for drive in ({}, {"drive": {"kind": "servo", "servo_gain": 1500.0}})
+    )
+    # Of a method whose heights are not those wanted, pins would not move.
+    assert np.ptp(plain) > 0.4e-3
+    assert np.ptp(driven) == pytest.approx(np.ptp(plain), rel=0.3)

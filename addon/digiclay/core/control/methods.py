@@ -62,6 +62,8 @@ class Method:
     """Whether its cells return to rest."""
     by_set: bool = False
     """Whether its orders for a cell depend on the active set; see `System.by_set`."""
+    by_speed: bool = False
+    """Whether it commands speeds of pins, and no heights that servos could follow."""
     batched: bool = True
     """Whether a batch of its runs is faster than single runs."""
     digest: str = ""
@@ -89,12 +91,13 @@ METHODS: dict[str, Method] = {
         "control.cell_states",
         "CellStates",
         {"radius": 12e-3, "edge_radius": 15.5e-3, "flat_radius": 3e-3},
+        by_speed=True,
     ),
-    "elastic": Method("control.behaviors", "Elastic", recovers=True),
-    "plastic": Method("control.behaviors", "Plastic"),
+    "elastic": Method("control.behaviors", "Elastic", recovers=True, by_speed=True),
+    "plastic": Method("control.behaviors", "Plastic", by_speed=True),
     "viscous": Method("control.behaviors", "Viscous", recovers=True, by_set=True),
-    "push_pull": Method("control.push_pull", "PushPull", by_set=True),
-    "force_display": Method("control.displays", "ForceDisplay", recovers=True),
+    "push_pull": Method("control.push_pull", "PushPull", by_set=True, by_speed=True),
+    "force_display": Method("control.displays", "ForceDisplay", recovers=True, by_speed=True),
     "shape_display": Method("control.displays", "ShapeDisplay"),
     "hybrid": Method("control.hybrid", "Hybrid", {}, batched=False),
 }

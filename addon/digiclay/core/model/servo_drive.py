@@ -8,7 +8,9 @@ from typing import NamedTuple
 import numpy as np
 
 from ..base.arrays import Cells, Flags, Floats
+from ..base.modes import LOCKED
 from .control_interface import Commands, Measurement
+from .layout import Layout
 from .matrix_drive import MatrixDrive
 
 
@@ -19,7 +21,7 @@ class FrameState(NamedTuple):
     last: Cells
     waiting: Cells
     held: Floats
-    """(n,): Heights that the servos follow, m."""
+    """(n,): Heights that the servos follow, m; NaN before the first one of a pin."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,31 +34,38 @@ class ServoDrive:
     start: FrameState
 
     def begin(self) -> FrameState:
-        """Return the state before a session: all pins hold the rest height."""
+        """Return the state before a session: no pin has a height to follow."""
         return self.start
 
     def serve(
         self, state: FrameState, period: int, seen: Measurement, orders: Commands
     ) -> tuple[FrameState, Commands]:
-        """Return the state, and ``K = K_s (H_held - H)``, limited to [-1, 1], 0 in the dead zone."""
-        known, held = self.parameters, state.held
-        wanted = orders.target
+        """Return the state, and ``K = K_s (H_held - H)``, limited to [-1, 1], 0 in the dead zone.
+
+        A pin whose first height comes within a frame holds until its end. Locked pins have no servo.
+        """
+        known, wanted, locked = self.parameters, orders.target, orders.mode == LOCKED
         if known.height_step:
-            wanted = np.round(wanted / known.height_step) * known.height_step
+            steps = np.round(wanted / known.height_step) * known.height_step
+            wanted = np.where(locked, wanted, steps)
+        followed, held = state.held[seen.cells], state.held.copy()
+        followed = np.where(np.isnan(followed), seen.target, followed)
         if period % self.frame == 0:
-            held = held.copy()
-            held[seen.cells] = wanted
-        followed = held[seen.cells]
+            followed = wanted
+        followed = np.where(locked, wanted, followed)
+        held[seen.cells] = followed
         error = followed - seen.height
         command = np.clip(known.servo_gain * error, -1.0, 1.0)
         command[np.abs(error) <= known.dead_zone] = 0.0
+        command = np.where(locked, orders.command, command)
         waiting = seen.cells[(command != 0.0) | (wanted != followed)]
         state = state._replace(held=held, waiting=waiting)
         return state, orders._replace(command=command)
 
 
-def make_servos(drive: MatrixDrive, lines: int, heights: Floats, period: float) -> ServoDrive:
-    """Put the drive of a bed together; heights (n,) at rest, m; control period, s."""
+def make_servos(drive: MatrixDrive, layout: Layout, period: float) -> ServoDrive:
+    """Put the drive of a bed together; control period, s."""
+    lines, cells = drive.count_lines(layout), layout.rows * layout.columns
     served, last, none = np.ones(lines, np.bool_), np.zeros(lines, np.intp), np.empty(0, np.intp)
-    start = FrameState(served, last, none, heights)
+    start = FrameState(served, last, none, np.full(cells, np.nan))
     return ServoDrive(drive, max(1, round(drive.frame / period)), start)

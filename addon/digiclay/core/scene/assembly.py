@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
 
-from ..base.arrays import Floats
+from ..base.arrays import TIE, Floats
 from ..base.errors import ParameterError
 from ..control.methods import find_method
 from ..engine.active_set import Selection
@@ -96,7 +96,7 @@ def assemble(scene: Scene) -> System:
         cell=cell,
         sensors=sensors,
         controller=controller,
-        drive=_make_drive(scene),
+        drive=_make_drive(scene, fastest),
         stepper=motion.stepper,
         period=period,
         plan=motion.plan,
@@ -337,16 +337,21 @@ def _make_sensors(scene: Scene, cell: Cell, line: Queue) -> Sensors:
     return sensors
 
 
-def _make_drive(scene: Scene) -> Drive:
-    """Return the valves between the controller and the cells."""
+def _make_drive(scene: Scene, fastest: float) -> Drive:
+    """Return the valves between the controller and the cells; `fastest`: rise without load, m/s."""
     if scene.drive is None:
         return DirectDrive()
     period = scene.simulation.control_period
     if scene.drive.kind == "servo":
         from ..model.servo_drive import make_servos
 
-        heights = np.full(scene.cells, scene.actuator.rest_height)
-        return make_servos(scene.drive, scene.drive.count_lines(scene.layout), heights, period)
+        # A pin without load loses K_s v0 T_c of its error in a control period; see `check_damping`.
+        gain = scene.drive.servo_gain
+        if gain * fastest * period > 1.0 + TIE:
+            most = 1.0 / (fastest * period)
+            rule = f"must be at most {most:.3g} 1/m at this control period, or pins would swing"
+            raise ParameterError("drive", "servo_gain", rule, f"{gain:g} 1/m")
+        return make_servos(scene.drive, scene.layout, period)
     from ..model.matrix_drive import make_addressing
 
     floor = scene.sensors.force_floor if scene.sensors else 0.0

@@ -258,6 +258,11 @@ class Scene(Described):
             self.drive.check_device(plan, self.simulation.control_period, dead_time)
             if self.drive.line_lag:
                 self._refuse_beside_gates()
+            if self.drive.kind == "servo" and self.control and find_method(self.method).by_speed:
+                rule = (
+                    f"must be matrix: control.method = {self.method} commands no heights to servos"
+                )
+                raise ParameterError("drive", "kind", rule, "servo")
 
     def _refuse_beside_bodies(self) -> None:
         """Refuse what cannot be where bodies press."""
