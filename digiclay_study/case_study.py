@@ -111,11 +111,15 @@ def _read(path: Path, table: Table, given: Sequence[Setting]) -> Study:
     cases, limits = parts["cases"], parts["limits"]
     refuse_unknown("limits", limits, tuple(MEASURED))
     for key in limits:
-        if not 0.0 < _require(limits, key, (int, float), "a number") < math.inf:
+        if not 0.0 < _require(limits, key, (int, float), "a number", "limits") < math.inf:
             rule = "must be a finite number above 0"
             raise ParameterError("limits", key, rule, show_value(limits[key]))
     if not limits:
         raise ParameterError("limits", "", "must have a metric", "nothing")
+    compared = [key for key in limits if key not in OUTCOMES]
+    if compared and not parts["reference"]:
+        rule = f"must have settings: limits.{compared[0]} compares with it"
+        raise ParameterError("reference", "", rule, "none")
     axes = [make_axis(key, values) for key, values in list_changes(parts["vary"])]
     keys = [axis.key for axis in axes]
     variants = parts["compare"] or {"least": {}}
@@ -129,8 +133,13 @@ def _read(path: Path, table: Table, given: Sequence[Setting]) -> Study:
     points, amounts = list[Point](), list[float]()
     for words in rows:
         variant, case = (
-            _write_words(_require(table, key, dict, "a table such as { stroke.direction = 30 }"))
-            for table, key in ((variants, words[0]), (cases, words[-1]))
+            _write_words(
+                _require(table, key, dict, "a table such as { stroke.direction = 30 }", owner)
+            )
+            for owner, table, key in (
+                ("compare", variants, words[0]),
+                ("cases", cases, words[-1]),
+            )
         )
         refuse_twice([*keys, *variant, *case], given)
         changes = settings | variant | dict(zip(keys, words[1:], strict=False)) | case
@@ -147,13 +156,12 @@ def _write_words(changes: Table) -> dict[str, str]:
     return {key: write_word(value) for key, value in list_changes(changes)}
 
 
-def _require(table: Table, key: str, kind: Any, wanted: str) -> Any:
-    """Return the value of a key, of a kind."""
+def _require(table: Table, key: str, kind: Any, wanted: str, owner: str = "") -> Any:
+    """Return the value of a key of a section, `owner`, of a kind."""
     value = table.get(key)
     if not isinstance(value, kind) or isinstance(value, bool) or value != value:
-        raise ParameterError(
-            key, "", f"must be {wanted}", "none" if value is None else show_value(value)
-        )
+        found = "none" if value is None else show_value(value)
+        raise ParameterError(owner or key, key if owner else "", f"must be {wanted}", found)
     return value
 
 

@@ -112,7 +112,9 @@ def test_a_study_that_was_stopped_goes_on_to_the_same_table_and_another_referenc
     assert main(COMMAND) == 0
     assert main([*COMMAND[:-2], "again", "--quiet"]) == 0
     assert read_text(Path("out/runs.csv")) == read_text(Path("again/runs.csv"))
-    place(STUDY.replace('[reference]\nvalve.stroke = "45 um"', ""))
+    place(
+        STUDY.replace('[reference]\nvalve.stroke = "45 um"', '[reference]\nvalve.stroke = "30 um"')
+    )
     refused(COMMAND, "out holds another study")
 
 
@@ -175,9 +177,9 @@ def test_a_deviation_is_relative_to_the_relief_of_the_reference_and_a_flat_one_h
         ('"valve.stroke"', '"valve.law"', "study.toml: minimize must be valves or a parameter"),
         ("[cases]", "[case]", "A study needs at least two --vary, or a STUDY file with [cases]."),
         ("along = {}", "[ratio]", "study.toml: ratio must be a known key"),
-        ("[cases]", "[compare]\nall = 3\n[cases]", "study.toml: all must be a table such as"),
+        ("[cases]", "[compare]\nall = 3\n[cases]", "study.toml: compare.all must be a table such as"),
         ("[cases]", "[compare.all]\nvalve.stroke = 1e-5\n[cases]", "valve.stroke must be given once"),
-        ("along = {}", "along = 3", "study.toml: along must be a table such as"),
+        ("along = {}", "along = 3", "study.toml: cases.along must be a table such as"),
         ('["15 um", "45 um"]', '"15 um"', "study.toml: valve.stroke must be varied over a list"),
         ('"15 um", "45 um"', '"15 um", "15 um"', "valve.stroke must not have a value twice"),
         ('"15 um", "45 um"', '"0 um"', "valve.stroke must be above 0"),
@@ -188,8 +190,9 @@ def test_a_deviation_is_relative_to_the_relief_of_the_reference_and_a_flat_one_h
         ('speed = "20 mm/s"', "speed = 0", "study.toml: stroke.speed must be above 0 m/s"),
         ("relief_deviation", "relief_deviatoin", "study.toml: limits.relief_deviatoin must be a"),
         ("= 1.5", "= 0", "limits.rfd_ratio must be a finite number above 0 (got 0)."),
+        ('valve.stroke = "45 um"\n\n[l', "[l", "reference must have settings: limits.rfd_ratio compares"),
         ("= 1.5", "= inf", "limits.rfd_ratio must be a finite number above 0 (got inf)."),
-        ("= 1.5", '= "1"', "study.toml: rfd_ratio must be a number (got '1')."),
+        ("= 1.5", '= "1"', "study.toml: limits.rfd_ratio must be a number (got '1')."),
         ("rfd_ratio = 1.5\nrelief_deviation = 0.05", "", "limits must have a metric (got nothing)."),
         ('["15 um", "45 um"]', "[]", "valve.stroke must be varied over at least one value"),
     ],

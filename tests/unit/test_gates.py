@@ -12,6 +12,7 @@ from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.toml_table import resolve
 from digiclay.core.session import snapshot
 from digiclay.core.session.run_scene import run
+from digiclay.core.studies.omissions import find_omissions
 from scipy.integrate import quad, solve_ivp
 
 from tests.assemble import (
@@ -223,6 +224,8 @@ def test_a_history_has_the_creep_of_idle_cells_and_says_why_it_has_no_error():
     assert fall[-1].min() > 0.0
     assert fall[-1] == pytest.approx(2.0 * fall[100], rel=0.1)
     assert "lines' gates" in done.estimate_errors().summary()
+    with refused_in_a_line(DigiclayError, "run.budget must be left out .* lines' gates"):
+        find_omissions(done.scene, 20e-6)
 
 
 @table(

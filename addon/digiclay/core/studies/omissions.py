@@ -21,7 +21,7 @@ from ..engine.system import System
 from ..scene.assembly import assemble
 from ..scene.recorder import Recorder
 from ..scene.schema import Scene
-from ..session.accuracy import estimate_errors
+from ..session.accuracy import estimate_errors, explain_absence
 from ..session.run_scene import run
 
 #: Parts that can be omitted, and their descriptions.
@@ -114,6 +114,9 @@ def find_omissions(
     """Return a scene with all omissions that fit within a budget of height error, m."""
     if not (math.isfinite(budget) and budget > 0.0):
         raise ParameterError("run", "budget", "must be above 0 m", f"{budget:g} m")
+    if absent := explain_absence(replace(scene, recorder=Recorder())):
+        rule = f"must be left out where errors cannot be estimated: {absent}"
+        raise ParameterError("run", "budget", rule, f"{budget * 1e6:g} µm")
     show("the full scene")
     error = _estimate_error(scene)
     if error > budget:
