@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -233,6 +234,14 @@ def test_a_history_has_the_creep_of_idle_cells_and_says_why_it_has_no_error():
     {
         "a leak without gates": ({"drive": {"leak": 1e-3}}, "drive.leak must be 0 without gates"),
         "an overlap without gates": ({"drive": {"overlap": 1e-3}}, "drive.overlap must be 0"),
+        "a volume without gates": (
+            {"drive": {"trapped_volume": "1 mm3"}},
+            "drive.trapped_volume must be 0 without gates of lines",
+        ),
+        "a volume that leaks": (
+            {"drive": {"line_lag": 1e-3, "leak": 1e-3, "trapped_volume": 1e-9}},
+            "drive.trapped_volume must be 0 with drive.leak",
+        ),
         "a leak of all": ({"drive": {"line_lag": 1e-3, "leak": 1.0}}, "leak must be below 1"),
         "a lag below 0": ({"drive": {"line_lag": -1.0}}, "line_lag must be at least 0 s"),
         "no number": ({"drive": {"line_lag": math.nan}}, "line_lag must be a finite number"),
@@ -264,3 +273,107 @@ def test_two_gates_without_a_line_s_are_the_bed_as_it_was():
     parts = (replace(bed().drive, line_lag=0.0), bed().drive)
     kinds = [type(assemble(bed().with_sections(drive=part)).cell.lag) for part in parts]
     assert kinds[0] is ValveLag is not kinds[1]
+
+
+@table(
+    "modulus, command, gates",
+    {
+        "oil": (1e9, 1.0, {}),
+        "oil with 1 % air": (1e7, 1.0, {}),
+        "air": (1e5, 1.0, {}),
+        "downwards, flow as the square of the lift": (1e7, -1.0, {"power": 2}),
+    },
+)
+def test_a_trapped_volume_moves_a_pin_by_a_packet_per_turn_of_its_gates(modulus, command, gates):
+    cycles, volume = 4, 1e-9
+    # The line of a cell opens 3 ms after its column has shut, which it waits for.
+    scene = bed(0.2e-3, overlap=3e-3, trapped_volume=volume, bulk_modulus=modulus, **gates)
+    moved, _ = rise(scene, cycles * CYCLE + SLOT, command)
+    packet = command * volume * 0.5e5 / (modulus * scene.actuator.area)
+    assert moved[3, 2] == pytest.approx(cycles * packet, rel=0.02)
+    assert np.abs(moved[:, [0, 1, 3, 4]]).max() == 0.0
+
+
+@table(
+    "line, modulus, top, gates",
+    {
+        "its own line: both together": (2, 1e7, 0.5, {}),
+        "its line after the column": (1, 1e6, 0.5, {"overlap": 3e-3}),
+        "as the column shuts": (1, 1e6, 0.5, {}),
+        "as the column opens": (3, 1e6, 0.5, {}),
+        "slow gates": (1, 1e7, 0.5, {"lag": 2e-3}),
+        "air": (3, 1e5, 0.5, {}),
+        "pressed, after the column": (1, 1e7, 39.5e-3, {"overlap": 3e-3}),
+        "pressed, as the column opens": (3, 1e7, 39.5e-3, {}),
+    },
+)
+def test_a_pin_over_a_trapped_volume_moves_as_scipy_says(line, modulus, top, gates):
+    lag, cycles = gates.get("lag", 0.2e-3), 2
+    scene = bed(**{"lag": lag, **gates}, trapped_volume=1e-9, bulk_modulus=modulus)
+    still = resolve({"trajectory": {"waypoints": over_middle((0.0, top), (1.0, top))}})
+    scene = scene.with_sections(trajectory=still.section("trajectory"), relaxation=None)
+    system = assemble(scene)
+    place = system.grid.x[5 * line + 2], system.grid.y[5 * line + 2]
+    script = scripted(lambda t, x, y: 1.0 * (np.hypot(x - place[0], y - place[1]) < 1e-4))
+    system = replace(system, controller=script(PERIOD))
+    run = record(system, scene.trajectories()[0], cycles * CYCLE)
+    area, contact = system.cell.actuator.area, scene.fingers[0].contact
+    gate = 2.0 * system.fastest * area / 0.5e5  # m3/s/Pa of an open one
+    late = 1e-3 + np.array([gates.get("overlap", 0.0), 0.0])
+
+    def load(height):
+        return contact.share * 0.125 * math.expm1(2000.0 * max(height - top, 0.0)) / area
+
+    def rate(t, y, command):
+        given, taken = gate * y[1:3] * (y[3] - load(y[0]), 0.5e5 - y[3])
+        return [given / area, *(command - y[1:3]) / lag, (taken - given) * modulus / 1e-9]
+
+    y = np.array([40e-3, 0.0, 0.0, load(40e-3)])
+    edges = np.unique(
+        [
+            0.0,
+            cycles * CYCLE * PERIOD,
+            *np.add.outer(late, np.arange(5 * cycles) * SLOT * PERIOD).ravel(),
+        ]
+    )
+    for start, end in pairwise(edges):
+        slots = np.floor((0.5 * (start + end) - late) / (SLOT * PERIOD)) % 5
+        wanted = (slots == (2, line)) * (0.5 * (start + end) > late)
+        done = solve_ivp(rate, (start, end), y, "Radau", args=(wanted,), rtol=1e-8, atol=1e-10)
+        y = done.y[:, -1]
+    assert run.height[-1, 12] - 40e-3 == pytest.approx(y[0] - 40e-3, rel=0.02)
+
+
+#: Control periods for which a pin is asked for, longer than a set of active cells serves.
+TURN = 12
+
+
+class Alternating(Scripted):
+    """A script that asks for a pin in front on the left and one behind on the right, by way of the middle."""
+
+    def locate(self, memory, touched):
+        return memory, (*2 * [find_side(memory)], 1e-3)
+
+
+def find_side(period):
+    """Return where the pin of a period is, x = y, m."""
+    return (-9e-3, 0.0, 9e-3, 0.0)[period // TURN % 4]
+
+
+def test_an_idle_pin_gets_the_packets_of_a_line_and_a_column_that_open_at_other_times():
+    rounds, modulus = 3, 1e6
+    scene = bed(1e-6, policy="needed", cells=11, trapped_volume=1e-9, bulk_modulus=modulus)
+    system = assemble(scene)
+
+    def command(t, x, y):
+        side = find_side(round(t / PERIOD))
+        return (side != 0.0) * (np.hypot(x - side, y - side) < 1e-4)
+
+    system = replace(system, controller=Alternating(command, PERIOD))
+    run = record(system, AWAY, rounds * 4 * TURN)
+    packet = 1e-9 * 0.5e5 / (modulus * scene.actuator.area)
+    moved = (run.height[-1] - 40e-3).reshape(11, 11) / packet
+    assert run.last.active.cells.size < 20
+    # The line in front has no turn after the last of the column on the right.
+    assert moved[2, 8] == pytest.approx(rounds - 1, rel=0.02)
+    assert moved[8, 2] == pytest.approx(rounds, rel=0.02)

@@ -12,6 +12,7 @@ SHOWN: dict[str, tuple[str, int]] = {
     "m/s": ("mm/s", 3),
     "m/s2": ("m/s²", 0),
     "1/m": ("1/mm", -3),
+    "m3": ("mm³", 9),
     "m2/s": ("mm²/s", 6),
     "kg/m3": ("kg/m³", 0),
     "N s/m": ("N·s/m", 0),

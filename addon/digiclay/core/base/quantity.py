@@ -29,6 +29,7 @@ UNITS: dict[str, tuple[float, str]] = {
     "1/N": (1.0, "1/N"), "N s/m": (1.0, "N s/m"),
     "kg": (1.0, "kg"), "g": (1e-3, "kg"), "m/s": (1.0, "m/s"), "mm/s": (1e-3, "m/s"), "m/s2": (1.0, "m/s2"),
     "kg/m3": (1.0, "kg/m3"), "m2/s": (1.0, "m2/s"), "mm2/s": (1e-6, "m2/s"), "cSt": (1e-6, "m2/s"),
+    "m3": (1.0, "m3"), "mm3": (1e-9, "m3"),
 }  # fmt: skip
 
 #: Smallest, unless 0, and largest number of a unit: far beyond all devices, and close enough to 1
@@ -36,7 +37,7 @@ UNITS: dict[str, tuple[float, str]] = {
 EXTENTS: dict[str, tuple[float, float]] = {
     "m": (1e-12, 1e3), "s": (1e-9, 1e6), "Pa": (1e-6, 1e10), "N": (1e-12, 1e6), "N/m": (1e-6, 1e9),
     "1/m": (1e-6, 1e9), "1/N": (1e-6, 1e9), "m/s": (1e-12, 1e6), "m/s2": (1e-9, 1e9), "kg/m3": (1e-3, 1e6),
-    "m2/s": (1e-12, 1e3), "N s/m": (1e-9, 1e9), "kg": (1e-9, 1e6), "": (1e-9, 1e9),
+    "m2/s": (1e-12, 1e3), "N s/m": (1e-9, 1e9), "kg": (1e-9, 1e6), "m3": (1e-18, 1.0), "": (1e-9, 1e9),
 }  # fmt: skip
 #: Bounds of a parameter: the comparison that a valid value satisfies.
 BOUNDS = {

@@ -68,6 +68,8 @@ class GatedDrive:
     instants: int
     creep: float
     """Motion of an idle cell in a period while both gates are shut, m."""
+    lift: float
+    """Rise of an idle cell by the volume between its gates, V / (β A), m/Pa."""
 
     @property
     def gates(self) -> Gates:
@@ -76,15 +78,15 @@ class GatedDrive:
         return gates
 
     @property
+    def filled(self) -> slice[int, int, None]:
+        """Row of the volumes between gates, none without them."""
+        return slice(self.cell.lag_rows.start + 2, self.cell.lag_rows.stop)
+
+    @property
     def columns(self) -> int:
         """Number m of cells in a line."""
         layout = self.lines.layout
         return layout.rows * layout.columns // self.lines.lines
-
-    @property
-    def middle(self) -> float:
-        """Height at which the cells of lines and columns begin, m."""
-        return 0.5 * self.cell.actuator.stroke
 
     @cached_property
     def workspace(self) -> tuple[Floats, Movement]:
@@ -96,8 +98,13 @@ class GatedDrive:
     def begin(self) -> GatedAddressing:
         """Return the state before a session: all gates are shut."""
         cells = np.zeros_like(self.workspace[0])
-        cells[0] = self.middle
+        self.restart(cells)
         return GatedAddressing(*self.lines.begin(), cells, 0)
+
+    def restart(self, cells: Floats) -> None:
+        """Put the cells of lines and columns at half the stroke, those of lines with full volumes."""
+        cells[0] = 0.5 * self.cell.actuator.stroke
+        cells[self.filled] = np.arange(cells.shape[1]) < self.lines.lines
 
     def find_gates(self, cells: Cells) -> tuple[Cells, Cells]:
         """Return the numbers of the lines and of the columns of cells in `GatedAddressing.cells`."""
@@ -124,14 +131,21 @@ class GatedDrive:
         move(np.empty((self.instants, 0)))
         return GatedAddressing(*addressing, block.copy(), state.aged), commands
 
-    def age(self, height: Floats, state: GatedAddressing, period: int) -> GatedAddressing:
-        """Move idle cells, of heights (n,), m, in place, up to a control period."""
+    def age(self, rows: Floats, state: GatedAddressing, period: int) -> GatedAddressing:
+        """Move idle cells, of rows (r, n), in place, up to a control period."""
+        height, filled = rows[0], rows[self.filled]
         line, column = self.find_gates(np.arange(height.size))
         own = state.cells[0] - state.cells[0, -1]
         height += own[line] + own[column] + (period - state.aged) * self.creep
+        left, new = (state.cells[self.filled, gates] for gates in (line, column))
+        supply = self.cell.supply
+        excess = np.abs(filled) * supply.pressure(filled) - supply.high
+        height += self.lift * (excess * (1.0 - left)).sum(axis=0)
+        # One of the gates of an idle cell has stayed shut.
+        filled[:] = filled * left * (1.0 - np.abs(new)) + new
         np.clip(height, 0.0, self.cell.actuator.stroke, out=height)
         cells = state.cells.copy()
-        cells[0] = self.middle
+        self.restart(cells)
         return state._replace(cells=cells, aged=period)
 
 
@@ -149,9 +163,8 @@ class GatedSelection(Selection):
     ) -> State:
         """Return a state, in the same arrays, with another set, and idle cells as of now."""
         addressing: Any = state.addressing
-        height = state.rows[0]
-        addressing = self.drive.age(height, addressing, state.period)
-        peak = max(state.peak, float(height.max()))
+        addressing = self.drive.age(state.rows, addressing, state.period)
+        peak = max(state.peak, float(state.rows[0].max()))
         return super().renew(state._replace(addressing=addressing, peak=peak), active, window, disc)
 
     @cached_property

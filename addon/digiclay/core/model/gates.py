@@ -2,7 +2,8 @@
 
 Their drops add: of conductances a and b, as shares of an open gate, the pair has ``2 a b / (a + b)``
 of both open. A shut gate leaks the share ε. What leaks past a shut column gate comes from the low
-reservoir. Each gate has a first-order lag, so that both are known in closed form.
+reservoir. Each gate has a first-order lag, so that both are known in closed form. A full
+volume V between them gives as much to the cell as both, open, for the time V / (β G) at any load.
 """
 
 from __future__ import annotations
@@ -36,13 +37,19 @@ class Gates:
     """Conductance of a shut gate as a share of an open one, ε."""
     power: int
     """Exponent of the opening in the laminar branch of the valve."""
+    packet: float
+    """Time V / (β G), s; 0 without a volume between the gates."""
 
-    rows = 2
+    @property
+    def rows(self) -> int:
+        """State rows per cell: both gates; how full the volume is, -1 (low pressure) to 1 (high)."""
+        return 3 if self.packet else 2
 
     def response(self, queue: Queue, times: Sequence[float]) -> Floats:
         """Return the map from the gates and their commands to the gates at times, line and column in turn."""
         length = max(self.queue.length, queue.length)
-        response = np.zeros((2 * len(times), 2 + 3 * length))
+        response = np.zeros((2 * len(times) + self.rows - 2, self.rows + 3 * length))
+        response[2 * len(times) :, 2 : self.rows] = 1.0
         gates = (
             (0, 0, self.line, self.queue),
             (1, 1, self.column, queue),
@@ -50,8 +57,9 @@ class Gates:
         )
         for gate, command, lag, own in gates:
             given = lag.response(own, times)
-            response[gate::2, gate] = given[:, 0]
-            response[gate::2, 2 + 3 * (length - own.length) + command :: 3] = given[:, 1:]
+            rows = slice(gate, 2 * len(times), 2)
+            response[rows, gate] = given[:, 0]
+            response[rows, self.rows + 3 * (length - own.length) + command :: 3] = given[:, 1:]
         return response
 
     def list_cuts(self, queue: Queue) -> tuple[float, ...]:
@@ -60,14 +68,24 @@ class Gates:
         cuts = {own.cut + n * lag.time_constant for own, lag in gates for n in LAGS}
         return tuple(sorted(cuts))
 
-    def join(self, raw: Floats, count: int) -> Floats:
-        """Return the openings of the equivalent valve at the first `count` times."""
-        line, column = raw[: 2 * count : 2], raw[1 : 2 * count : 2]
+    def join(self, raw: Floats, steps: Floats) -> Floats:
+        """Return the openings of the equivalent valve in steps, s; fills and empties the volume in `raw`."""
+        count = 2 * len(steps)
+        line, column = raw[:count:2], raw[1:count:2]
         line_gate = self.leak + (1.0 - self.leak) * np.abs(line) ** self.power
         column_gate = (1.0 - self.leak) * np.abs(column) ** self.power
         driven = _connect(line_gate, column_gate)
         leaked = _connect(line_gate, column_gate + self.leak) - driven
         lift = np.copysign(driven, column) - leaked
+        if self.packet:
+            both = line_gate + column_gate + TINY
+            source = np.copysign(column_gate / both, column)
+            change = -np.expm1(-2.0 / self.packet * steps[:, None] * both)
+            given = self.packet / steps[:, None] * line_gate / both
+            for i in range(len(steps)):
+                lost = change[i] * (raw[-1] - source[i])
+                raw[-1] -= lost
+                lift[i] += given[i] * lost
         return np.copysign(np.abs(lift) ** (1.0 / self.power), lift)
 
     def command(self, opening: Floats) -> Floats:

@@ -63,9 +63,9 @@ class Lag(Protocol):
         """Return when the valve changes to the next command in a period, s."""
         return (queue.cut,)
 
-    def join(self, raw: Floats, count: int) -> Floats:
-        """Return the openings at the first `count` times of `response` from its product with the rows."""
-        return raw[:count]
+    def join(self, raw: Floats, steps: Floats) -> Floats:
+        """Return the openings in steps, s, from the product of `response` with the rows."""
+        return raw[: len(steps)]
 
 
 class Pulp(Protocol):

@@ -42,6 +42,8 @@ KINDS = {
         "line_lag",
         "overlap",
         "leak",
+        "trapped_volume",
+        "bulk_modulus",
     ),
     "servo": ("frame", "dead_zone", "height_step", "servo_gain"),
 }
@@ -108,6 +110,18 @@ class MatrixDrive(Parameters):
         below=1.0,
     )
 
+    trapped_volume: float = quantity(
+        0.0,
+        "volume between the gates of a cell",
+        unit="m3",
+        symbol="V_t",
+        at_least=0.0,
+        later=True,
+    )
+    bulk_modulus: float = quantity(
+        1e9, "bulk modulus of the fluid in it", unit="Pa", symbol="β", above=0.0, later=True
+    )
+
     frame: float = quantity(
         0.0,
         "time for which servos hold commanded heights, whole control periods; 0: one of them",
@@ -137,7 +151,10 @@ class MatrixDrive(Parameters):
             if value != default:
                 rule = f"must be left out with drive.kind = {self.kind}"
                 raise ParameterError("drive", name, rule, str(value))
-        for name in ("overlap", "leak"):
+        if self.trapped_volume and self.leak:
+            rule = "must be 0 with drive.leak, which empties it"
+            raise ParameterError("drive", "trapped_volume", rule, f"{self.trapped_volume:g} m3")
+        for name in ("overlap", "leak", "trapped_volume"):
             value = getattr(self, name)
             if value and not self.line_lag:
                 rule = "must be 0 without gates of lines: give drive.line_lag"

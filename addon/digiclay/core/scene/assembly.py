@@ -131,16 +131,19 @@ def _add_gates(scene: Scene, motion: Motion, system: System) -> System:
     dead_time = (scene.delay.dead_time if scene.delay else 0.0) + drive.overlap
     queue = split_delay(Delay(dead_time), period)
     power = scene.valve.flow_law(scene.fluid, scene.actuator.area).power
-    gates: Any = Gates(ValveLag(drive.line_lag), lag, queue, drive.leak, power)
+    compliance = drive.trapped_volume / drive.bulk_modulus
+    packet = compliance / float(motion.cell.flow.laminar_conductance(1.0))
+    gates: Any = Gates(ValveLag(drive.line_lag), lag, queue, drive.leak, power, packet)
     cell = replace(motion.cell, lag=gates)
     plan = motion.stepper.plan(cell, motion.line, motion.steps)
     commands = 3 * max(queue.length, motion.line.length)
     rows = replace(system.rows, physics=cell.rows, queue=commands)
-    shut = gates.join(np.zeros((2, 1)), 1)[0]
+    shut = gates.join(np.zeros((2, 1)), np.ones(1))[0]
     flow = cell.flow.flow(shut, cell.supply.pressure(shut))
     creep = period * float(flow[0]) / cell.actuator.area
     lines: Any = system.drive
-    gated = GatedDrive(lines, cell, rows, motion.stepper, plan, system.instants.size, creep)
+    lift = compliance / cell.actuator.area
+    gated = GatedDrive(lines, cell, rows, motion.stepper, plan, system.instants.size, creep, lift)
     selection = GatedSelection(system.grid, rows, cell, period, system.fastest, gated)
     return replace(system, cell=cell, plan=plan, rows=rows, drive=gated, selection=selection)
 

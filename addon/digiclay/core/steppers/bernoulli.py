@@ -256,7 +256,7 @@ class StepWorkspace:
         self.pulp, self.lag = rows[cell.pulp_rows, :k], rows[cell.lag_rows]
         openings = np.zeros_like(rows, shape=(len(plan.response), *every))
         self.opening_after = openings[len(openings) - len(self.lag) :]
-        self.opening = cell.lag.join(openings, gauss)
+        self.opening = cell.lag.join(openings, plan.weights)
         self.gates = openings if cell.lag.rows > 1 else None
         self.open_valves = prepare_map(plan.response, rows[cell.lag_rows.start :], openings)
         # Conductances of the valves, the same with the signs of the openings, underside, and ones.
@@ -299,7 +299,7 @@ class StepWorkspace:
         """Move the block by one control period, in place; see `interfaces.Movement`."""
         self.open_valves()
         if self.gates is not None:
-            self.opening[:] = self.plan.cell.lag.join(self.gates, len(self.opening))
+            self.opening[:] = self.plan.cell.lag.join(self.gates, self.plan.weights)
         self.lag[:] = self.opening_after
         self._conduct()
         self.rise_freely()
