@@ -286,7 +286,7 @@ def test_two_gates_without_a_line_s_are_the_bed_as_it_was():
 )
 def test_a_trapped_volume_moves_a_pin_by_a_packet_per_turn_of_its_gates(modulus, command, gates):
     cycles, volume = 4, 1e-9
-    # The line of a cell opens 3 ms after its column has shut, which it waits for.
+    # The line of a cell opens 3 ms after the column has shut.
     scene = bed(0.2e-3, overlap=3e-3, trapped_volume=volume, bulk_modulus=modulus, **gates)
     moved, _ = rise(scene, cycles * CYCLE + SLOT, command)
     packet = command * volume * 0.5e5 / (modulus * scene.actuator.area)
