@@ -111,15 +111,10 @@ class MatrixDrive(Parameters):
     )
 
     trapped_volume: float = quantity(
-        0.0,
-        "volume between the gates of a cell",
-        unit="m3",
-        symbol="V_t",
-        at_least=0.0,
-        later=True,
+        0.0, "volume between the gates of a cell", unit="m3", symbol="V_t", at_least=0.0
     )
     bulk_modulus: float = quantity(
-        1e9, "bulk modulus of the fluid in it", unit="Pa", symbol="β", above=0.0, later=True
+        1e9, "bulk modulus of the fluid in it", unit="Pa", symbol="β", above=0.0
     )
 
     frame: float = quantity(
