@@ -296,6 +296,13 @@ def _write(out: Path, study: Study, records: dict[int, Record]) -> list[str]:
     write_whole(out / "runs.csv", format_csv([heads, *rows]).encode())
     figures = np.array(values, dtype=np.float64)
     groups = find_candidates(study, np.where(np.isnan(figures), np.inf, figures))
+    worst = [
+        [name, *each.words, each.amount, *each.figures]
+        for name, group in groups.items()
+        for each in group
+    ]
+    heads = [*study.keys[:-1], study.minimized, *study.limits]
+    write_whole(out / "worst.csv", format_csv([heads, *worst]).encode())
     limits = {MEASURED[name]: most for name, most in study.limits.items()}
     curves = {
         name: np.array([(each.amount, *each.figures) for each in sorted(group)])

@@ -53,7 +53,7 @@ A design of N x (parameters + 2) runs, with --second N x (2 parameters + 2). The
 finished run; with --uncertain bands.csv, 95 % bands of each point. After Ctrl-C the same command continues.
 
 Without --vary SCENE is a STUDY file, with [cases]: the least device that meets limits in all cases. The
-folder then holds study.md, limits.png and runs.csv.
+folder then holds study.md, limits.png, worst.csv and runs.csv.
 """
 METRICS = "rfd,lag,oscillation,relief"
 PICTURE = "indices.png"

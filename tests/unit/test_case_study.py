@@ -94,6 +94,10 @@ def test_the_values_of_a_study_are_those_of_its_runs_and_a_finished_folder_has_o
     assert float(found[1]["relief_deviation"]) == pytest.approx(off, rel=1e-9)
     ratio = math.sqrt(square(narrow, *across[1:]) / square(wide, *across[1:]))
     assert float(found[1]["rfd_ratio"]) == pytest.approx(ratio, rel=1e-9)
+    for name in ("rfd_ratio", "relief_deviation"):
+        cases = [float(row[name]) for row in found]
+        worst = [float(row[name]) for row in rows(Path("out/worst.csv"))]
+        assert worst == [max(cases[:2]), max(cases[2:])]
     before = {path: path.stat().st_mtime_ns for path in Path("out/points").iterdir()}
     place(STUDY.replace("= 1.5", "= 1e9").replace("= 0.05", "= 1e9"))
     assert main(COMMAND) == 0
