@@ -107,7 +107,7 @@ def _frame(axes: Any, shown: Floats, inside: Cells, trials: Cells) -> int:
     """Set the ends of the axes around front, unchanged scene and most trials; return how many are outside."""
     out = np.zeros(len(shown), dtype=bool)
     for column, name in ((0, "y"), (1, "x")):
-        values = shown[trials, column]
+        values = shown[trials if len(trials) else inside, column]
         most = np.quantile(values[np.isfinite(values)], SHOWN, method="higher")
         low, high = shown[inside, column].min(), max(shown[inside, column].max(), most)
         if low > 0.0 and high / low > WIDE:

@@ -6,6 +6,7 @@ import digiclay
 import numpy as np
 import pytest
 from digiclay import DigiclayError
+from digiclay.core.model.matrix_drive import MatrixDrive
 from digiclay.core.scene.toml_table import tabulate
 
 from tests.assemble import refused_in_a_line
@@ -59,6 +60,9 @@ def test_a_pin_moves_as_the_equations_of_valve_and_cylinder_say():
     # Of the fourth order in steps of a sixteenth of the time constant.
     np.testing.assert_allclose(height, wanted, atol=1e-9)
     assert digiclay.step_response(plain, 1.0, 10.0).height[-1] == plain.actuator.stroke
+    for drive in ({"sections": 4}, {"kind": "servo"}):  # the valve alone counts
+        driven = plain.with_sections(drive=MatrixDrive(**drive))
+        assert digiclay.step_response(driven, 1.0, 10.0).height[-1] == plain.actuator.stroke
     assert (
         digiclay.step_response(digiclay.scene("five_fingers_mound"), 0.0).height.tolist()
         == [0.04] * 21

@@ -117,6 +117,16 @@ def test_points_of_another_search_are_refused_and_without_any_contact_there_is_n
     refused([*TUNE, "--generations", "1"], "No run has both metrics without losing the fingertip")
 
 
+def test_where_every_trial_fails_the_scene_stays_as_it_is(here):
+    # A slot is a whole number of control periods.
+    write_text(here / "my.toml", SCENE + "[drive]\nsections = 1\n")
+    varied = command("--vary drive.slot=0.005:0.02 --vary control.force_gain=1:10")
+    options = command("--population 4 --generations 1 --workers 1 --out out --quiet")
+    assert main(["tune", "my.toml", *varied, *options]) == 0
+    assert load(here / "out" / "chosen.toml").drive == load(here / "my.toml").drive
+    assert (here / "out" / "front.png").exists()
+
+
 @pytest.mark.parametrize(
     "words, message",
     [
