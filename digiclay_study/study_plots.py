@@ -107,9 +107,11 @@ def _frame(axes: Any, shown: Floats, inside: Cells, trials: Cells) -> int:
     """Set the ends of the axes around front, unchanged scene and most trials; return how many are outside."""
     out = np.zeros(len(shown), dtype=bool)
     for column, name in ((0, "y"), (1, "x")):
-        values = shown[trials if len(trials) else inside, column]
-        most = np.quantile(values[np.isfinite(values)], SHOWN, method="higher")
-        low, high = shown[inside, column].min(), max(shown[inside, column].max(), most)
+        low, high = shown[inside, column].min(), shown[inside, column].max()
+        values = shown[trials, column]
+        if np.isfinite(values).any():
+            most = np.quantile(values[np.isfinite(values)], SHOWN, method="higher")
+            high = max(high, most)
         if low > 0.0 and high / low > WIDE:
             axes.set(**{f"{name}scale": "log"})
             ends = low / 1.3, high * 1.3
