@@ -32,6 +32,8 @@ AXES = "digiclay_axes"
 #: Attributes of a bed's mesh, one value per pin: type in Blender, name of its value, type of the
 #: array.
 ATTRIBUTES = {"mode": ("INT", "value", np.int32), "force": ("FLOAT", "value", np.float32)}
+#: The same, with what a mesh has from the first pin on that waits for its drive.
+WRITTEN = ATTRIBUTES | {"waiting": ("BOOLEAN", "value", np.bool_)}
 
 
 def mesh(name: str, shape: tuple[Floats, list[tuple[int, ...]]], smooth_below: float = 0.6) -> Mesh:
@@ -75,12 +77,16 @@ def _require_cells(bed: Mesh, pins: int | None = None) -> None:
 
 
 def write_cells(bed: Mesh, position: Floats, height: Floats, **values: Array) -> None:
-    """Write pins into a mesh: axes (n, 2), m, tops (n,), m, and of `mode` and `force` (n,) what changed."""
+    """Write pins into a mesh: axes (n, 2), m, tops (n,), m, and of `WRITTEN` (n,) what changed."""
     _require_cells(bed, len(height))
     placed = np.column_stack([position, height]) * SCALE
     bed.vertices.foreach_set("co", np.ascontiguousarray(placed, np.float32).ravel())
     for name, array in values.items():
-        _, value, kind = ATTRIBUTES[name]
+        stored, value, kind = WRITTEN[name]
+        if name not in bed.attributes:
+            if not array.any():
+                continue
+            bed.attributes.new(name, stored, "POINT")
         # Looked up afresh each time: undo and new attributes invalidate what was kept.
         bed.attributes[name].data.foreach_set(value, np.ascontiguousarray(array, kind))
     bed.update()  # 4.2 shows stale data without

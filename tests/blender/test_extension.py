@@ -16,7 +16,7 @@ import pytest
 from digiclay import bridge, command_line, preferences
 from digiclay.bridge import linear
 from digiclay.core.base.errors import OutputError
-from digiclay.core.base.modes import Mode
+from digiclay.core.base.modes import WAITING, Mode
 from digiclay.device import palettes
 from digiclay.device.instant import Instant
 from digiclay.roles import ROLE
@@ -172,7 +172,7 @@ def mode_color(mode):
 #: 2.3 is just noticeable side by side, 10 is told apart at a glance.
 SETS = {
     **{
-        name: (tuple(palette.values()), len(Mode), 10.0)
+        name: ((*palette.values(), WAITING), len(Mode) + 1, 10.0)
         for name, palette in palettes.PALETTES.items()
     },
     "fingertips": (palettes.FINGERS, 10, 15.5),

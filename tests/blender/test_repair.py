@@ -39,6 +39,7 @@ def still(bed):
     """Return a bake of two frames in which nothing moves."""
     cells = bridge.read_cells(bed.data)
     twice = {name: np.array([cells[name]] * 2) for name in ("height", "mode", "force")}
+    twice["waiting"] = np.zeros_like(twice["mode"], bool)
     return bake.BakedFrames(
         cells["position"], **twice, pose=np.array([bridge.pose(fingertip_of(bed))] * 2)
     )
@@ -353,7 +354,7 @@ def test_a_bed_appended_from_an_older_file_is_made_whole_and_its_helpers_put_awa
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "older.blend"))
     reset_to_empty()
     bpy.ops.wm.append(directory=str(tmp_path / "older.blend" / "Object") + "/", filename=name)
-    assert len(bpy.context.scene.objects) == 1 + 27
+    assert len(bpy.context.scene.objects) == 1 + 28
     done("Append")
     assert (whole(*beds()), housings()) == (True, 1)
     undone()

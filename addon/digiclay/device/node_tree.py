@@ -181,7 +181,9 @@ def bed_nodes(sources: Sources, deck: float, length: float, unit: float) -> Node
     parts = {"Collection": sources.collection, "Separate Children": True}
     choice = node(tree, "GeometryNodeCollectionInfo", parts, name=SOURCES)
     level = _level_of_force(tree, settings.outputs[TOP_FORCE], len(Mode))
-    mode = attribute(tree, "mode", "INT")
+    waiting = attribute(tree, "waiting", "BOOLEAN")
+    last = len(Mode) + len(heat.COLORS) + 1
+    mode = switch(tree, "INT", waiting, attribute(tree, "mode", "INT"), last)
     look = switch(tree, "INT", settings.outputs[COLOR_BY_FORCE], mode, level)
     instances = node(
         tree,

@@ -9,7 +9,7 @@ from .. import bridge, roles
 from ..bridge import SCALE
 from ..compat import ID, Collection, Material, Mesh, Object, bpy, shader_nodes
 from ..core.base.errors import DigiclayError
-from ..core.base.modes import COLORS, Mode
+from ..core.base.modes import COLORS, WAITING, Mode
 from ..ui_text import localize
 from . import heat, primitives
 from .instant import Instant
@@ -91,8 +91,8 @@ class SkinMeshes(NamedTuple):
 class Sources(NamedTuple):
     """Objects drawn by a bed's geometry nodes, in a collection outside all Blender scenes."""
 
-    #: First one pin per mode, then one per level of force, in the order of their codes; then the
-    #: others.
+    #: First one pin per mode, then one per level of force, in the order of their codes; then
+    #: one that waits; then the others.
     collection: Collection
     #: An arrow of length 1 that points down and ends at the origin.
     arrow: Object
@@ -113,6 +113,7 @@ def make_sources(instant: Instant, length: float, deck: float, rim: float) -> So
     looks += [
         (f"force_{level:02d}", color) for level, color in enumerate((heat.NO_FORCE, *heat.COLORS))
     ]
+    looks.append(("waiting", WAITING))
     collection = bpy.data.collections.new("Digital Clay Parts")
     # The node that reads the collection sorts it by name: hence the number in front.
     for code, (look, color) in enumerate(looks):

@@ -111,7 +111,7 @@ def show(bed: Object, instant: Instant) -> None:
 def show_state(bed: Object, system: System, state: State) -> None:
     """Show the pins of a running session; the fingertip is the user's and stays where it is."""
     # Forces are gathered and written only while something drawn tells them.
-    shown: dict[str, Array] = {"mode": state.mode()}
+    shown: dict[str, Array] = {"mode": state.mode(), "waiting": state.waiting()}
     if wants_force(bed):
         shown["force"] = state.row(system.rows.force)
     bridge.write_cells(bed.data, system.grid.positions, state.row(0), **shown)

@@ -272,9 +272,9 @@ def find_moment(context: Context) -> float | None:
 
 
 def _visible_rows(session: Running) -> Floats:
-    """Return all that can be seen of a session's cells, shape (3, n)."""
-    state = session.state
-    return np.array([state.row(0), state.row(session.system.rows.force), state.mode()])
+    """Return all that can be seen of a session's cells, shape (4, n)."""
+    state, force = session.state, session.system.rows.force
+    return np.array([state.row(0), state.row(force), state.mode(), state.waiting()])
 
 
 def _read_changes(context: Context, bed: Object, session: Running) -> tuple[str, Running, str]:

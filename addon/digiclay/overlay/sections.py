@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core.base.arrays import Floats, Indices
-from ..core.base.modes import Mode
+from ..core.base.modes import WAITING, Mode
 from ..core.model.touch import MOST_FORCE, MOST_INDENTATION
 from ..device import heat
 from ..strokes.stroke import Correction
@@ -316,9 +316,8 @@ def _draw_modes(pen: Pen) -> None:
     pen.entries(2, [(colors[mode], f"{modes[mode]} {name}") for mode, name in names.items()])
     if pen.readings.drive:
         served, lines, waiting = pen.readings.drive
-        pen.row(
-            localize("{} of {} lines addressed", served, lines), localize("{} pins wait", waiting)
-        )
+        pen.row(localize("{} of {} lines addressed", served, lines))
+        pen.entries(1, [(WAITING, localize("{} pins wait", waiting))])
 
 
 def _size(error: float, unit: str) -> str:

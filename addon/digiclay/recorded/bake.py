@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import bridge
-from ..bridge import ATTRIBUTES
+from ..bridge import WRITTEN
 from ..compat import (
     Modifier,
     NodeTree,
@@ -20,7 +20,7 @@ from ..compat import (
     own_curves,
     set_node_setting,
 )
-from ..core.base.arrays import Cells, Floats, Modes
+from ..core.base.arrays import Cells, Flags, Floats, Modes
 from ..core.base.errors import DigiclayError
 from ..core.engine.bodies import Knot, find_given
 from ..core.model.fingertip import Fingertip
@@ -74,7 +74,7 @@ def playback_nodes(bake: Object, moments: int) -> NodeTree:
     blend = node(tree, "ShaderNodeMix", {"Factor": part, **ends}, data_type="VECTOR")
     moved = {"Geometry": cells, "Position": enabled(blend.outputs, "Result")}
     shown = node(tree, "GeometryNodeSetPosition", moved).outputs["Geometry"]
-    for name, (kind, _, _) in ATTRIBUTES.items():
+    for name, (kind, _, _) in WRITTEN.items():
         value = sample(tree, table, attribute(tree, name, kind), kind, first)
         shown = store(tree, shown, name, kind, value)
     finish(tree, shown)
@@ -108,6 +108,8 @@ class BakedFrames:
     mode: Modes
     #: (t, n), N.
     force: NDArray[np.float32]
+    #: (t, n), whether they wait for their drive.
+    waiting: Flags
     #: (t, f, 7), of the fingertips.
     pose: Floats
 
@@ -128,14 +130,15 @@ def simulate_frames(take: Take, rate: float) -> Iterator[float | BakedFrames]:
     count = grid.count
     height = np.empty((wanted.size, count), np.float32)
     force, mode = np.empty_like(height), np.empty((wanted.size, count), np.int8)
+    waiting = np.empty(mode.shape, np.bool_)
     frame = 0
     for period, (system, state) in enumerate(play(take)):
         while frame < wanted.size and wanted[frame] == period:
             height[frame], force[frame] = state.row(0), state.row(system.rows.force)
-            mode[frame] = state.mode()
+            mode[frame], waiting[frame] = state.mode(), state.waiting()
             frame += 1
         yield period / take.periods
-    yield BakedFrames(grid.positions, height, mode, force, take.poses[wanted])
+    yield BakedFrames(grid.positions, height, mode, force, waiting, take.poses[wanted])
 
 
 def apply(
@@ -300,6 +303,7 @@ def _make_source(moments: BakedFrames) -> Object:
         moments.height.ravel().astype(np.float64),
         mode=moments.mode.ravel(),
         force=moments.force.ravel(),
+        waiting=moments.waiting.ravel(),
     )
     bake = bpy.data.objects.new(mesh.name, mesh)
     bake[ROLE] = BAKE

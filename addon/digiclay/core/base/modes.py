@@ -50,3 +50,5 @@ COLORS: dict[Mode, tuple[float, float, float]] = {
     Mode.FROZEN: (0.00, 0.62, 0.45),
     Mode.LOCKED: (0.16, 0.14, 0.20),
 }
+#: sRGB of a cell that waits for its drive, in any mode.
+WAITING = (0.28, 0.14, 0.00)

@@ -247,6 +247,13 @@ class State(NamedTuple):
         values.reshape(-1)[self.active.flat] = self.active.mode
         return values
 
+    def waiting(self) -> Flags:
+        """Return which cells wait for their drive, (n,)."""
+        flags = np.zeros(self.rows.shape[1], np.bool_)
+        if self.addressing:
+            flags[self.addressing.waiting] = True
+        return flags
+
     def shares(self) -> Floats:
         """Return the shares by which pins are locked, (n,), from 0 to 1."""
         locks = 0.0 if self.locks is None else self.locks
