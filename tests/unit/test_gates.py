@@ -243,6 +243,14 @@ def test_a_history_has_the_creep_of_idle_cells_and_says_why_it_has_no_error():
             "drive.trapped_volume must be 0 with drive.leak",
         ),
         "a leak of all": ({"drive": {"line_lag": 1e-3, "leak": 1.0}}, "leak must be below 1"),
+        "gates quicker than any": (
+            {"drive": {"line_lag": 1e-300}},
+            "drive.line_lag must be 0 or at least 1e-09 s",
+        ),
+        "lines that open in the next slot": (
+            {"drive": {"line_lag": 1e-3, "slot": 10e-3, "overlap": 11e-3}},
+            "drive.overlap must be at most a slot, 0.01 s",
+        ),
         "a lag below 0": ({"drive": {"line_lag": -1.0}}, "line_lag must be at least 0 s"),
         "no number": ({"drive": {"line_lag": math.nan}}, "line_lag must be a finite number"),
         "valves without lag": (

@@ -243,6 +243,8 @@ def _parameters(part: Parameters) -> str:
 
 def human(value: object, unit: str) -> str:
     """Write a value in the unit people read. `value`: in SI; `unit`: SI unit; empty where there is none."""
+    if isinstance(value, bool):
+        return str(value).lower()
     factor, name = READ.get(unit, (1.0, unit))
     return (
         f"{value * factor:.6g} {name}".rstrip() if isinstance(value, (int, float)) else str(value)

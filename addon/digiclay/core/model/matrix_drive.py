@@ -47,6 +47,8 @@ KINDS = {
     ),
     "servo": ("frame", "dead_zone", "height_step", "servo_gain"),
 }
+#: Least time constant of a gate, as of a valve, s.
+SHORTEST_LAG = 1e-9
 #: Weight of a line under a fingertip, with the policy *pressed*.
 PRESSED = 5.0
 
@@ -146,6 +148,9 @@ class MatrixDrive(Parameters):
             if value != default:
                 rule = f"must be left out with drive.kind = {self.kind}"
                 raise ParameterError("drive", name, rule, str(value))
+        if 0.0 < self.line_lag < SHORTEST_LAG:
+            rule = f"must be 0 or at least {SHORTEST_LAG:g} s"
+            raise ParameterError("drive", "line_lag", rule, f"{self.line_lag:g} s")
         if self.trapped_volume and self.leak:
             rule = "must be 0 with drive.leak, which empties it"
             raise ParameterError("drive", "trapped_volume", rule, f"{self.trapped_volume:g} m3")
@@ -198,6 +203,9 @@ class MatrixDrive(Parameters):
         if slot < dead_time:
             rule = f"must be at least delay.dead_time, {dead_time:g} s"
             raise ParameterError("drive", "slot", rule, f"{slot:g} s")
+        if self.overlap > slot:
+            rule = f"must be at most a slot, {slot:g} s, or lines open for the columns of others"
+            raise ParameterError("drive", "overlap", rule, f"{self.overlap:g} s")
 
 
 class Addressing(NamedTuple):
