@@ -28,8 +28,8 @@ SHAPED = ("shape", "field", "file")
 
 #: What the names of properties of twice a parameter begin with.
 WHOLE = "whole_"
-#: Labels of parameters whose names, stored in files, are spelled otherwise.
-LABELS = {"centring_time": "Centering Time"}
+#: Labels of parameters whose names, stored in files, are spelled otherwise, or mean two things.
+LABELS = {"centring_time": "Centering Time", "drive.share": "Shared Commands"}
 
 Update = Callable[[Any, Any], None]
 
@@ -54,7 +54,10 @@ def group(
     `updates` of its fields are called with group and context.
     """
     fields = _fields(kind)
-    properties = {name: _property(fields[name], updates.get(name)) for name in names or fields}
+    properties = {
+        field: _property(fields[field], updates.get(field), f"{name}.{field}")
+        for field in names or fields
+    }
     return make_group(name, kind.__doc__ or "", properties)
 
 
@@ -85,12 +88,13 @@ def title(name: str) -> str:
     return LABELS.get(name) or name.replace("_", " ").title()
 
 
-def _property(field: dataclasses.Field[Any], update: Update | None) -> Any:
-    """Make the property of one parameter."""
+def _property(field: dataclasses.Field[Any], update: Update | None, key: str) -> Any:
+    """Make the property of one parameter, ``drive.share`` for instance."""
     quantity: Quantity = field.metadata["quantity"]
     default = field.default
     unit, power = unit_of(quantity.unit, default)
-    label = f"Half {title(field.name)}" if quantity.whole else title(field.name)
+    label = LABELS.get(key) or title(field.name)
+    label = f"Half {label}" if quantity.whole else label
     options: dict[str, Any] = {
         "name": f"{label} ({unit})" if unit else label,
         "description": _tooltip(quantity, default, unit, power),
