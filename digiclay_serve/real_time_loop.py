@@ -191,7 +191,9 @@ def _find_effort(session: Session) -> Record:
     if session.errors is None:
         return {
             **simulated,
-            "errors_absent": "not yet" if session.monitor else "the step cannot be halved",
+            "errors_absent": "not yet"
+            if session.monitor
+            else "gates of lines, or a step that cannot be halved",
         }
     return simulated | {f"{name}_error": value for name, value in session.errors._asdict().items()}
 

@@ -3,21 +3,24 @@
 import tomllib
 from dataclasses import dataclass
 
+import digiclay
 import numpy as np
 import pytest
 from digiclay.core.base.errors import DigiclayError
 from digiclay.core.base.modes import Mode
 from digiclay.core.control.methods import METHODS
 from digiclay.core.control.orders import share
+from digiclay.core.control.own_method import Orders, OwnMethod
 from digiclay.core.engine.simulation import begin, periods
 from digiclay.core.model.control_interface import Commands
 from digiclay.core.scene.assembly import assemble
-from digiclay.core.scene.toml_table import format_scene, resolve
+from digiclay.core.scene.toml_table import format_scene, resolve, tabulate
 from digiclay.core.session import snapshot
 from digiclay.core.session.live_session import simulate_path
 from digiclay.core.session.run_scene import run
 
 from tests.assemble import AWAY, assert_near, over_middle, record, refused_in_a_line, replace, table
+from tests.own_methods import forgotten
 
 PERIOD = 5e-3
 MOTOR = {"valve": {"law": "motor", "hold": "braked", "free_speed": 0.2}, "conduit": "absent"}
@@ -231,3 +234,24 @@ def test_a_servo_follows_methods_that_command_heights_and_others_are_refused(met
     # Of a method whose heights are not those wanted, pins would not move.
     assert np.ptp(plain) > 0.4e-3
     assert np.ptp(driven) == pytest.approx(np.ptp(plain), rel=0.3)
+
+
+@dataclass(frozen=True)
+class Openings(OwnMethod):
+    """Valves that open, to no height that servos could follow."""
+
+    def locate(self, memory, touched, device):
+        return memory, (0.0, 0.0, 1.0)
+
+    def command(self, memory, cells, device):
+        return memory, Orders(opening=np.ones(cells.height.shape))
+
+
+def test_a_method_of_ones_own_orders_heights_to_servos():
+    with forgotten():
+        scene = digiclay.scene(tabulate(servo()), {"control.method": Openings})
+        with refused_in_a_line(
+            DigiclayError, "must order heights with drive.kind = servo, not open"
+        ):
+            run(scene)
+        assert np.ptp(run(scene.with_sections(drive=None)).history["height"]) > 1e-3

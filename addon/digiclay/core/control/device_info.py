@@ -41,6 +41,8 @@ class DeviceInfo:
     """Dead time of valve commands, s."""
     commands_wait: bool = False
     """Whether a command may wait in a drive before it acts."""
+    servos: bool = False
+    """Whether servos of the drive follow commanded heights, whatever the valve commands are."""
 
     @cached_property
     def rim(self) -> Rim:

@@ -162,6 +162,8 @@ class OwnControl:
                 (orders.rows, "rows", seen.own.shape),
             )
         )
+        if height is None and opening is not None and self.device.servos:
+            raise ValueError("must order heights with drive.kind = servo, not openings alone")
         target = np.clip(seen.target if height is None else height, 0.0, actuator.stroke)
         if opening is None:
             command = self.drive.command(self.drive.approach(target - seen.height), seen.force)

@@ -371,9 +371,9 @@ def _make_controller(scene: Scene, bed: Grid, cells: tuple[Cell, ...]) -> Contro
     sensing = scene.sensors
     floors = (sensing.force_floor, sensing.height_floor) if sensing else (0.0, 0.0)
     dead_time = scene.delay.dead_time if scene.delay else 0.0
-    waits = scene.drive is not None
+    driven = scene.drive is not None, scene.drive is not None and scene.drive.kind == "servo"
     device = DeviceInfo(
-        bed, cell, scene.simulation.control_period, scene.blister, None, *floors, dead_time, waits
+        bed, cell, scene.simulation.control_period, scene.blister, None, *floors, dead_time, *driven
     )
     if scene.shape:
         from ..shapes.fitting import fit_shape
