@@ -94,7 +94,7 @@ def read_study(path: Path, given: Sequence[Setting] = ()) -> Study:
     """Read a STUDY file, its settings replaced by the `given` ones; SceneError in one line."""
     table = read_table(path)
     if "cases" not in table:
-        raise SceneError("A study needs at least two --vary, or a STUDY file with [cases].")
+        raise SceneError(f"{path.name} has no [cases]: a study needs them, or at least two --vary.")
     try:
         return _read(path, table, given)
     except ParameterError as error:

@@ -179,7 +179,7 @@ def test_a_deviation_is_relative_to_the_relief_of_the_reference_and_a_flat_one_h
         ('"bed.toml"', '"bad.toml"', "bad.toml: there is no such file."),
         ("minimize", "minimze", "study.toml: minimze must be a known key"),
         ('"valve.stroke"', '"valve.law"', "study.toml: minimize must be valves or a parameter"),
-        ("[cases]", "[case]", "A study needs at least two --vary, or a STUDY file with [cases]."),
+        ("[cases]", "[case]", "study.toml has no [cases]"),
         ("along = {}", "[ratio]", "study.toml: ratio must be a known key"),
         ("[cases]", "[compare]\nall = 3\n[cases]", "study.toml: compare.all must be a table such as"),
         ("[cases]", "[compare.all]\nvalve.stroke = 1e-5\n[cases]", "valve.stroke must be given once"),
@@ -210,8 +210,11 @@ def test_a_mistake_is_told_in_one_line(old, new, message, refused):
 @pytest.mark.parametrize(
     "words, message",
     [
-        ("study bed.toml --out out", "A study needs at least two --vary, or a STUDY file"),
-        ("study slow_press --out out", "A study needs at least two --vary, or a STUDY file"),
+        (
+            "study bed.toml --out out",
+            "bed.toml has no [cases]: a study needs them, or at least two --vary",
+        ),
+        ("study slow_press --out out", "slow_press.toml has no [cases]"),
         ("study study.toml --second --out out", "--second and --uncertain are for a study with"),
         ("study study.toml --metric lag --out out", "--metric, --second and --uncertain are for"),
         ("study study.toml --set valve.stroke=1e-5 --out out", "must not be given to --set as"),
