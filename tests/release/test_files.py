@@ -18,7 +18,7 @@ BESIDE = [path.name for path in ROOT.glob("digiclay_*")]
 #: Endings of the files that the extension reads, and of texts for people.
 KINDS = re.compile(
     r"LICENSE|LICENSES/[\w.-]+\.txt|blender_manifest\.toml|[\w/]+\.py|wheels/[\w.-]+-py3-none-any\.whl"
-    r"|sample_shapes/(README\.md|methods/\w+\.txt|\w+/README\.md|batches/\w+\.toml|sessions/\w+\.toml)"
+    r"|sample_shapes/(README\.md|methods/\w+\.txt|\w+/README\.md|batches/\w+\.toml|(sessions|displays)/\w+\.toml)"
     r"|sample_shapes/shapes/\w+\.(png|stl|obj|ply|npy)"
     r"|presets/[\w/]+\.toml|press/\w+\.dat|farms/\w+\.js|manual/\w+\.html|translations/\w+\.toml"
 )
