@@ -7,42 +7,48 @@ import digiclay
 import numpy as np
 import pytest
 from digiclay.core.base.errors import DigiclayError
-from digiclay.core.base.modes import Mode
 from digiclay.core.control.methods import METHODS
 from digiclay.core.control.orders import share
 from digiclay.core.control.own_method import Orders, OwnMethod
 from digiclay.core.engine.simulation import begin, periods
-from digiclay.core.model.control_interface import Commands
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.toml_table import format_scene, resolve, tabulate
 from digiclay.core.session import snapshot
 from digiclay.core.session.live_session import simulate_path
 from digiclay.core.session.run_scene import run
 
-from tests.assemble import AWAY, assert_near, over_middle, record, refused_in_a_line, replace, table
+from tests.assemble import (
+    AWAY,
+    Scripted,
+    assert_near,
+    over_middle,
+    record,
+    refused_in_a_line,
+    replace,
+    table,
+)
 from tests.own_methods import forgotten
 
 PERIOD = 5e-3
 MOTOR = {"valve": {"law": "motor", "hold": "braked", "free_speed": 0.2}, "conduit": "absent"}
 
 
-@dataclass(frozen=True)
-class Wave:
-    """Controller that asks all pins for heights that grow with time, and for no valve command."""
-
-    speed: float
-    rows = 0
-
-    def begin(self):
-        return 0
-
-    def locate(self, memory, touched):
-        return memory, (0.0, 0.0, 1.0)
+class Heights(Scripted):
+    """Controller whose script has heights for all pins, and no valve commands."""
 
     def command(self, memory, seen):
-        target = np.full(seen.height.shape, 40e-3 + self.speed * memory * PERIOD)
-        modes = np.full(target.size, Mode.HOLD, np.int8)
-        return memory + 1, Commands(target, modes, np.zeros(target.size))
+        memory, orders = super().command(memory, seen)
+        target, none = orders.command, np.zeros(orders.command.size)
+        return memory, orders._replace(target=target, command=none)
+
+
+def rise_at(speed):
+    """Return a controller that asks all pins for heights that grow with time."""
+    return Heights(lambda time, x, y: 40e-3 + speed * time, PERIOD)
+
+
+def rest(time, x, y):
+    return 40e-3
 
 
 def servo(**known):
@@ -59,7 +65,7 @@ def servo(**known):
 
 
 def follow(scene, speed, count=120):
-    system = replace(assemble(scene), controller=Wave(speed))
+    system = replace(assemble(scene), controller=rise_at(speed))
     return record(system, AWAY, count).height[:, 0]
 
 
@@ -151,7 +157,7 @@ def test_what_a_servo_has_not_is_refused(drive, said):
         servo(**drive)
 
 
-class Once(Wave):
+class Once(Heights):
     """Controller that asks for a height in the first periods alone, after those of a frame's start."""
 
     def locate(self, memory, touched):
@@ -164,7 +170,7 @@ class Once(Wave):
 
 
 def test_a_pin_waits_for_its_frame():
-    system = replace(assemble(servo(frame=0.5)), controller=Once(0.0))
+    system = replace(assemble(servo(frame=0.5)), controller=Once(rest, PERIOD))
     height = record(system, AWAY, 200).height[:, 12]
     assert height[100] == 40e-3
     assert height[-1] == pytest.approx(41e-3, abs=5e-6)
@@ -181,7 +187,7 @@ def test_a_formed_pin_that_a_method_reaches_within_a_frame_holds_until_its_end()
     scene = servo(frame=0.5)
     formed = begin(assemble(scene))
     formed.rows[0] = formed.rows[formed.active.rows.target] = 45e-3
-    system = replace(assemble(scene), controller=Late(0.0))
+    system = replace(assemble(scene), controller=Late(rest, PERIOD))
     start = snapshot.transfer_heights(system, snapshot.dump(assemble(scene), formed))
     *_, state = periods(system, scene.trajectories(), start, 190)
     assert np.array_equal(state.row(0), formed.row(0))
@@ -195,7 +201,7 @@ def test_a_locked_pin_stays_whatever_its_servo_followed(hold):
     scene = servo(**drive).with_sections(
         valve=replace(servo().section("valve"), hold=hold), delay=None
     )
-    system = replace(assemble(scene), controller=Wave(20e-3))
+    system = replace(assemble(scene), controller=rise_at(20e-3))
     *_, state = periods(system, scene.trajectories(), begin(system), 43)
     poses = np.tile([0.0, 0.0, 0.5, 1.0, 0.0, 0.0, 0.0], (101, 1, 1))
     *_, state = simulate_path(system, state, poses[:2], share(np.ones(25)))

@@ -113,7 +113,7 @@ def repeat_period(
         system.selection.release(state)
         state = state._replace(active=system.selection.take(state, leader.active))
     if state.active.cells.size:
-        state.active.queue_commands(leader.active.all.command)
+        state.active.queue_command(leader.active.all.command)
     return state.end_period(state.memory, move(system, state, finger), state.addressing)
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -162,17 +163,18 @@ class ActiveSet:
         """The queued commands, oldest first."""
         return tuple(self.block[self.rows.commands])
 
-    def queue_commands(self, *newest: Floats) -> None:
-        """Queue the commands of a control period, (m,) or (m, b), 1, in place."""
-        count = len(newest)
-        for older, newer in zip(self.queue, (*self.queue[count:], *newest), strict=True):
+    def queue_command(self, newest: Floats) -> None:
+        """Queue a command of each cell, (m,) or (m, b), 1, in place."""
+        for older, newer in pairwise(self.queue):
             older[:] = newer
+        self.queue[-1][:] = newest
 
     def follow(self, orders: Commands) -> None:
         """Set targets, modes and valve commands, in place."""
         self.all.target[:] = orders.target
         self.all.mode[:] = orders.mode
-        self.queue_commands(*orders.queued)
+        for command in orders.queued:
+            self.queue_command(command)
 
     @cached_property
     def flat(self) -> Cells:

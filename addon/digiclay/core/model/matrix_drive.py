@@ -179,33 +179,31 @@ class MatrixDrive(Parameters):
         row, column = np.divmod(cells, layout.columns)
         return (row, column) if self.axis == "rows" else (column, row)
 
-    def count_periods(self, period: float) -> int:
-        """Return the control periods, of `period` s, of a slot."""
-        return max(1, round(self.slot / period))
-
     def check_device(self, layout: Layout, period: float, dead_time: float) -> None:
-        """Refuse more sections than lines, and slots that do not fit the control period or dead time, s."""
-        if self.kind == "servo":
-            frame = round(self.frame / period) * period
-            if abs(self.frame - frame) > TIE * period:
+        """Refuse more sections than lines, and times that do not fit the control period or dead time, s."""
+        for name in ("frame", "slot"):
+            time = getattr(self, name)
+            if time and abs(time - count_periods(time, period) * period) > TIE * period:
                 rule = f"must be a whole number of control periods, {period:g} s, or 0"
-                raise ParameterError("drive", "frame", rule, f"{self.frame:g} s")
+                raise ParameterError("drive", name, rule, f"{time:g} s")
+        if self.kind == "servo":
             return
         lines = self.count_lines(layout)
         if self.sections > lines:
             rule = f"must be at most the number of layout.{self.axis}, {lines}"
             raise ParameterError("drive", "sections", rule, str(self.sections))
         slot = self.slot or period
-        whole = self.count_periods(period) * period
-        if abs(slot - whole) > TIE * whole:
-            rule = f"must be a whole number of control periods, {period:g} s, or 0"
-            raise ParameterError("drive", "slot", rule, f"{self.slot:g} s")
         if slot < dead_time:
             rule = f"must be at least delay.dead_time, {dead_time:g} s"
             raise ParameterError("drive", "slot", rule, f"{slot:g} s")
         if self.overlap > slot:
             rule = f"must be at most a slot, {slot:g} s, or lines open for the columns of others"
             raise ParameterError("drive", "overlap", rule, f"{self.overlap:g} s")
+
+
+def count_periods(time: float, period: float) -> int:
+    """Return the control periods, of `period` s, of a slot or frame, s; 0: one of them."""
+    return max(1, round(time / period))
 
 
 class Addressing(NamedTuple):
@@ -312,4 +310,4 @@ def make_addressing(
     drive: MatrixDrive, layout: Layout, period: float, floor: float
 ) -> MatrixAddressing:
     """Put the drive of a bed together; control period, s; noise floor of a cell's force, N."""
-    return MatrixAddressing(drive, layout, drive.count_periods(period), max(floor, TIE))
+    return MatrixAddressing(drive, layout, count_periods(drive.slot, period), max(floor, TIE))

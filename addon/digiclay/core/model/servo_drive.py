@@ -11,7 +11,7 @@ from ..base.arrays import Cells, Flags, Floats
 from ..base.modes import LOCKED
 from .control_interface import Commands, Measurement
 from .layout import Layout
-from .matrix_drive import MatrixDrive
+from .matrix_drive import MatrixDrive, count_periods
 
 
 class FrameState(NamedTuple):
@@ -44,9 +44,9 @@ class ServoDrive:
 
         A pin whose first height comes within a frame holds until its end. Locked pins have no servo.
         """
-        known, wanted, locked = self.parameters, orders.target, orders.mode == LOCKED
-        if known.height_step:
-            steps = np.round(wanted / known.height_step) * known.height_step
+        servo, wanted, locked = self.parameters, orders.target, orders.mode == LOCKED
+        if servo.height_step:
+            steps = np.round(wanted / servo.height_step) * servo.height_step
             wanted = np.where(locked, wanted, steps)
         followed, held = state.held[seen.cells], state.held.copy()
         followed = np.where(np.isnan(followed), seen.target, followed)
@@ -55,8 +55,8 @@ class ServoDrive:
         followed = np.where(locked, wanted, followed)
         held[seen.cells] = followed
         error = followed - seen.height
-        command = np.clip(known.servo_gain * error, -1.0, 1.0)
-        command[np.abs(error) <= known.dead_zone] = 0.0
+        command = np.clip(servo.servo_gain * error, -1.0, 1.0)
+        command[np.abs(error) <= servo.dead_zone] = 0.0
         command = np.where(locked, orders.command, command)
         waiting = seen.cells[(command != 0.0) | (wanted != followed)]
         state = state._replace(held=held, waiting=waiting)
@@ -68,4 +68,4 @@ def make_servos(drive: MatrixDrive, layout: Layout, period: float) -> ServoDrive
     lines, cells = drive.count_lines(layout), layout.rows * layout.columns
     served, last, none = np.ones(lines, np.bool_), np.zeros(lines, np.intp), np.empty(0, np.intp)
     start = FrameState(served, last, none, np.full(cells, np.nan))
-    return ServoDrive(drive, max(1, round(drive.frame / period)), start)
+    return ServoDrive(drive, count_periods(drive.frame, period), start)

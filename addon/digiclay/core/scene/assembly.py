@@ -371,10 +371,11 @@ def _make_controller(scene: Scene, bed: Grid, cells: tuple[Cell, ...]) -> Contro
     sensing = scene.sensors
     floors = (sensing.force_floor, sensing.height_floor) if sensing else (0.0, 0.0)
     dead_time = scene.delay.dead_time if scene.delay else 0.0
-    driven = scene.drive is not None, scene.drive is not None and scene.drive.kind == "servo"
     device = DeviceInfo(
-        bed, cell, scene.simulation.control_period, scene.blister, None, *floors, dead_time, *driven
+        bed, cell, scene.simulation.control_period, scene.blister, None, *floors, dead_time
     )
+    if scene.drive:
+        device = replace(device, commands_wait=True, servos=scene.drive.kind == "servo")
     if scene.shape:
         from ..shapes.fitting import fit_shape
 

@@ -111,16 +111,13 @@ class Stroke(Drag):
     def path(self, speed: float, rest: float) -> tuple[Path, float, float]:
         """Return the fingertip's path, and start and end of the drag, s, for a surface at `rest`, m."""
         path, start, end = super().path(speed, rest)
-        cosine, sine = (
-            math.cos(math.radians(self.direction)),
-            math.sin(math.radians(self.direction)),
-        )
-        turned = (
-            replace(point, position=(self.x + along * cosine, self.y + along * sine, height))
-            for point in path.waypoints
-            for along, _, height in [point.position]
-        )
-        return replace(path, waypoints=(*turned,)), start, end
+        turn = math.radians(self.direction)
+        turned = []
+        for point in path.waypoints:
+            along, _, height = point.position
+            place = self.x + along * math.cos(turn), self.y + along * math.sin(turn), height
+            turned.append(replace(point, position=place))
+        return replace(path, waypoints=tuple(turned)), start, end
 
 
 @dataclass(frozen=True, eq=False, repr=False)
