@@ -50,7 +50,9 @@ def played(script, out, size=(1280, 800), by_hand=False, display=""):
     command += ["--factory-startup", "--python-exit-code", "3"]
     command += [] if by_hand else ["--enable-event-simulate"]
     command += ["--window-geometry", "0", "0", str(size[0]), str(size[1])]
-    command += ["--python", str(HERE / "driver.py"), "--", str(out), str(HERE / script)]
+    start = f"import sys; sys.path[:0] = [{str(HERE.parents[1])!r}]"
+    start += f"; from tests.window import driver; driver.main({script.removesuffix('.py')!r})"
+    command += ["--python-expr", start, "--", str(out)]
     # A launcher that makes a screen for Blender makes it as large as the window.
     screen = {"BLENDER_WINDOW_SCREEN": f"{size[0]}x{size[1]}x24"}
     screen |= {"DISPLAY": display} if display else {}

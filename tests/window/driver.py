@@ -1,14 +1,14 @@
 """Runs inside a Blender window and plays a script there, with simulated keys and mouse moves.
 
-Started by `blender_window.played`, with the folder for the results and the script after ``--``.
-A script is a file with a generator function ``script(blender)``, which is given this module. It is
-stepped from a timer, so that Blender handles each batch of events before the next; it may
-yield how long to wait, s. The pins have few vertices, unless the script has ``FINE_PINS = True``.
+Started by `blender_window.played`, with the folder for the results as the last word.
+A script is a module of this folder with a generator function ``script``, which imports this one as
+``blender``. It is stepped from a timer, so that Blender handles each batch of events before the
+next; it may yield how long to wait, s. The pins have few vertices, unless the script has
+``FINE_PINS = True``.
 """
 
 import faulthandler
 import importlib
-import importlib.util
 import json
 import subprocess
 import sys
@@ -23,7 +23,7 @@ from bpy_extras.view3d_utils import location_3d_to_region_2d
 from mathutils import Vector
 
 EXTENSION = "bl_ext.user_default.digiclay"
-OUT, SCRIPT = (Path(text) for text in sys.argv[sys.argv.index("--") + 1 :][:2])
+OUT = Path(sys.argv[-1])
 #: Time between steps, s: software GL draws a window of this size in a third of it.
 PAUSE = 0.4
 SEEN = {}
@@ -41,7 +41,9 @@ def event(kind, value="PRESS", at=(0, 0), **modifiers):
     window().event_simulate(kind, value, x=at[0], y=at[1], **modifiers)
 
 
-def key(kind, at, **modifiers):
+def key(kind, at=None, **modifiers):
+    """Press and release a key at a place, by default over the middle of the 3D view."""
+    at = at or middle()
     event(kind, "PRESS", at, **modifiers)
     event(
         kind, "RELEASE", at, **{name: held for name, held in modifiers.items() if name != "unicode"}
@@ -115,7 +117,7 @@ def empty_scene():
 
 def add_paper_bed():
     call(bpy.ops.mesh.digital_clay_add, bed="paper")
-    key("HOME", middle())
+    key("HOME")
     yield None
 
 
@@ -123,7 +125,7 @@ def scene_with_bed(**chosen):
     yield from empty_scene()
     call(bpy.ops.mesh.digital_clay_add, **chosen)
     bpy.ops.ed.undo_push(message="Add")
-    key("HOME", middle())
+    key("HOME")
     yield None
 
 
@@ -238,7 +240,7 @@ def start(thing=None):
 def after(name, *keys, **modifiers):
     """Press keys over the 3D view; look when the sessions have taken up whatever has happened."""
     for kind in keys:
-        key(kind, middle(), **modifiers)
+        key(kind, **modifiers)
     yield from settle()
     look(name)
 
@@ -348,7 +350,7 @@ def finish():
     bpy.ops.wm.quit_blender()
 
 
-def main():
+def main(name):
     faulthandler.enable()  # Blender that crashes says at which line of Python it did
     bpy.context.preferences.view.show_splash = False
     bpy.context.preferences.view.smooth_view = 0  # the mouse is sent by where things are seen
@@ -358,10 +360,7 @@ def main():
     bpy.context.preferences.view.use_save_prompt = False  # nobody would answer
     if addon_utils.enable(EXTENSION) is None:
         SEEN["error"] = f"{EXTENSION} cannot be enabled"
-    sys.path[:0] = [str(SCRIPT.parent), str(SCRIPT.parents[2])]  # scripts share what a hand does
-    found = importlib.util.spec_from_file_location("script", SCRIPT)
-    played = importlib.util.module_from_spec(found)
-    found.loader.exec_module(played)
+    played = importlib.import_module(f"tests.window.{name}")
     if "error" not in SEEN and not getattr(played, "FINE_PINS", False):
         # The vertices of rounder pins cost software GL most of a frame.
         part("device.parts").MANY = 0
@@ -369,7 +368,7 @@ def main():
             area for screen in bpy.data.screens for area in screen.areas if area.type == "VIEW_3D"
         ):
             area.spaces.active.overlay.show_floor = False  # a sixth of what is left
-    steps = played.script(sys.modules[__name__])
+    steps = played.script()
 
     def step():
         try:
@@ -385,6 +384,3 @@ def main():
         return None
 
     bpy.app.timers.register(step, first_interval=2.0, persistent=True)
-
-
-main()

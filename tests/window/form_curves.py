@@ -6,6 +6,7 @@ import addon_utils
 import bpy
 import numpy as np
 
+from tests.window import driver as blender
 from tests.window.hand_strokes import (
     act,
     add_bed,
@@ -32,53 +33,53 @@ OBJECT, HALF = (328, 41), 10
 ALONG, FILLED = 3, 2
 
 
-def script(blender):
-    add_bed(blender, bed="design")
-    take_tool(blender)
+def script():
+    add_bed(bed="design")
+    take_tool()
     yield from focus_window()
-    settings = brush(blender)
+    settings = brush()
     settings.brush, settings.height = "RAISE", 8.0
-    add_curves(blender)
+    add_curves()
     yield from blender.rounds()
-    yield from act(blender, to(on_the_screen(blender, 0.0, 0.0)), "key a sleep 0.5")
+    yield from act(to(on_the_screen(0.0, 0.0)), "key a sleep 0.5")
     blender.SEEN["selected"] = len([thing for thing in curves() if thing.select_get()])
-    yield from click_entry(blender, "along", ALONG)
+    yield from click_entry("along", ALONG)
     yield from blender.until(lambda: blender.session() is not None)
     blender.SEEN["queued"] = blender.session().begun_strokes
     blender.shot("curves_queued")
-    yield from formed(blender, "formed")
-    yield from act(blender, to(on_the_screen(blender, 0.0, 0.0)), "key ctrl+z")
-    note(blender, "undone")
+    yield from formed("formed")
+    yield from act(to(on_the_screen(0.0, 0.0)), "key ctrl+z")
+    note("undone")
     for thing in curves():
         filled = thing.type == "FONT" or thing.data.fill_mode != "NONE"
         thing.select_set(filled and thing.data.dimensions == "2D")
-    yield from click_entry(blender, "filled", FILLED)
-    yield from formed(blender, "stamped")
+    yield from click_entry("filled", FILLED)
+    yield from formed("stamped")
 
 
-def click_entry(blender, name, number):
+def click_entry(name, number):
     """Open the Object menu by the pointer, and click an entry, by its number from the end.
 
     The arrow keys tell where it is: the picture changes in it and in the one above.
     """
-    yield from done(blender, hand(to(OBJECT, 0.3), "click 1 sleep 0.8"))
+    yield from done(hand(to(OBJECT, 0.3), "click 1 sleep 0.8"))
     pictures = []
     for words in (["key Up sleep 0.3"] * number, ["key Up sleep 0.3"]):
-        yield from done(blender, hand(*words))
+        yield from done(hand(*words))
         blender.shot(f"curves_{name}")
         pictures.append(blender.read_shot(f"curves_{name}"))
     rows, columns = np.nonzero((np.abs(pictures[1] - pictures[0]) > 0.05).any(axis=-1))
     x, y = int(np.median(columns)), len(pictures[0]) - int(rows.min()) - HALF
-    yield from done(blender, hand(to((x + 3, y), 0.3), to((x, y), 0.3)))
+    yield from done(hand(to((x + 3, y), 0.3), to((x, y), 0.3)))
     blender.shot(f"curves_{name}")  # a menu takes clicks when it has been drawn
-    yield from done(blender, hand("click 1 sleep 0.5"))
+    yield from done(hand("click 1 sleep 0.5"))
 
 
 def curves():
     return [thing for thing in bpy.context.scene.objects if thing.type in ("CURVE", "FONT")]
 
 
-def add_curves(blender):
+def add_curves():
     """Add both over the bed, selected, and write down the lines that Blender itself makes of them, mm."""
     file = Path(blender.OUT, "logo.svg")
     file.write_text(SVG)
@@ -113,10 +114,10 @@ def convert(thing):
     return lines
 
 
-def formed(blender, name):
+def formed(name):
     yield from blender.until(lambda: not blender.session().strokes)
     yield 2.0
-    note(blender, name)
+    note(name)
     for thing in curves():
         thing.hide_set(True)
     yield from blender.rounds()

@@ -3,6 +3,7 @@
 import bpy
 import numpy as np
 
+from tests.window import driver as blender
 from tests.window.hand_strokes import (
     act,
     brush,
@@ -27,7 +28,7 @@ SPIKE, SPIKES = 12e-3, ((0.0, 0.0), (0.0, 18.0))
 RIDGE, WIDTH = 15e-3, 8.0
 
 
-def put_up(blender, rise):
+def put_up(rise):
     """Have pins stand out at rest, by what is found from the grid, m."""
     session = blender.session()
     system = session.system
@@ -57,61 +58,61 @@ def ridge(grid):
     return RIDGE * np.exp(-((1e3 * grid.x / WIDTH) ** 2))
 
 
-def script(blender):
-    yield from prepare(blender)
-    yield from raise_and_level(blender)
-    yield from reset(blender)
-    yield from smooth(blender)
-    yield from reset(blender)
-    yield from across_a_ridge(blender)
+def script():
+    yield from prepare()
+    yield from raise_and_level()
+    yield from reset()
+    yield from smooth()
+    yield from reset()
+    yield from across_a_ridge()
 
 
-def across_a_ridge(blender):
+def across_a_ridge():
     """Draw a line of Lower that is straight in perspective across a ridge, projected either way."""
-    settings = brush(blender)
+    settings = brush()
     for project in ("SURFACE", "PLANE"):
-        put_up(blender, ridge)
+        put_up(ridge)
         yield from blender.settle(5)
         settings.project = project
-        process = line(blender, (-LONG, -HALF), (LONG, HALF), *QUICK)
-        yield from done(blender, process)
+        process = line((-LONG, -HALF), (LONG, HALF), *QUICK)
+        yield from done(process)
         blender.shot(f"ridge_{project.lower()}")
         (stroke,) = blender.session().strokes
         path = [[1e3 * sample.x, 1e3 * sample.y] for sample in stroke.samples]
-        yield from act(blender, "key ctrl+z")
-        note(blender, project)
+        yield from act("key ctrl+z")
+        note(project)
         blender.SEEN[project]["path"] = path
 
 
-def raise_and_level(blender):
+def raise_and_level():
     """Raise by the header's brush, by Ctrl, and lower by Ctrl; level the middle of what was lowered."""
-    settings = brush(blender)
+    settings = brush()
     for name, kind, y, key in (
         ("raised", "RAISE", 0.0, ""),
         ("inverted", "LOWER", -21.0, "ctrl"),
         ("lowered", "RAISE", 0.0, "ctrl"),
     ):
         settings.brush, picture = kind, f"raise_{name}_under_way"
-        yield from stroke(blender, name, (-LONG, y), (LONG, y), *QUICK, key=key, picture=picture)
+        yield from stroke(name, (-LONG, y), (LONG, y), *QUICK, key=key, picture=picture)
         if name == "raised":
             blender.shot("raise_ridge")
         if name == "inverted":
-            yield from act(blender, "key ctrl+z")
-            note(blender, "raising undone")
+            yield from act("key ctrl+z")
+            note("raising undone")
         if name != "lowered":
-            yield from reset(blender)
+            yield from reset()
     settings.brush = "LEVEL"
-    yield from stroke(blender, "leveled", (0.0, -24.0), (0.0, 24.0), *QUICK)
+    yield from stroke("leveled", (0.0, -24.0), (0.0, 24.0), *QUICK)
     blender.shot("raise_level")
     settings.brush = "LOWER"
 
 
-def smooth(blender):
+def smooth():
     """Smooth by Shift and by the header's brush, undo, cancel, and form a line by Shift and a click."""
-    yield from act(blender, to(on_the_screen(blender, -27.0, -27.0)), "click 1")
-    put_up(blender, spikes)
+    yield from act(to(on_the_screen(-27.0, -27.0)), "click 1")
+    put_up(spikes)
     yield from blender.settle(5)
-    note(blender, "before")
+    note("before")
     first = []
 
     def started():
@@ -120,41 +121,41 @@ def smooth(blender):
             first.append([1e3 * strokes[-1].samples[0].x, 1e3 * strokes[-1].samples[0].y])
         return bool(strokes)
 
-    process = line(blender, (-HALF, 0.0), (HALF, 0.0), *SLOWER, key="shift")
+    process = line((-HALF, 0.0), (HALF, 0.0), *SLOWER, key="shift")
     yield from blender.until(started)
     yield from blender.until(lambda: process.poll() is not None)
     blender.shot("smooth_shift_under_way")
-    yield from finish(blender, process)
-    note(blender, "smoothed")
+    yield from finish(process)
+    note("smoothed")
     blender.SEEN["smoothed"]["first"] = first[-1]
     blender.shot("smooth_shift")
-    yield from act(blender, to(on_the_screen(blender, 0.0, -30.0)), "key ctrl+z")
-    note(blender, "undone")
-    yield from by_brush(blender)
-    yield from click(blender)
+    yield from act(to(on_the_screen(0.0, -30.0)), "key ctrl+z")
+    note("undone")
+    yield from by_brush()
+    yield from click()
 
 
-def by_brush(blender):
+def by_brush():
     """Smooth with the brush of the header; then once more, and take that back by Esc."""
-    settings = brush(blender)
+    settings = brush()
     settings.brush = "SMOOTH"
-    process = line(blender, (-HALF, 18.0), (HALF, 18.0), *SLOWER, last="")
+    process = line((-HALF, 18.0), (HALF, 18.0), *SLOWER, last="")
     yield from blender.until(lambda: process.poll() is not None)
     blender.shot("smooth_brush_under_way")
-    yield from act(blender, "mouseup 1")
-    note(blender, "by brush")
+    yield from act("mouseup 1")
+    note("by brush")
     blender.shot("smooth_brush")
-    process = line(blender, (-HALF, 0.0), (HALF, 0.0), *SLOWER, last="sleep 2")
+    process = line((-HALF, 0.0), (HALF, 0.0), *SLOWER, last="sleep 2")
     yield from blender.until(lambda: any(one.samples[3:] for one in blender.session().strokes))
-    yield from act(blender, "key Escape sleep 0.2 mouseup 1")
-    yield from finish(blender, process)
-    note(blender, "escaped")
+    yield from act("key Escape sleep 0.2 mouseup 1")
+    yield from finish(process)
+    note("escaped")
     settings.brush = "LOWER"
 
 
-def click(blender):
+def click():
     """Press once, then click with Shift: the line between the two."""
-    ends = [on_the_screen(blender, x, -24.0) for x in (-27.0, 27.0)]
-    yield from act(blender, to(ends[0]), "click 1")
-    yield from act(blender, to(ends[1]), "keydown shift sleep 0.2 click 1 sleep 0.2 keyup shift")
-    note(blender, "line")
+    ends = [on_the_screen(x, -24.0) for x in (-27.0, 27.0)]
+    yield from act(to(ends[0]), "click 1")
+    yield from act(to(ends[1]), "keydown shift sleep 0.2 click 1 sleep 0.2 keyup shift")
+    note("line")

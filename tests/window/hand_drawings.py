@@ -4,6 +4,7 @@ import bpy
 import numpy as np
 
 from tests.drawings import AS_DRAWN, RATE, TURNED, draw_by_hand, put, read_drawings
+from tests.window import driver as blender
 from tests.window.hand_strokes import (
     brush,
     done,
@@ -24,35 +25,35 @@ DRAWN = {
 }
 
 
-def script(blender):
-    yield from prepare(blender, "TOP", bed="design")
-    settings, rng = brush(blender), np.random.default_rng(41)
+def script():
+    yield from prepare("TOP", bed="design")
+    settings, rng = brush(), np.random.default_rng(41)
     settings.depth, settings.height, settings.strength = 4.0, 8.0, 1.0
     drawings = read_drawings()
     for name, (kind, _, pose) in DRAWN.items():
         settings.brush = kind
         for path in put(drawings[name], *pose):
-            yield from done(blender, draw(blender, draw_by_hand(path, rng)))
-        yield from formed(blender)
+            yield from done(draw(draw_by_hand(path, rng)))
+        yield from formed()
         blender.SEEN[name] = {"bed": blender.heights().round(3).tolist()}
-        yield from look(blender, name)
-        yield from reset(blender)
+        yield from look(name)
+        yield from reset()
 
 
-def draw(blender, places):
+def draw(places):
     """Start a hand that goes through places (k, 2), mm, with the button down."""
-    pixels = [on_the_screen(blender, x, y) for x, y in places.tolist()]
+    pixels = [on_the_screen(x, y) for x, y in places.tolist()]
     moves = [to(pixel, 1.0 / RATE) for pixel in pixels[1:]]
     return hand(to(pixels[0]), "mousedown 1", *moves, "mouseup 1")
 
 
-def formed(blender):
+def formed():
     """Wait until all strokes of the queue are formed."""
     yield from blender.until(lambda: not any(session.strokes for session in blender.sessions()))
     yield from blender.settle()
 
 
-def look(blender, name):
+def look(name):
     """Take a picture from above the front edge, and look down again."""
     blender.call(bpy.ops.view3d.view_orbit, angle=0.7, type="ORBITUP")
     blender.shot(f"drawing_{name}")

@@ -5,6 +5,7 @@ import subprocess
 import bpy
 import numpy as np
 
+from tests.window import driver as blender
 from tests.window import space_mouse
 from tests.window.hand_strokes import (
     HALF,
@@ -28,44 +29,42 @@ LEAVE = (450, 13)
 TURN = (0, 0, 0, 0, 15, 0)
 
 
-def script(blender):
-    yield from prepare(blender)
-    yield from turned(blender)
-    yield from reset(blender)
-    yield from quarter(blender)
-    yield from reset(blender)
-    yield from second_window(blender)
-    yield from sculpting(blender)
+def script():
+    yield from prepare()
+    yield from turned()
+    yield from reset()
+    yield from quarter()
+    yield from reset()
+    yield from second_window()
+    yield from sculpting()
 
 
-def held_stroke(blender):
+def held_stroke():
     (session,) = blender.sessions()
     return session.strokes[-1] if session.strokes and session.strokes[-1].held else None
 
 
-def followed(blender):
-    yield from blender.until(
-        lambda: held_stroke(blender) is not None and held_stroke(blender).reached > 0
-    )
+def followed():
+    yield from blender.until(lambda: held_stroke() is not None and held_stroke().reached > 0)
 
 
-def let_go(blender, name):
-    yield from followed(blender)
-    path = [[1e3 * sample.x, 1e3 * sample.y] for sample in held_stroke(blender).samples]
-    yield from act(blender, "mouseup 1")
-    note(blender, name)
+def let_go(name):
+    yield from followed()
+    path = [[1e3 * sample.x, 1e3 * sample.y] for sample in held_stroke().samples]
+    yield from act("mouseup 1")
+    note(name)
     blender.SEEN[name]["path"] = path
 
 
-def turned(blender):
+def turned():
     looking = blender.view()[0].spaces.active.region_3d
-    start, end = ends(blender)
+    start, end = ends()
     before, distance = np.array(looking.view_rotation), looking.view_distance
     middle = (start[0] + end[0]) // 2, (start[1] + end[1]) // 2
     # To and fro for as long as it takes to turn the view.
     there, back = drag(start, middle, 1.0, 60), drag(middle, start, 1.0, 60)
     process = hand(to(start), "mousedown 1", *[there, back] * 60)
-    yield from followed(blender)
+    yield from followed()
 
     def is_turned():
         space_mouse.push(TURN)
@@ -74,35 +73,35 @@ def turned(blender):
     yield from blender.until(is_turned)
     space_mouse.push((0,) * 6)
     process.terminate()
-    yield from done(blender, process)
-    seen = {"held": held_stroke(blender) is not None}
+    yield from done(process)
+    seen = {"held": held_stroke() is not None}
     # What a trackpad sends to Blender on X11: two fingers up, to the left and to the right are
     # wheels.
-    yield from done(blender, hand("click 4 sleep 0.1 click 6 sleep 0.1 click 7 sleep 0.1"))
+    yield from done(hand("click 4 sleep 0.1 click 6 sleep 0.1 click 7 sleep 0.1"))
     seen["nearer"] = distance / looking.view_distance
-    yield from done(blender, hand(drag(middle, on_the_screen(blender, HALF, 0.0), 0.5, 60)))
-    yield from let_go(blender, "turned")
+    yield from done(hand(drag(middle, on_the_screen(HALF, 0.0), 0.5, 60)))
+    yield from let_go("turned")
     blender.SEEN["turned"] |= seen | {
         "turned": np.abs(np.array(looking.view_rotation) - before).max().item()
     }
     blender.shot("elsewhere_turned")
 
 
-def quarter(blender):
+def quarter():
     blender.call(bpy.ops.screen.region_quadview)
-    yield from blender.until(lambda: top_quarter(blender) is not None)
-    yield from draw_in(blender, "quarter", blender.window(), top_quarter(blender), (0, 0))
+    yield from blender.until(lambda: top_quarter() is not None)
+    yield from draw_in("quarter", blender.window(), top_quarter(), (0, 0))
     blender.shot("elsewhere_quarter")
     blender.call(bpy.ops.screen.region_quadview)
     yield None
 
 
-def draw_in(blender, name, window, region, corner):
+def draw_in(name, window, region, corner):
     """Draw along the middle row in a region of a window whose top left corner is somewhere on the screen."""
     seen = (blender.pixel(blender.world(x, 0.0), region) for x in (-HALF, HALF))
     start, end = ((corner[0] + across, corner[1] + window.height - 1 - up) for across, up in seen)
-    yield from done(blender, hand(to(start), "mousedown 1", drag(start, end, 1.0, 60)))
-    yield from let_go(blender, name)
+    yield from done(hand(to(start), "mousedown 1", drag(start, end, 1.0, 60)))
+    yield from let_go(name)
 
 
 def windows_on_screen():
@@ -122,7 +121,7 @@ def windows_on_screen():
     }
 
 
-def second_window(blender):
+def second_window():
     first = set(windows_on_screen())
     bpy.ops.wm.window_new()
     yield from blender.until(lambda: len(windows_on_screen()) > len(first))
@@ -133,8 +132,8 @@ def second_window(blender):
     looking, seen = region.data, blender.view()[0].spaces.active.region_3d
     looking.view_location, looking.view_distance = seen.view_location, seen.view_distance
     yield from blender.rounds()  # its matrices are those of the last drawing
-    yield from done(blender, hand(f"windowfocus --sync {number}"))
-    yield from draw_in(blender, "second window", window, region, (shown["X"], shown["Y"]))
+    yield from done(hand(f"windowfocus --sync {number}"))
+    yield from draw_in("second window", window, region, (shown["X"], shown["Y"]))
     blender.SEEN["second window"]["windows"] = len(bpy.context.window_manager.windows)
     blender.shot("elsewhere_window")
     with bpy.context.temp_override(window=window):
@@ -143,7 +142,7 @@ def second_window(blender):
     yield from focus_window()
 
 
-def sculpting(blender):
+def sculpting():
     blender.select(blender.beds()[0])
     home = blender.window().workspace
     blender.window().workspace = bpy.data.workspaces["Sculpting"]
@@ -152,7 +151,7 @@ def sculpting(blender):
     blender.shot("elsewhere_sculpting")
     area, _ = blender.view()
     at = area.x + LEAVE[0], blender.window().height - (area.y + area.height) + LEAVE[1]
-    yield from done(blender, hand(to(at, 0.2), "click 1"))
+    yield from done(hand(to(at, 0.2), "click 1"))
     yield from blender.until(lambda: bpy.context.mode == "OBJECT")
     blender.shot("elsewhere_back")
     tool = blender.window().workspace.tools.from_space_view3d_mode("OBJECT")

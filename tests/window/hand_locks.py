@@ -5,6 +5,7 @@ from itertools import pairwise
 import bpy
 import numpy as np
 
+from tests.window import driver as blender
 from tests.window.hand_strokes import (
     act,
     brush,
@@ -24,8 +25,8 @@ BOX = ((4.0, -26.0), (26.0, -10.0))
 EIGHT = ((-26.0, 8.0), (-2.0, 28.0), (-2.0, 8.0), (-26.0, 28.0), (-26.0, 8.0))
 
 
-def keep(blender, name):
-    note(blender, name)
+def keep(name):
+    note(name)
     session = blender.session()
     shares = session.state.shares()
     grid, height = session.system.grid, session.state.row(0)
@@ -39,9 +40,9 @@ def keep(blender, name):
     }
 
 
-def draw(blender, *places, before="", after=""):
+def draw(*places, before="", after=""):
     """Return the hand that drags along places of the bed, mm, and their pixels in the window."""
-    screen = [on_the_screen(blender, *place) for place in places]
+    screen = [on_the_screen(*place) for place in places]
     first, words = screen[0], []
     for start, end in pairwise(screen):
         way = np.linspace(start, end, 12)[1:].round().astype(int)
@@ -50,53 +51,51 @@ def draw(blender, *places, before="", after=""):
     return (to(first), before, "mousedown 1", *words, "mouseup 1", after), pixels
 
 
-def change(blender, name, operator, **given):
+def change(name, operator, **given):
     blender.call(operator, **given)
-    yield from finish(blender, hand("sleep 0.1"))
-    keep(blender, name)
+    yield from finish(hand("sleep 0.1"))
+    keep(name)
 
 
-def script(blender):
-    yield from prepare(blender)
-    settings = brush(blender)
+def script():
+    yield from prepare()
+    settings = brush()
     settings.brush, settings.height = "RAISE", 8.0
-    yield from stroke(blender, "ridge", (-27.0, -6.0), (27.0, 12.0), *HOW)
+    yield from stroke("ridge", (-27.0, -6.0), (27.0, 12.0), *HOW)
     settings.brush = "LOCK"
-    words, pixels = draw(blender, *BOX, before="key b sleep 0.4")
-    yield from act(blender, *words)
-    keep(blender, "box")
+    words, pixels = draw(*BOX, before="key b sleep 0.4")
+    yield from act(*words)
+    keep("box")
     blender.SEEN["box"]["path"] = pixels
     words, pixels = draw(
-        blender,
         *EIGHT,
         before="keydown ctrl keydown shift sleep 0.2",
         after="keyup shift keyup ctrl",
     )
-    yield from act(blender, *words)
-    keep(blender, "lasso")
+    yield from act(*words)
+    keep("lasso")
     blender.SEEN["lasso"]["path"] = pixels
-    yield from act(blender, to(on_the_screen(blender, 0.0, 33.0)), "key ctrl+z")
-    keep(blender, "lasso undone")
+    yield from act(to(on_the_screen(0.0, 33.0)), "key ctrl+z")
+    keep("lasso undone")
     words, _ = draw(
-        blender,
         (10.0, -28.0),
         (28.0, -16.0),
         before="key b sleep 0.4 keydown ctrl sleep 0.2",
         after="keyup ctrl",
     )
-    yield from act(blender, *words)
-    keep(blender, "box with ctrl")
+    yield from act(*words)
+    keep("box with ctrl")
     # Inside the view: a press beside that would drag a value of another editor.
     _, region = blender.view()
     x, y = region.x + 150, blender.window().height - region.y - 100
     box = ("mousedown 1", to((x + 20, y - 20)), "mouseup 1")
-    yield from act(blender, to((x, y)), "key b sleep 0.4", *box)
-    keep(blender, "nothing inside")
+    yield from act(to((x, y)), "key b sleep 0.4", *box)
+    keep("nothing inside")
     height = bpy.ops.digiclay.press_locks_height
-    yield from change(blender, "by height", height, side="ABOVE", height=4.0)
+    yield from change("by height", height, side="ABOVE", height=4.0)
     blender.shot("locks_skin")
     for what in ("BLUR", "BLUR"):
-        yield from change(blender, "blurred", bpy.ops.digiclay.press_locks, change=what)
+        yield from change("blurred", bpy.ops.digiclay.press_locks, change=what)
     blender.shot("locks_skin_blurred")
     blender.beds()[0].digiclay_display.form = "pins"
     yield from blender.rounds(8)
@@ -104,34 +103,34 @@ def script(blender):
     blender.beds()[0].digiclay_display.form = "skin"
     yield from blender.rounds(8)
     settings.brush = "ERASE"
-    yield from stroke(blender, "erased", (-27.0, -6.0), (27.0, 12.0), *HOW)
-    keep(blender, "erased")
+    yield from stroke("erased", (-27.0, -6.0), (27.0, 12.0), *HOW)
+    keep("erased")
     blender.shot("locks_erased")
-    yield from change(blender, "cleared", bpy.ops.digiclay.press_locks, change="CLEAR")
+    yield from change("cleared", bpy.ops.digiclay.press_locks, change="CLEAR")
     blender.shot("locks_skin_cleared")
     blender.beds()[0].digiclay_display.form = "pins"
     yield from blender.rounds(8)
     blender.shot("locks_pins_cleared")
     for name in ("skin", "pins_blurred", "skin_cleared", "pins_cleared"):
-        blender.SEEN[f"white {name}"] = count_white(blender, name).tolist()
+        blender.SEEN[f"white {name}"] = count_white(name).tolist()
     settings.symmetry = "X"
-    words, _ = draw(blender, *BOX, before="key b sleep 0.4")
-    yield from act(blender, *words)
-    keep(blender, "mirrored box")
+    words, _ = draw(*BOX, before="key b sleep 0.4")
+    yield from act(*words)
+    keep("mirrored box")
     settings.symmetry = "NONE"
-    yield from change(blender, "left in part", bpy.ops.digiclay.press_locks, change="BLUR")
-    yield from without_session(blender)
+    yield from change("left in part", bpy.ops.digiclay.press_locks, change="BLUR")
+    yield from without_session()
 
 
-def count_white(blender, name):
+def count_white(name):
     """Return how many pixels are white in the left and in the right half of the view in a picture."""
-    white = (read_shot(f"locks_{name}", blender) > 0.98).all(axis=-1).sum(axis=0)
+    white = (read_shot(f"locks_{name}") > 0.98).all(axis=-1).sum(axis=0)
     return np.array([half.sum() for half in np.array_split(white, 2)])
 
 
-def without_session(blender):
+def without_session():
     """Look at two beds without a session, as skin and as pins, before and after the file is opened again."""
-    yield from act(blender, "key Escape")
+    yield from act("key Escape")
     yield from blender.stopped()
     bed = blender.beds()[0]
     blender.select(bed)
@@ -144,15 +143,15 @@ def without_session(blender):
     blender.call(bpy.ops.view3d.view_axis, type="TOP")
     blender.call(bpy.ops.view3d.view_orbit, angle=0.7, type="ORBITUP")
     blender.call(bpy.ops.view3d.view_all)
-    yield from look_with_and_without(blender, "two")
+    yield from look_with_and_without("two")
     file = str(blender.OUT / "locked.blend")
     bpy.ops.wm.save_as_mainfile(filepath=file)
     bpy.ops.wm.open_mainfile(filepath=file)
     yield from blender.rounds(8)
-    yield from look_with_and_without(blender, "opened")
+    yield from look_with_and_without("opened")
 
 
-def look_with_and_without(blender, name):
+def look_with_and_without(name):
     """Write down how many white pixels the overlays have in both halves of a picture."""
     area, _ = blender.view()
     for shown in (True, False):
@@ -160,5 +159,5 @@ def look_with_and_without(blender, name):
         yield from blender.rounds(8)
         blender.shot(f"locks_{name}_{shown}")
     area.spaces.active.overlay.show_overlays = True
-    white = [count_white(blender, f"{name}_{shown}") for shown in (True, False)]
+    white = [count_white(f"{name}_{shown}") for shown in (True, False)]
     blender.SEEN[f"white {name}"] = (white[0] - white[1]).tolist()

@@ -5,6 +5,7 @@ from itertools import pairwise
 
 import bpy
 
+from tests.window import driver as blender
 from tests.window.hand_strokes import (
     act,
     brush,
@@ -32,10 +33,10 @@ WAVE = ((-27.0, -9.0), (-9.0, 12.0), (9.0, -12.0), (27.0, 9.0))
 LOADS = {"alone": (30, 0.0), "few redraws": (4, 0.0), "a load": (30, 0.15)}
 
 
-def draw(blender, *paths, then=""):
+def draw(*paths, then=""):
     words = []
     for path in paths:
-        places = [on_the_screen(blender, *place) for place in path]
+        places = [on_the_screen(*place) for place in path]
         words += [to(places[0], 0.02), "mousedown 1"]
         words += [
             drag(start, end, DURATION / (len(places) - 1), RATE) for start, end in pairwise(places)
@@ -44,29 +45,29 @@ def draw(blender, *paths, then=""):
     return hand(*words, then)
 
 
-def drawn(blender, *paths):
-    yield from done(blender, draw(blender, *paths))
+def drawn(*paths):
+    yield from done(draw(*paths))
 
 
-def script(blender):
-    yield from prepare(blender, "TOP", bed="paper")
-    yield from act(blender, to(on_the_screen(blender, 0.0, 0.0)), "click 1")  # the session begins
-    yield from reset(blender)
-    yield from taken_back(blender)
+def script():
+    yield from prepare("TOP", bed="paper")
+    yield from act(to(on_the_screen(0.0, 0.0)), "click 1")  # the session begins
+    yield from reset()
+    yield from taken_back()
     # Ridges take the device of this bed much longer.
-    brush(blender).brush, brush(blender).height = "RAISE", 8.0
-    yield from queue(blender)
-    yield from haste(blender)
-    brush(blender).brush = "LOWER"
+    brush().brush, brush().height = "RAISE", 8.0
+    yield from queue()
+    yield from haste()
+    brush().brush = "LOWER"
     for name, (rate, load) in LOADS.items():
-        yield from under_load(blender, name, rate, load)
+        yield from under_load(name, rate, load)
 
 
-def queue(blender):
+def queue():
     # So few are for a finger that is moved by hand.
     preferences, usual = blender.preferences(), blender.preferences().most_periods
     preferences.most_periods = 1
-    process = draw(blender, *LINES)
+    process = draw(*LINES)
     while process.poll() is None:
         yield 0.02
     ended, simulated = time.perf_counter(), blender.session().state.period
@@ -79,66 +80,66 @@ def queue(blender):
     simulated = (blender.session().state.period - simulated) * blender.session().system.period
     blender.SEEN["time"] = {"after the hand": spent, "simulated": simulated}
     yield from blender.settle()
-    note(blender, "formed")
+    note("formed")
     for count in (1, 2):
-        yield from act(blender, to(on_the_screen(blender, 0.0, -33.0)), "key ctrl+z sleep 0.2")
-        note(blender, f"undone {count}")
+        yield from act(to(on_the_screen(0.0, -33.0)), "key ctrl+z sleep 0.2")
+        note(f"undone {count}")
     for count in (1, 2):
-        yield from act(blender, "key ctrl+shift+z sleep 0.2")
-        note(blender, f"redone {count}")
-    yield from act(blender, "key BackSpace sleep 0.2")
-    note(blender, "backspace")
-    yield from reset(blender)
+        yield from act("key ctrl+shift+z sleep 0.2")
+        note(f"redone {count}")
+    yield from act("key BackSpace sleep 0.2")
+    note("backspace")
+    yield from reset()
 
 
-def haste(blender):
+def haste():
     loop = blender.part("live.loop").LOOP
     for name, keys in (
         ("finished", "key Return"),
         ("let go on", "key Return sleep 0.05 key Escape"),
     ):
-        yield from done(blender, draw(blender, *LINES, then=keys))
+        yield from done(draw(*LINES, then=keys))
         yield from blender.until(lambda: not loop.in_haste)
-        note(blender, name)
+        note(name)
         blender.SEEN[name]["left"] = len(blender.session().strokes)
         yield from blender.until(lambda: not blender.session().strokes)
         yield from blender.settle()
-        note(blender, f"{name}, formed")
-        yield from act(blender, to(on_the_screen(blender, 0.0, -33.0)), "key ctrl+z sleep 0.2")
-        note(blender, f"{name}, undone")
-        yield from reset(blender)
+        note(f"{name}, formed")
+        yield from act(to(on_the_screen(0.0, -33.0)), "key ctrl+z sleep 0.2")
+        note(f"{name}, undone")
+        yield from reset()
 
 
-def taken_back(blender):
+def taken_back():
     """Take back queued strokes, redo them; save a queue, and press Esc three times while it is formed."""
-    away = to(on_the_screen(blender, 0.0, -33.0))
-    yield from drawn(blender, *LINES)
-    yield from act(blender, away, "key ctrl+z sleep 0.2 key ctrl+z sleep 0.2")
-    note(blender, "two taken back")
-    yield from act(blender, "key ctrl+shift+z sleep 0.2 key ctrl+shift+z sleep 0.2")
-    note(blender, "two redone")
-    yield from reset(blender)
+    away = to(on_the_screen(0.0, -33.0))
+    yield from drawn(*LINES)
+    yield from act(away, "key ctrl+z sleep 0.2 key ctrl+z sleep 0.2")
+    note("two taken back")
+    yield from act("key ctrl+shift+z sleep 0.2 key ctrl+shift+z sleep 0.2")
+    note("two redone")
+    yield from reset()
     # A ridge takes longer than the keys after it.
-    brush(blender).brush = "RAISE"
-    yield from drawn(blender, *LINES)
+    brush().brush = "RAISE"
+    yield from drawn(*LINES)
     file = str(blender.OUT / "queue.blend")
     bpy.ops.wm.save_as_mainfile(filepath=file)
-    yield from done(blender, hand("key Escape sleep 0.05 key Escape sleep 0.05 key Escape"))
+    yield from done(hand("key Escape sleep 0.05 key Escape sleep 0.05 key Escape"))
     blender.SEEN["after Esc"] = len(blender.sessions())
     yield from blender.until(lambda: not blender.sessions())
-    note(blender, "stopped")
+    note("stopped")
     bpy.ops.wm.open_mainfile(filepath=file)
     yield from blender.until(
         lambda: not blender.part("live.beds").read_queue(blender.beds()[0])[-1]
     )
     yield from blender.rounds()
-    note(blender, "opened")
-    brush(blender).brush = "LOWER"
-    yield from act(blender, to(on_the_screen(blender, 0.0, -33.0)), "click 1")
-    yield from reset(blender)
+    note("opened")
+    brush().brush = "LOWER"
+    yield from act(to(on_the_screen(0.0, -33.0)), "click 1")
+    yield from reset()
 
 
-def under_load(blender, name, rate, load):
+def under_load(name, rate, load):
     preferences = blender.preferences()
     preferences.redraw_rate = rate
 
@@ -150,7 +151,7 @@ def under_load(blender, name, rate, load):
 
     if load:
         bpy.app.timers.register(burn)
-    process, path = draw(blender, WAVE), []
+    process, path = draw(WAVE), []
 
     def formed():
         strokes = blender.session().strokes
@@ -163,6 +164,6 @@ def under_load(blender, name, rate, load):
     if load:
         bpy.app.timers.unregister(burn)
     yield from blender.settle()
-    note(blender, name)
+    note(name)
     blender.SEEN[name] |= {"path": path, "exact": blender.session().state.row(0).tolist()}
-    yield from reset(blender)
+    yield from reset()

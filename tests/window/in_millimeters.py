@@ -2,6 +2,7 @@
 
 import bpy
 
+from tests.window import driver as blender
 from tests.window.hand_strokes import brush, catch_up, focus_window, stroke, take_tool
 
 #: Beds that the factory file's view would cut off: what they are made with.
@@ -10,29 +11,29 @@ LARGE, SMALL = {"bed": "paper", "pitch": 100.0}, {"bed": "paper", "scale": 0.003
 PLACES = (3.0, 3.0), (11.0, 11.0), (-11.0, -11.0)
 
 
-def script(blender):
+def script():
     units = bpy.context.scene.unit_settings
     units.scale_length, units.length_unit = 1e-3, "MILLIMETERS"
-    yield from add(blender, bed="paper")
+    yield from add(bed="paper")
     area, _ = blender.view()
     bed, graph = blender.beds()[0], bpy.context.evaluated_depsgraph_get()
     blender.SEEN["size"] = list(bed.evaluated_get(graph).dimensions)
     blender.SEEN["millimeter"] = bpy.context.window_manager.operators[-1].properties.millimeter
     area.spaces.active.show_region_hud = True
     blender.shot("millimeters_added")
-    catch_up(blender)
-    take_tool(blender)
+    catch_up()
+    take_tool()
     yield from focus_window()
-    brush(blender).brush, brush(blender).height = "RAISE", 6.0
-    yield from stroke(blender, "raised", (-27.0, 0.0), (27.0, 0.0), picture="millimeters_drawn")
+    brush().brush, brush().height = "RAISE", 6.0
+    yield from stroke("raised", (-27.0, 0.0), (27.0, 0.0), picture="millimeters_drawn")
     blender.shot("millimeters_raised")
     for name, chosen in (("large", LARGE), ("small", SMALL)):
-        yield from add(blender, **chosen)
+        yield from add(**chosen)
         blender.shot(f"millimeters_{name}")
-        blender.SEEN[name] = [find_pin(blender, *place) for place in PLACES]
+        blender.SEEN[name] = [find_pin(*place) for place in PLACES]
 
 
-def find_pin(blender, column, row):
+def find_pin(column, row):
     """Return the place of the pin that is seen at a place, pitches from the middle; None without."""
     pitch = blender.beds()[0].digiclay.layout.pitch
     x, y = blender.on_the_bed(pitch * column, pitch * row)
@@ -42,7 +43,7 @@ def find_pin(blender, column, row):
     return target and [target.pin % 25 - 12, target.pin // 25 - 12]
 
 
-def add(blender, **chosen):
+def add(**chosen):
     blender.call(bpy.ops.object.select_all, action="SELECT")
     blender.call(bpy.ops.object.delete)
     blender.call(bpy.ops.mesh.digital_clay_add, "INVOKE_DEFAULT", True, **chosen)

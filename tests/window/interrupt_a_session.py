@@ -3,8 +3,10 @@
 import addon_utils
 import bpy
 
+from tests.window import driver as blender
 
-def press(blender):
+
+def press():
     tip = blender.fingertip()
     for z in (46.0, 43.0, 40.0, 38.0, 37.0, 37.0, 40.0, 46.0):
         tip.location.z = (z + 8.0) * 1e-3 * blender.part("bridge").SCALE
@@ -13,7 +15,7 @@ def press(blender):
     yield None
 
 
-def edit_in_mid_stroke(blender):
+def edit_in_mid_stroke():
     """Draw a stroke, go to Edit Mode before the fingertip has formed it, stop with Esc, and go on."""
     blender.select(blender.beds()[0])
     yield None
@@ -31,7 +33,7 @@ def edit_in_mid_stroke(blender):
         yield from blender.after(name, kind)
         strokes.append([len(session.strokes) for session in blender.sessions()])
     blender.shot("session_edited")
-    blender.key("TAB", blender.middle())
+    blender.key("TAB")
     yield from blender.rounds()
     yield from blender.start()
     yield from blender.after("edited no more")
@@ -40,12 +42,12 @@ def edit_in_mid_stroke(blender):
     settings.brush = "LOWER"
 
 
-def script(blender):
+def script():
     after = blender.after
     yield from blender.scene_with_bed()
     yield from blender.open_sidebar()
     yield from blender.start()
-    yield from press(blender)
+    yield from press()
     blender.look("formed")
 
     blender.select(blender.fingertip())
@@ -69,7 +71,7 @@ def script(blender):
     blender.window().scene = scene
     yield from after("scene back")
 
-    yield from edit_in_mid_stroke(blender)
+    yield from edit_in_mid_stroke()
 
     blender.beds()[0].scale = (1.0, 1.0, 1.5)
     yield from after("scaled")
@@ -90,10 +92,10 @@ def script(blender):
 
     bpy.ops.ed.undo_push(message="Before")
     blender.call(bpy.ops.object.select_all, action="SELECT")
-    blender.key("DEL", blender.middle())
+    blender.key("DEL")
     yield from blender.stopped()
     blender.look("all deleted")
-    blender.key("Z", blender.middle(), ctrl=True)
+    blender.key("Z", ctrl=True)
     yield 1.0
     blender.look("all back")
     yield from blender.start(blender.beds()[0])

@@ -5,6 +5,8 @@ from pathlib import Path
 import bpy
 import numpy as np
 
+from tests.window import driver as blender
+
 FINE_PINS = True
 #: Panels unfolded in one picture, so that each is seen whole in a window of 800 pixels.
 PICTURES = {
@@ -18,7 +20,7 @@ PICTURES = {
 }
 
 
-def script(blender):
+def script():
     """Look at the tab without a bed, then at each panel of a bed, then at a bed that is to be rebuilt."""
     yield from blender.empty_scene()
     yield from blender.open_sidebar()
@@ -36,15 +38,15 @@ def script(blender):
     with blender.unfolded("stale", "DIGICLAY_PT_device", "layout", "delay") as tab:
         yield from blender.open_sidebar(tab)
         blender.shot("panels_stale")
-    blender.SEEN["rebuild refused"] = refused(blender)
+    blender.SEEN["rebuild refused"] = refused()
     bed.digiclay.layout.pitch = 3.0
     blender.SEEN["rebuilt"] = sorted(blender.call(bpy.ops.digiclay.rebuild))
     blender.SEEN["pins"] = len(blender.beds()[0].data.vertices)
-    yield from own_methods(blender)
-    yield from export(blender)
+    yield from own_methods()
+    yield from export()
 
 
-def own_methods(blender):
+def own_methods():
     """Allow a folder with a method and a mistake, look at its parameters; take the permission back."""
     folder = Path(blender.OUT, "methods")
     blender.part("command_line").run(["new-method", "soft_pad", "--out", str(folder), "--quiet"])
@@ -70,7 +72,7 @@ def own_methods(blender):
     yield from blender.open_sidebar()
 
 
-def refused(blender):
+def refused():
     try:
         blender.call(bpy.ops.digiclay.rebuild)
     except RuntimeError as error:
@@ -78,12 +80,12 @@ def refused(blender):
     return ""
 
 
-def export(blender):
+def export():
     """Form a ridge and a pit on another bed, and take them out of the bed in every way there is."""
     yield from blender.empty_scene()
     yield from blender.add_paper_bed()
     bed = blender.beds()[0]
-    form(blender, bed)
+    form(bed)
     with blender.unfolded("export", "DIGICLAY_PT_features") as tab:
         yield from blender.open_sidebar(tab)
         blender.call(bpy.ops.digiclay.find_features)
@@ -100,20 +102,20 @@ def export(blender):
         bpy.ops.mesh.digital_clay_make, "EXEC_DEFAULT", True, kind="features", skin="smooth"
     )
     yield None
-    blender.key("HOME", blender.middle())
+    blender.key("HOME")
     yield None
     yield None
     blender.shot("export_meshes")
     count = len(bpy.data.objects)
-    blender.key("Z", blender.middle(), ctrl=True)
+    blender.key("Z", ctrl=True)
     yield None
     yield None
     blender.SEEN["undone"] = count - len(bpy.data.objects)
     blender.select(blender.beds()[0])
-    yield from browser(blender)
+    yield from browser()
 
 
-def browser(blender):
+def browser():
     """Export by File > Export: look at the browser's options, change the format, and confirm."""
     blender.call(
         bpy.ops.export_mesh.digital_clay, "INVOKE_DEFAULT", kind="solid", file_format="3mf"
@@ -134,7 +136,7 @@ def browser(blender):
     blender.SEEN["files"] = sorted(path.name for path in blender.OUT.glob("*.3mf"))
 
 
-def form(blender, bed):
+def form(bed):
     instant = blender.part("device.instant").Instant
     cells = blender.part("bridge").read_cells(bed.data)
     x, y = cells["position"].T * 1e3

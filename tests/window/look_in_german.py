@@ -3,6 +3,8 @@
 import blf
 import bpy
 
+from tests.window import driver as blender
+
 #: Languages and scales.
 LOOKS = (("de_DE", 1.0), ("de_DE", 1.5), ("en_US", 1.0))
 #: Panels that are unfolded one after another, and sections of them.
@@ -48,7 +50,7 @@ def list_texts(part):
     return [text for item in part["items"] for text in list_texts(item)]
 
 
-def script(blender):
+def script():
     """Unfold each panel, then those of a session that records; look at all of the overlay."""
     yield from blender.empty_scene()
     preferences = bpy.context.preferences
@@ -71,7 +73,7 @@ def script(blender):
     for kind in blender.part("panels").CLASSES:
         if issubclass(kind, bpy.types.Panel):
             kind.append(measure)
-    yield from unfold(blender, "DIGICLAY_PT_start", "")
+    yield from unfold("DIGICLAY_PT_start", "")
     yield from blender.add_paper_bed()
     bpy.ops.mesh.primitive_cube_add(location=(0.0, 0.0, 3.0))
     bpy.context.object.name = "Cube"  # a word that Blender translates
@@ -80,19 +82,19 @@ def script(blender):
     for language, scale in LOOKS:
         preferences.view.language, preferences.view.ui_scale = language, scale
         for root, sections in PANELS.items():
-            yield from unfold(blender, root, sections)
+            yield from unfold(root, sections)
     preferences.view.language, preferences.view.ui_scale = LOOKS[0]
     blender.beds()[0].digiclay_display.overlay_full = True
     yield from blender.start()
     blender.call(bpy.ops.digiclay.take_record)
     for root in LIVE:
-        yield from unfold(blender, root, "")
+        yield from unfold(root, "")
     yield from blender.open_sidebar()
     blender.part("overlay.views").follow()  # which went with the panels
     blender.shot("german_overlay")
 
 
-def unfold(blender, root, sections):
+def unfold(root, sections):
     """Draw a panel, with some sections, in a tab of its own."""
     with blender.unfolded("german", root, *sections.split()) as tab:
         yield from blender.open_sidebar(tab)

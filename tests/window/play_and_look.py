@@ -5,24 +5,26 @@ from contextlib import contextmanager
 import bpy
 import numpy as np
 
+from tests.window import driver as blender
+
 #: Size of the move gizmo: its arrows end so many pixels from its middle.
 ARROW = 65
 
 
-def script(blender):
+def script():
     yield from blender.scene_with_bed(rows=9, columns=9)
-    yield from pick(blender)
-    yield from escape(blender)
-    yield from units(blender)
+    yield from pick()
+    yield from escape()
+    yield from units()
     yield from blender.scene_with_bed()
-    yield from gizmo(blender)
-    yield from playback(blender)
-    yield from windows(blender)
-    yield from render(blender)
-    yield from views(blender)
+    yield from gizmo()
+    yield from playback()
+    yield from windows()
+    yield from render()
+    yield from views()
 
 
-def gizmo(blender):
+def gizmo():
     yield from blender.start(blender.beds()[0])
     blender.select(blender.fingertip())
     blender.call(bpy.ops.wm.tool_set_by_id, name="builtin.move")
@@ -45,17 +47,17 @@ def gizmo(blender):
         mouse(arrow + step / 6 * (there - here))
         yield None
         if step == 6:  # the pins give way as fast as the machine simulates them
-            yield from blender.until(lambda: lowest(blender) < 39.9)
+            yield from blender.until(lambda: lowest() < 39.9)
         blender.look(f"gizmo {step}")
     blender.shot("play_gizmo")
     mouse(arrow + there - here, "LEFTMOUSE", "RELEASE")
     yield from blender.settle()
-    blender.key("ESC", blender.middle())
+    blender.key("ESC")
     yield 0.5
-    at_rest(blender)
+    at_rest()
 
 
-def playback(blender):
+def playback():
     """Play a keyframed fingertip; the first Esc stops the session, the next one the playback."""
     tip = blender.fingertip()
     for frame, z in ((1, 0.54), (24, 0.44), (48, 0.54)):
@@ -67,29 +69,29 @@ def playback(blender):
     scene.frame_set(1)
     yield from blender.start(blender.beds()[0])
     blender.call(bpy.ops.screen.animation_play)
-    yield from blender.until(lambda: lowest(blender) < 39.5)
+    yield from blender.until(lambda: lowest() < 39.5)
     blender.look("played")
     blender.shot("play_playback")
     for name in ("after one Esc", "after two"):
-        blender.key("ESC", blender.middle())
+        blender.key("ESC")
         yield 1.0
         blender.look(name)
         blender.SEEN[name]["plays"] = bpy.context.screen.is_animation_playing
     blender.fingertip().animation_data_clear()
-    at_rest(blender)
+    at_rest()
 
 
-def lowest(blender):
+def lowest():
     return float(blender.heights().min())
 
 
-def windows(blender):
+def windows():
     """Close a second window in mid-session; then close the one the session was started in."""
     yield from blender.start(blender.beds()[0])
     bpy.ops.wm.window_new()
     yield 1.0
-    yield from closed(blender, "second window closed")
-    blender.key("ESC", blender.middle())
+    yield from closed("second window closed")
+    blender.key("ESC")
     yield 0.5
     bpy.ops.wm.window_new()
     yield 1.0
@@ -100,7 +102,7 @@ def windows(blender):
     blender.look("started in the second")
     blender.call(bpy.ops.digiclay.take_record)
     yield from blender.settle()
-    yield from closed(blender, "its own window closed", lambda: not blender.sessions())
+    yield from closed("its own window closed", lambda: not blender.sessions())
     list_takes = blender.part("recorded.takes").list_takes
     kept = blender.SEEN["kept"] = [[entry.name for entry in list_takes(blender.beds()[0])]]
     for turn in (bpy.ops.ed.undo, bpy.ops.ed.redo):
@@ -109,7 +111,7 @@ def windows(blender):
     kept.append([entry.name for entry in list_takes(blender.beds()[0])])
 
 
-def closed(blender, name, then=lambda: True):
+def closed(name, then=lambda: True):
     with bpy.context.temp_override(window=bpy.context.window_manager.windows[-1]):
         bpy.ops.wm.window_close()
     yield 1.5
@@ -118,7 +120,7 @@ def closed(blender, name, then=lambda: True):
     blender.SEEN[name]["windows"] = len(bpy.context.window_manager.windows)
 
 
-def render(blender):
+def render():
     scene = blender.window().scene
     scene.camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
     scene.collection.objects.link(scene.camera)
@@ -140,14 +142,14 @@ def render(blender):
     yield from blender.after("rendered")
 
 
-def views(blender):
+def views():
     """Press in an orthographic view, and in the top view of a quad view, and see what is written there."""
     blender.call(bpy.ops.wm.tool_set_by_id, name="digiclay.press_tool")
     area, _ = blender.view()
     area.spaces.active.region_3d.view_perspective = "ORTHO"
     # Blender works out the matrices of a view when it draws it.
     yield from blender.until(lambda: area.spaces.active.region_3d.window_matrix[3][2] == 0.0)
-    yield from tapped(blender, blender.pixel(blender.world(-15.0, 9.0)), "orthographic")
+    yield from tapped(blender.pixel(blender.world(-15.0, 9.0)), "orthographic")
     blender.shot("play_orthographic")
     areas = len(blender.window().screen.areas)
     # A quarter of a small view has no room for the overlay.
@@ -155,11 +157,9 @@ def views(blender):
     yield from blender.until(lambda: len(blender.window().screen.areas) < areas)
     blender.part("operators.pin_view").pick_pins(blender.beds()[0], [312])
     blender.call(bpy.ops.screen.region_quadview)
-    yield from blender.until(lambda: top_quarter(blender) is not None)
-    yield from tapped(
-        blender, blender.pixel(blender.world(15.0, -9.0), top_quarter(blender)), "quad view"
-    )
-    with drawn(blender) as marks:
+    yield from blender.until(lambda: top_quarter() is not None)
+    yield from tapped(blender.pixel(blender.world(15.0, -9.0), top_quarter()), "quad view")
+    with drawn() as marks:
         yield from blender.until(lambda: len(marks) == 4)
     blender.SEEN["drawn in the quarters"] = sorted(marks.values())
     area, _ = blender.view()
@@ -177,7 +177,7 @@ def views(blender):
     yield None
 
 
-def top_quarter(blender):
+def top_quarter():
     """Return the quarter of a quad view that looks from straight above, once it has been drawn as such."""
     area, _ = blender.view()
     quarters = [region for region in area.regions if region.type == "WINDOW"]
@@ -190,7 +190,7 @@ def top_quarter(blender):
 
 
 @contextmanager
-def drawn(blender):
+def drawn():
     module = blender.part("overlay.draw")
     draw, seen = module.draw, {}
 
@@ -207,7 +207,7 @@ def drawn(blender):
         module.draw = draw
 
 
-def tapped(blender, at, name):
+def tapped(at, name):
     blender.event("MOUSEMOVE", "NOTHING", at)
     yield 0.3
     blender.event("LEFTMOUSE", "PRESS", at)
@@ -216,16 +216,16 @@ def tapped(blender, at, name):
     blender.look(name)
     blender.event("LEFTMOUSE", "RELEASE", at)
     # Until the gesture has ended it takes the next press for its own.
-    yield from blender.until(lambda: not held(blender))
+    yield from blender.until(lambda: not held())
 
 
-def held(blender):
+def held():
     return "DIGICLAY_OT_press" in [
         operator.bl_idname for operator in blender.window().modal_operators
     ]
 
 
-def at_rest(blender):
+def at_rest():
     blender.select(blender.beds()[0])
     blender.call(bpy.ops.digiclay.session_reset)
     blender.fingertip().location = 0.0, 0.0, 0.54
@@ -236,7 +236,7 @@ def modal():
     return [one.bl_idname for one in bpy.context.window_manager.windows[0].modal_operators]
 
 
-def pick(blender):
+def pick():
     """Begin to pick in one workspace, and go on in another; there, click beside all views as well."""
     picked = blender.part("device.view").picked_pins
     blender.call(bpy.ops.digiclay.pick_pins, "INVOKE_DEFAULT")
@@ -252,19 +252,19 @@ def pick(blender):
     )
     yield from blender.click((timeline.x + timeline.width // 2, timeline.y + timeline.height // 2))
     blender.SEEN["clicked in the timeline"] = list(picked(blender.beds()[0]))
-    blender.key("HOME", blender.middle())
+    blender.key("HOME")
     yield None
     yield from blender.click(blender.on_the_bed(6, -9))
     blender.SEEN["picked elsewhere"] = list(picked(blender.beds()[0]))
     blender.SEEN["told in"] = list(blender.part("operators.action")._TOLD)
-    blender.key("RET", blender.middle())
+    blender.key("RET")
     yield 0.3
     blender.SEEN["after Enter"] = modal(), list(blender.part("operators.action")._TOLD)
     blender.window().workspace = home
     yield None
 
 
-def escape(blender):
+def escape():
     """Press Esc while nobody drives the session: over a 3D view, and over another editor."""
     loop, session_loop = blender.part("live.loop"), blender.part("operators.session_loop")
     # Long enough that the key comes in it for sure; else it is a tenth of a second every 20 s.
@@ -286,7 +286,7 @@ def escape(blender):
     session_loop.EVERY, session_loop.MOMENT = usual
 
 
-def counted(blender, name):
+def counted(name):
     """Count the beds, those with a fingertip, the objects of the scene, those hidden, and the sessions."""
     scene = blender.window().scene
     tips = [blender.part("roles").fingertip_of(bed) for bed in blender.beds()]
@@ -295,22 +295,22 @@ def counted(blender, name):
     blender.SEEN[name] = [len(tips), whole, len(scene.objects), hidden, len(blender.sessions())]
 
 
-def looked(blender, name):
+def looked(name):
     watch = blender.part("device.part_watch")
     yield 1.0
     yield from blender.until(lambda: not bpy.app.timers.is_registered(watch._repair_when_idle))
     if blender.sessions():
         yield from blender.until(lambda: not all(one.stale for one in blender.sessions()))
     yield 0.5
-    counted(blender, name)
+    counted(name)
 
 
-def pressed(blender, name, kind, **held):
-    blender.key(kind, blender.middle(), **held)
-    yield from looked(blender, name)
+def pressed(name, kind, **held):
+    blender.key(kind, **held)
+    yield from looked(name)
 
 
-def changed_by_f9(blender, name):
+def changed_by_f9(name):
     """Click on "Linked" in the panel of a copy that F9 opens beside the mouse, and leave the panel."""
     x, y = blender.middle()
     blender.event("MOUSEMOVE", "NOTHING", (x, y))
@@ -318,51 +318,51 @@ def changed_by_f9(blender, name):
     blender.key("F9", (x, y))
     yield 0.5
     yield from blender.click((x + 137, y - 51))
-    yield from looked(blender, name)
+    yield from looked(name)
     blender.SEEN["linked by F9"] = len({bed.data.name for bed in blender.beds()}) == 1
     for at in ((x, y + 60), (x - 250, y + 150)):
         blender.event("MOUSEMOVE", "NOTHING", at)
         yield 0.3
 
 
-def units(blender):
+def units():
     """Delete a bed, undo and redo that; drag a copy off, undo and redo that; hide; delete in mid-session."""
     blender.event("MOUSEMOVE", "NOTHING", blender.middle())
     blender.select(blender.beds()[0])
     yield 0.5
-    counted(blender, "one bed")
-    yield from pressed(blender, "deleted", "DEL")
-    yield from pressed(blender, "delete undone", "Z", ctrl=True)
-    yield from pressed(blender, "delete redone", "Z", ctrl=True, shift=True)
-    yield from pressed(blender, "delete undone again", "Z", ctrl=True)
+    counted("one bed")
+    yield from pressed("deleted", "DEL")
+    yield from pressed("delete undone", "Z", ctrl=True)
+    yield from pressed("delete redone", "Z", ctrl=True, shift=True)
+    yield from pressed("delete undone again", "Z", ctrl=True)
     blender.select(blender.beds()[0])
-    blender.key("D", blender.middle(), shift=True)
+    blender.key("D", shift=True)
     yield 1.0
-    counted(blender, "copy in hand")
+    counted("copy in hand")
     x, y = blender.middle()
     blender.event("MOUSEMOVE", "NOTHING", (x + 120, y))
     yield 0.5
     blender.key("LEFTMOUSE", (x + 120, y))
-    yield from looked(blender, "copied")
-    yield from changed_by_f9(blender, "copy changed by F9")
-    yield from pressed(blender, "copy undone", "Z", ctrl=True)
-    yield from pressed(blender, "copy redone", "Z", ctrl=True, shift=True)
+    yield from looked("copied")
+    yield from changed_by_f9("copy changed by F9")
+    yield from pressed("copy undone", "Z", ctrl=True)
+    yield from pressed("copy redone", "Z", ctrl=True, shift=True)
     blender.select(blender.beds()[0])
-    yield from pressed(blender, "hidden", "H")
-    yield from pressed(blender, "shown", "H", alt=True)
+    yield from pressed("hidden", "H")
+    yield from pressed("shown", "H", alt=True)
     yield from blender.start(blender.beds()[1])
-    counted(blender, "session")
+    counted("session")
     # A bed with a session is not selected, so that no outline encloses its pins.
     blender.select(blender.beds()[1])
-    yield from pressed(blender, "deleted in mid-session", "DEL")
-    yield from pressed(blender, "undone after it", "Z", ctrl=True)
+    yield from pressed("deleted in mid-session", "DEL")
+    yield from pressed("undone after it", "Z", ctrl=True)
     blender.call(bpy.ops.object.select_all, action="SELECT")
     bpy.ops.ed.undo_push(message="Select")
-    blender.key("D", blender.middle(), alt=True)
+    blender.key("D", alt=True)
     yield 1.0
-    blender.key("RIGHTMOUSE", blender.middle())
-    yield from looked(blender, "all copied")
+    blender.key("RIGHTMOUSE")
+    yield from looked("all copied")
     blender.call(bpy.ops.object.select_all, action="SELECT")
     bpy.ops.ed.undo_push(message="Select")
-    yield from pressed(blender, "all deleted", "DEL")
-    yield from pressed(blender, "all back", "Z", ctrl=True)
+    yield from pressed("all deleted", "DEL")
+    yield from pressed("all back", "Z", ctrl=True)

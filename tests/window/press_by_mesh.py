@@ -2,8 +2,10 @@
 
 import bpy
 
+from tests.window import driver as blender
 
-def script(blender):
+
+def script():
     yield from blender.empty_scene()
     yield from blender.add_paper_bed()
     origin = blender.beds()[0].location
@@ -14,7 +16,7 @@ def script(blender):
     yield 0.5
     blender.SEEN["added"] = sorted(blender.call(bpy.ops.digiclay.add_presser))
     yield from blender.open_sidebar()
-    blender.key("HOME", blender.middle())
+    blender.key("HOME")
     yield None
     yield from blender.start(bpy.data.objects["Suzanne"])
     yield from blender.grab((0, 0, -17), "Z", look_as="pressing")

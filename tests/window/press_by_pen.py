@@ -7,6 +7,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 
+from tests.window import driver as blender
 from tests.window.hand_strokes import finish, note, on_the_screen, prepare
 
 HAND = Path(__file__).parent / "tablet" / "pen_hand.py"
@@ -19,8 +20,8 @@ STROKES = {
 HALF = 12.0
 
 
-def draw(blender, row, pressure, right, near):
-    places = (on_the_screen(blender, float(x), row) for x in np.linspace(-HALF, HALF, 31))
+def draw(row, pressure, right, near):
+    places = (on_the_screen(float(x), row) for x in np.linspace(-HALF, HALF, 31))
     (x, y), *later = places
     words = [
         f"to {x} {y} 0 {right} {near}",
@@ -33,7 +34,7 @@ def draw(blender, row, pressure, right, near):
     return subprocess.Popen([sys.executable, str(HAND), *words, "up"])
 
 
-def pressed(blender, since):
+def pressed(since):
     """Return how high pins are where the finger was lowest since a period, mm, and its turns there."""
     (session,) = blender.sessions()
     poses = session.recording.path[since:, 0]
@@ -43,15 +44,15 @@ def pressed(blender, since):
     return {"formed": 1e3 * float(session.state.row(0)[cell][0]), "inside": lowest[:, 3:].tolist()}
 
 
-def script(blender):
-    yield from prepare(blender, "TOP")
+def script():
+    yield from prepare("TOP")
     yield from blender.start()
     blender.call(bpy.ops.digiclay.take_record)
     for name, stroke in STROKES.items():
         (session,) = blender.sessions()
         since = len(session.recording.path)
-        yield from finish(blender, draw(blender, *stroke))
-        note(blender, name)
+        yield from finish(draw(*stroke))
+        note(name)
         (session,) = blender.sessions()
-        blender.SEEN[name] |= {"outside": session.pose[3:].tolist(), **pressed(blender, since)}
+        blender.SEEN[name] |= {"outside": session.pose[3:].tolist(), **pressed(since)}
     blender.shot("pen")

@@ -5,6 +5,7 @@ import time
 import bpy
 import numpy as np
 
+from tests.window import driver as blender
 from tests.window.hand_strokes import (
     act,
     brush,
@@ -36,9 +37,9 @@ TIMED = {
 }  # fmt: skip
 
 
-def script(blender):
+def script():
     """Do what a hand does."""
-    yield from prepare(blender, "TOP", bed="paper")
+    yield from prepare("TOP", bed="paper")
     bed = blender.beds()[0]
     bed.rotation_euler[2], bed.location[0], bed.location[1] = 0.4, 0.3, -0.2
     blender.evaluate()
@@ -47,9 +48,9 @@ def script(blender):
     yield from blender.rounds()
     blender.shot("symmetry_begun")
     # The first press starts the session.
-    yield from act(blender, to(on_the_screen(blender, 0.0, 0.0), 0.3), "click 1 sleep 0.3")
+    yield from act(to(on_the_screen(0.0, 0.0), 0.3), "click 1 sleep 0.3")
     yield from blender.until(lambda: bool(blender.sessions()))
-    settings = brush(blender)
+    settings = brush()
     settings.radial = 4
     for name, symmetry, way in (
         ("one", "NONE", APART),
@@ -60,34 +61,34 @@ def script(blender):
         ("along alone", "NONE", ALONG),
         ("along", "X", ALONG),
     ):
-        yield from begin(blender)
+        yield from begin()
         settings.symmetry = symmetry
-        process = line(blender, *way, 0.3, 125)
-        yield from blender.until(lambda: is_pressing(blender))
+        process = line(*way, 0.3, 125)
+        yield from blender.until(lambda: is_pressing())
         blender.shot(f"symmetry_{name}")
-        yield from finish(blender, process)
-        write_down(blender, name)
+        yield from finish(process)
+        write_down(name)
     blender.shot("symmetry_formed")
-    yield from impatient(blender)
+    yield from impatient()
 
 
-def is_pressing(blender):
+def is_pressing():
     """Tell whether a fingertip is in the pins, or the stroke is done already."""
     (session,) = blender.sessions()
     return not session.strokes or bool((session.state.finger_forces() > 0.01).any())
 
 
-def begin(blender):
+def begin():
     """Have a bed at rest, and record from now on."""
-    yield from reset(blender)
+    yield from reset()
     bpy.ops.ed.undo_push(message="Reset")
     blender.call(bpy.ops.digiclay.take_record)
     yield from blender.settle()
 
 
-def write_down(blender, name):
+def write_down(name):
     """Note the heights, the periods of the last stroke up to the last order, and the recorded fingertips."""
-    note(blender, name)
+    note(name)
     (session,) = blender.sessions()
     recording = session.recording
     ordered = np.flatnonzero(recording.orders.rows.any(axis=1))
@@ -98,58 +99,58 @@ def write_down(blender, name):
     }
 
 
-def impatient(blender):
+def impatient():
     """Draw three strokes at once, one of another symmetry; undo the last; Esc in the middle of a fourth."""
-    settings = brush(blender)
-    yield from begin(blender)
+    settings = brush()
+    yield from begin()
     settings.symmetry = "RADIAL"
-    first = line(blender, *APART, 0.2, 125)
+    first = line(*APART, 0.2, 125)
     yield from blender.until(lambda: first.poll() is not None)
     settings.symmetry = "Y"
-    second = line(blender, (-27.0, 15.0), (-12.0, 15.0), 0.2, 125)
+    second = line((-27.0, 15.0), (-12.0, 15.0), 0.2, 125)
     yield from blender.until(lambda: second.poll() is not None)
     settings.symmetry = "X"
-    yield from finish(blender, line(blender, (6.0, 30.0), (15.0, 30.0), 0.2, 125))
-    note(blender, "three")
-    yield from act(blender, to(on_the_screen(blender, 0.0, 0.0)), "key ctrl+z")
-    note(blender, "two")
+    yield from finish(line((6.0, 30.0), (15.0, 30.0), 0.2, 125))
+    note("three")
+    yield from act(to(on_the_screen(0.0, 0.0)), "key ctrl+z")
+    note("two")
     settings.symmetry = "RADIAL"
-    process = line(blender, (9.0, 9.0), (15.0, 9.0), 0.2, 125, last="sleep 2")
+    process = line((9.0, 9.0), (15.0, 9.0), 0.2, 125, last="sleep 2")
     yield from blender.until(lambda: any(one.system.fingers == 4 for one in blender.sessions()))
-    yield from act(blender, "key Escape sleep 0.2")
+    yield from act("key Escape sleep 0.2")
     hand("mouseup 1")
-    yield from finish(blender, process)
-    note(blender, "escaped")
+    yield from finish(process)
+    note("escaped")
     # The recording is kept, replayed and baked.
     blender.call(bpy.ops.digiclay.take_keep)
     yield from blender.settle()
     (session,) = blender.sessions()
     blender.SEEN["at the end"] = session.poses.shape
-    yield from act(blender, "key Escape")
+    yield from act("key Escape")
     yield from blender.stopped()
     bed = blender.beds()[0]
     take = blender.part("recorded.takes").read(bed)
     blender.SEEN["take"] = [max(take.fingers), min(take.fingers)]
     blender.call(bpy.ops.digiclay.take_replay)  # in steps of its own
-    yield from done(blender, hand("sleep 0.1"))
-    note(blender, "replayed")
-    yield from time_images(blender)
+    yield from done(hand("sleep 0.1"))
+    note("replayed")
+    yield from time_images()
 
 
-def time_images(blender):
+def time_images():
     """Note the periods of strokes with several images, and the seconds until all is formed."""
-    yield from prepare(blender, "TOP", bed="design")
-    yield from act(blender, to(on_the_screen(blender, 0.0, 0.0), 0.3), "click 1 sleep 0.3")
+    yield from prepare("TOP", bed="design")
+    yield from act(to(on_the_screen(0.0, 0.0), 0.3), "click 1 sleep 0.3")
     yield from blender.until(lambda: bool(blender.sessions()))
-    settings, timed = brush(blender), {}
+    settings, timed = brush(), {}
     settings.depth = 4.0
     for name, (symmetry, count, way) in TIMED.items():
-        yield from reset(blender)
+        yield from reset()
         settings.symmetry, settings.radial = symmetry, count
-        begun, process = time.perf_counter(), line(blender, *way, 0.3, 125)
+        begun, process = time.perf_counter(), line(*way, 0.3, 125)
         yield from blender.until(lambda: any(one.strokes for one in blender.sessions()), 0.01)
         yield from blender.until(lambda: not any(one.strokes for one in blender.sessions()), 0.01)
         (session,), seconds = blender.sessions(), time.perf_counter() - begun
         timed[name] = session.state.period - session.gestures[-1].period, seconds
-        yield from finish(blender, process)
+        yield from finish(process)
     blender.SEEN["timed"] = timed

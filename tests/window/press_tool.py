@@ -6,13 +6,15 @@ import addon_utils
 import bpy
 import numpy as np
 
+from tests.window import driver as blender
+
 #: The guide's pictures show the pins as a user sees them.
 FINE_PINS = "DIGICLAY_SCREENSHOTS" in os.environ
 #: A finger that is on its way moves in each of so many ticks of its session.
 TICKS = 3
 
 
-def drag(blender, way, pause=0.3):
+def drag(way, pause=0.3):
     """Hold the mouse along a way over the bed, mm, at its start until the finger is there; it stays down."""
     for step, (x, y) in enumerate(way):
         at = blender.on_the_bed(x, y)
@@ -20,12 +22,12 @@ def drag(blender, way, pause=0.3):
         yield 0.15
         if step == 0:
             blender.event("LEFTMOUSE", "PRESS", at)
-            yield from come(blender)
+            yield from come()
         yield pause
-    yield from come(blender)
+    yield from come()
 
 
-def come(blender):
+def come():
     """Wait until the finger has come to rest: it stays where it is while the session ticks on.
 
     By time alone a slow machine, on which nothing happens for a second, would be taken for a finger
@@ -45,12 +47,12 @@ def come(blender):
     raise AssertionError("The finger does not come to rest")
 
 
-def let_go(blender, x, y):
+def let_go(x, y):
     blender.event("LEFTMOUSE", "RELEASE", blender.on_the_bed(x, y))
-    yield from come(blender)
+    yield from come()
 
 
-def note(blender, name):
+def note(name):
     blender.look(name)
     tip = blender.fingertip()
     blender.SEEN[name] |= {
@@ -64,57 +66,57 @@ def note(blender, name):
     }
 
 
-def script(blender):
+def script():
     yield from blender.empty_scene()
     yield from blender.add_paper_bed()
     # Software GL draws a frame or two a second; in between the session is to catch up.
     blender.preferences().most_periods = 100
     blender.call(bpy.ops.wm.tool_set_by_id, name="digiclay.press_tool")
     yield None
-    note(blender, "added")
+    note("added")
     # An outline about 625 pins is what takes software GL longest.
     blender.call(bpy.ops.object.select_all, action="DESELECT")
     blender.event("MOUSEMOVE", "NOTHING", blender.on_the_bed(-15, 5))
     yield 1.0
     blender.shot("press_cursor")
-    yield from edges(blender)
-    yield from keys(blender)
+    yield from edges()
+    yield from keys()
 
-    yield from drag(blender, [(-18.0 + 6.0 * step, 6.0) for step in range(0, 7, 2)])
-    note(blender, "pressed")
+    yield from drag([(-18.0 + 6.0 * step, 6.0) for step in range(0, 7, 2)])
+    note("pressed")
     blender.shot("press_held")
-    yield from let_go(blender, 18.0, 6.0)
-    note(blender, "let go")
-    yield from depths(blender)
-    yield from shown(blender)
-    yield from ended(blender)
-    yield from disabled(blender)
+    yield from let_go(18.0, 6.0)
+    note("let go")
+    yield from depths()
+    yield from shown()
+    yield from ended()
+    yield from disabled()
 
 
-def said(blender, name):
+def said(name):
     """Write down what is shown beside the cursor."""
     chosen = blender.part("press.brush").tool_settings(bpy.context)
     blender.SEEN[name] = blender.part("press.tool").describe(blender.beds()[0], chosen)
 
 
-def keys(blender):
+def keys():
     """Hold Ctrl and Shift over the bed, with a hand at rest, and let go of Ctrl where nobody sees it."""
     at = blender.on_the_bed(-15, 5)
     for name, held in (("LEFT_CTRL", {"ctrl": True}), ("RIGHT_SHIFT", {"shift": True})):
         blender.event(name, "PRESS", at, **held)
         yield from blender.rounds()
-        said(blender, f"{name} held")
+        said(f"{name} held")
         blender.event(name, "RELEASE", at)
         yield from blender.rounds()
-        said(blender, f"{name} let go")
+        said(f"{name} let go")
     blender.event("LEFT_CTRL", "PRESS", at, ctrl=True)
     yield from blender.rounds()
     blender.event("MOUSEMOVE", "NOTHING", (at[0] + 1, at[1]))
     yield from blender.rounds()
-    said(blender, "moved without Ctrl")
+    said("moved without Ctrl")
 
 
-def edges(blender):
+def edges():
     """Move the mouse into corners of a view full of pins; find where the text beside it is drawn."""
     area, region = blender.view()
     looking = area.spaces.active.region_3d
@@ -145,28 +147,28 @@ def edges(blender):
     yield 0.5
 
 
-def depths(blender):
-    yield from drag(blender, [(-20.0, -20.0)])
-    note(blender, "before the wheel")
+def depths():
+    yield from drag([(-20.0, -20.0)])
+    note("before the wheel")
     at = blender.on_the_bed(-20, -20)
     for _ in range(8):
         blender.event("WHEELDOWNMOUSE", "PRESS", at, ctrl=True)
         yield 0.1
-    yield from come(blender)
+    yield from come()
     # Moves that Blender makes up itself have the keys that are held.
     blender.event("LEFT_CTRL", "PRESS", at, ctrl=True)
     for step in range(1, 5):
         blender.event("MOUSEMOVE", "NOTHING", (at[0], at[1] + 20 * step), ctrl=True)
         yield 0.1
-    yield from come(blender)
-    note(blender, "after Ctrl")
-    said(blender, "deeper")
+    yield from come()
+    note("after Ctrl")
+    said("deeper")
     blender.event("LEFT_CTRL", "RELEASE", at)
     blender.key("ESC", at)
     yield from blender.settle()
     blender.event("LEFTMOUSE", "RELEASE", at)
     yield from blender.settle()
-    said(blender, "the next one")
+    said("the next one")
     blender.key("P", at)  # pauses: the stroke stays in the queue
     yield from blender.until(lambda: blender.session().paused)
     blender.event("LEFT_CTRL", "PRESS", at, ctrl=True)
@@ -175,7 +177,7 @@ def depths(blender):
     blender.event("LEFTMOUSE", "RELEASE", at, ctrl=True)
     blender.event("LEFT_CTRL", "RELEASE", at)
     yield from blender.rounds()
-    said(blender, "while Raise forms")
+    said("while Raise forms")
     blender.key("Z", at, ctrl=True)
     yield from blender.settle()
     blender.key("P", at)
@@ -183,7 +185,7 @@ def depths(blender):
     yield from blender.settle()
 
 
-def disabled(blender):
+def disabled():
     """Disable the extension with the tool in hand and the mouse over the bed, and go on moving it."""
     yield from blender.add_paper_bed()
     tools, at = blender.window().workspace.tools, blender.on_the_bed(-15, 5)
@@ -199,15 +201,15 @@ def disabled(blender):
     addon_utils.enable(blender.EXTENSION)  # for what comes after the script
 
 
-def shown(blender):
+def shown():
     blender.window().view_layer.objects.active = blender.beds()[0]
     blender.call(bpy.ops.digiclay.pick_pins, "INVOKE_DEFAULT")
     yield None
     for x in (-12.0, 0.0, 12.0):
         yield from blender.click(blender.on_the_bed(x, -27))
-    blender.key("RET", blender.middle())
+    blender.key("RET")
     yield 0.5
-    note(blender, "picked")
+    note("picked")
     chosen = bpy.context.preferences.addons[blender.EXTENSION].preferences
     chosen.overlay_corner = "bottom_right"  # the finger is on the left
     display = blender.beds()[0].digiclay_display
@@ -215,11 +217,11 @@ def shown(blender):
     # The bed makes room for all of the overlay: the hand goes where it then is seen.
     display.form, display.color, display.arrows, display.overlay_full = "pins", "force", True, True
     yield 0.5
-    yield from drag(blender, [(-12.0 + 4.0 * step, -24.0) for step in range(0, 5, 2)])
+    yield from drag([(-12.0 + 4.0 * step, -24.0) for step in range(0, 5, 2)])
     yield from blender.settle()
-    note(blender, "forces shown")
+    note("forces shown")
     blender.shot("guide_forces")
-    yield from let_go(blender, 4.0, -24.0)
+    yield from let_go(4.0, -24.0)
     preferences = bpy.context.preferences
     theme = bpy.utils.preset_paths("interface_theme")[0]
     bpy.ops.script.execute_preset(
@@ -235,19 +237,19 @@ def shown(blender):
     preferences.view.ui_scale = 1.0
     display.overlay = False
     yield from blender.settle()
-    note(blender, "overlay off")
+    note("overlay off")
     display.overlay = True
     yield from blender.settle()
-    note(blender, "overlay on")
+    note("overlay on")
 
 
-def ended(blender):
+def ended():
     """End the session; then a press starts it anew, and losing the bed under the mouse ends the gesture."""
-    blender.key("ESC", blender.middle())
+    blender.key("ESC")
     yield from blender.stopped()
-    note(blender, "ended")
-    yield from drag(blender, [(20.0, 20.0)])
-    note(blender, "started anew")
+    note("ended")
+    yield from drag([(20.0, 20.0)])
+    note("started anew")
     bpy.data.objects.remove(blender.beds()[0])
     yield from blender.stopped()
     blender.look("bed deleted")

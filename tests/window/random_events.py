@@ -5,6 +5,8 @@ import random
 import bpy
 import numpy as np
 
+from tests.window import driver as blender
+
 EVENTS = 150
 #: After so many of them a session is started where none runs any more.
 REVIVED = 4
@@ -27,24 +29,24 @@ KEYS = {
 
 
 class Events:
-    def __init__(self, blender, source):
-        self.blender, self.source = blender, source
+    def __init__(self, source):
+        self.source = source
 
     @property
     def tip(self):
-        found = [self.blender.fingertip(number) for number in range(len(self.blender.beds()))]
+        found = [blender.fingertip(number) for number in range(len(blender.beds()))]
         tips = [tip for tip in found if tip is not None]
         return self.source.choice(tips) if tips else None
 
     def happen(self, name):
         if name in KEYS:
             kind, modifiers = KEYS[name]
-            self.blender.key(kind, self.somewhere(), **modifiers)
+            blender.key(kind, self.somewhere(), **modifiers)
         else:
             getattr(self, name)()
 
     def somewhere(self):
-        _, region = self.blender.view()
+        _, region = blender.view()
         pick = self.source.random
         x = region.x + int(region.width * (0.2 + 0.5 * pick()))
         return x, region.y + int(region.height * (0.2 + 0.6 * pick()))
@@ -60,90 +62,90 @@ class Events:
 
     def grab(self):
         at = self.somewhere()
-        self.blender.key("G", at)
+        blender.key("G", at)
         for _ in range(3):
             at = self.somewhere()
-            self.blender.event("MOUSEMOVE", "NOTHING", at)
-        self.blender.key(self.source.choice(["LEFTMOUSE", "RIGHTMOUSE", "ESC", "RET"]), at)
+            blender.event("MOUSEMOVE", "NOTHING", at)
+        blender.key(self.source.choice(["LEFTMOUSE", "RIGHTMOUSE", "ESC", "RET"]), at)
 
     def select(self):
-        things = list(self.blender.window().view_layer.objects)
+        things = list(blender.window().view_layer.objects)
         if things and bpy.context.mode == "OBJECT":
-            self.blender.select(self.source.choice(things))
+            blender.select(self.source.choice(things))
 
     def add(self):
-        if len(self.blender.beds()) < 3 and bpy.context.mode == "OBJECT":
+        if len(blender.beds()) < 3 and bpy.context.mode == "OBJECT":
             self.operator(bpy.ops.mesh.digital_clay_add, rows=11, columns=11)
 
     def operator(self, operator, *how, **properties):
-        area, region = self.blender.view()
-        with bpy.context.temp_override(window=self.blender.window(), area=area, region=region):
+        area, region = blender.view()
+        with bpy.context.temp_override(window=blender.window(), area=area, region=region):
             willing = operator.poll()
         if willing:
             try:
                 # With an undo step: data that come and go without one crash Blender at the next
                 # undo.
-                self.blender.call(operator, *(how or ("EXEC_DEFAULT",)), True, **properties)
+                blender.call(operator, *(how or ("EXEC_DEFAULT",)), True, **properties)
             except RuntimeError as error:
                 if not str(error).startswith("Error: "):  # what an operator reports is no fault
                     raise
 
     def start(self):
-        beds = self.blender.beds()
+        beds = blender.beds()
         if beds and bpy.context.mode == "OBJECT":
-            self.blender.select(self.source.choice(beds))
+            blender.select(self.source.choice(beds))
         self.operator(bpy.ops.digiclay.session, "INVOKE_DEFAULT")
 
     def revive(self):
         """Have a session run again: what happens to none tells nothing about it."""
-        if self.blender.sessions():
+        if blender.sessions():
             return
         if bpy.context.mode != "OBJECT":
             self.operator(bpy.ops.object.mode_set, mode="OBJECT")
-        for bed in self.blender.beds():
+        for bed in blender.beds():
             bed.scale = 1, 1, 1
         self.add()
         self.start()
 
     def method(self):
         methods = ["virtual_master", "cell_states", "plastic", "push_pull"]
-        for bed in self.blender.beds():
+        for bed in blender.beds():
             bed.digiclay.method = self.source.choice(methods)
 
     def parameter(self):
-        for bed in self.blender.beds():
+        for bed in blender.beds():
             bed.digiclay.simulation.control_period = self.source.choice([5.0, 10.0])
 
     def scale(self):
-        for bed in self.blender.beds():
+        for bed in blender.beds():
             bed.scale = self.source.choice([(1, 1, 1), (1, 1, 1), (2, 2, 2), (1, 2, 1), (0, 0, 0)])
 
     def workspace(self):
         name = self.source.choice(["Layout", "Layout", "Animation", "Modeling"])
-        self.blender.window().workspace = bpy.data.workspaces[name]
+        blender.window().workspace = bpy.data.workspaces[name]
 
     def scene(self):
         if len(bpy.data.scenes) < 2:
             bpy.data.scenes.new("Other")
             bpy.ops.ed.undo_push(message="Scene")
-        self.blender.window().scene = self.source.choice([*bpy.data.scenes, bpy.data.scenes[0]])
+        blender.window().scene = self.source.choice([*bpy.data.scenes, bpy.data.scenes[0]])
 
     def play(self):
         self.operator(bpy.ops.screen.animation_play)
 
     def duplicate(self):
-        if bpy.context.mode == "OBJECT" and len(self.blender.beds()) < 3:
+        if bpy.context.mode == "OBJECT" and len(blender.beds()) < 3:
             self.operator(bpy.ops.object.duplicate, linked=self.source.random() < 0.5)
 
     def save(self):
-        bpy.ops.wm.save_as_mainfile(filepath=str(self.blender.OUT / "random.blend"))
+        bpy.ops.wm.save_as_mainfile(filepath=str(blender.OUT / "random.blend"))
 
     def load(self):
-        if (self.blender.OUT / "random.blend").is_file():
-            bpy.ops.wm.open_mainfile(filepath=str(self.blender.OUT / "random.blend"))
+        if (blender.OUT / "random.blend").is_file():
+            bpy.ops.wm.open_mainfile(filepath=str(blender.OUT / "random.blend"))
 
 
-def check(blender):
+def check():
     for session in blender.sessions():
         state = blender.part("core.session.snapshot").load(session.system, session.snapshot)
         height = state.row(0)
@@ -158,12 +160,12 @@ def check(blender):
             assert np.isfinite(blender.part("bridge").read_cells(bed.data)["height"]).all()
 
 
-def script(blender):
+def script():
     """Do random things, checking after each; then form a bed in peace."""
     yield from blender.scene_with_bed(rows=15, columns=15)
     blender.call(bpy.ops.digiclay.session, "INVOKE_DEFAULT")
     source = random.Random(20)
-    events = Events(blender, source)
+    events = Events(source)
     names = source.choices(list(CHOICES), weights=list(CHOICES.values()), k=EVENTS)
     done = []
     blender.SEEN["done"] = done
@@ -174,13 +176,13 @@ def script(blender):
             events.revive()
         events.happen(name)
         yield 0.1
-        check(blender)
+        check()
         live += bool(blender.sessions())
     blender.SEEN["live"] = live
     blender.shot("session_random")
 
     # Whatever state that was, somebody who goes on from it can sculpt.
-    blender.key("ESC", blender.middle())
+    blender.key("ESC")
     yield 0.5
     if bpy.context.screen.is_animation_playing:
         blender.call(bpy.ops.screen.animation_cancel)

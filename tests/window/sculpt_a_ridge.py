@@ -3,27 +3,29 @@
 import bpy
 import numpy as np
 
+from tests.window import driver as blender
 
-def script(blender):
+
+def script():
     for step in (valley, shape, several_fingers):
-        yield from step(blender)
+        yield from step()
         bpy.ops.wm.read_homefile(use_empty=True)
         yield 1.0
 
 
-def valley(blender):
+def valley():
     after, undo = blender.after, blender.undo
     yield from blender.empty_scene()
     yield from blender.add_paper_bed()
     yield from blender.open_sidebar()
-    blender.key("HOME", blender.middle())
+    blender.key("HOME")
     yield None
     blender.look("added")
     blender.select(blender.fingertip())
     yield None
     yield from blender.grab((9, 0, 0), "X", steps=2)
     blender.look("dragged")
-    blender.key("Z", blender.middle(), ctrl=True)
+    blender.key("Z", ctrl=True)
     yield 0.8
     blender.look("drag undone")
     yield from blender.start()
@@ -62,16 +64,16 @@ def valley(blender):
     yield from after("stopped", "ESC")
     blender.shot("session_stopped")
     for _ in range(3):
-        blender.key("Z", blender.middle(), ctrl=True)
+        blender.key("Z", ctrl=True)
         yield 0.6
 
 
-def shape(blender):
+def shape():
     """Display a sample shape, press the fingertip into it live, and keep what was formed."""
     yield from blender.empty_scene()
     yield from blender.add_paper_bed()
     yield from blender.open_sidebar()
-    blender.key("HOME", blender.middle())
+    blender.key("HOME")
     yield None
     blender.select(blender.beds()[0])
     blender.look("flat")
@@ -81,7 +83,7 @@ def shape(blender):
     blender.call(bpy.ops.wm.call_panel, "INVOKE_DEFAULT", name="DIGICLAY_PT_shapes")
     yield None
     blender.shot("shape_panel")
-    blender.key("ESC", blender.middle())
+    blender.key("ESC")
     yield None
 
     yield from blender.start(blender.fingertip())
@@ -91,7 +93,7 @@ def shape(blender):
     blender.shot("shape_pressed")
     yield from blender.grab((0, 0, 25), "Z")
     yield from blender.settle()
-    blender.key("ESC", blender.middle())
+    blender.key("ESC")
     yield None
     yield None
     blender.look("formed shape")
@@ -104,30 +106,30 @@ def shape(blender):
     blender.SEEN["mesh"] = (
         max(vertex.co.z for vertex in mesh.data.vertices) / blender.part("bridge").SCALE
     )
-    blender.key("Z", blender.middle(), ctrl=True)
+    blender.key("Z", ctrl=True)
     yield None
 
-    blender.key("Z", blender.middle(), ctrl=True)
+    blender.key("Z", ctrl=True)
     yield None
     blender.SEEN["keeping undone"] = blender.beds()[0].digiclay.shape.file
 
     blender.call(bpy.ops.wm.call_menu, "INVOKE_DEFAULT", name="DIGICLAY_MT_samples")
     yield None
     blender.shot("sample_menu")
-    blender.key("ESC", blender.middle())
+    blender.key("ESC")
     yield None
     blender.call(bpy.ops.digiclay.add_sample, "EXEC_DEFAULT", True, sample="session:signature")
     yield None
-    blender.key("HOME", blender.middle())
+    blender.key("HOME")
     yield None
     blender.shot("sample_signature")
     blender.SEEN["beds"] = len(blender.beds())
-    blender.key("Z", blender.middle(), ctrl=True)
+    blender.key("Z", ctrl=True)
     yield None
     blender.SEEN["beds after undo"] = len(blender.beds())
 
 
-def note(blender, name):
+def note(name):
     session, roles = blender.sessions()[0], blender.part("roles")
     bed = blender.beds()[0]
     blender.SEEN[name] = {
@@ -139,7 +141,7 @@ def note(blender, name):
     }
 
 
-def list_hidden(blender):
+def list_hidden():
     """Take a picture; return which fingertips the overlay in it covers."""
     module, (_, region), pictures = blender.part("overlay.draw"), blender.view(), []
     draw = module.draw
@@ -153,44 +155,44 @@ def list_hidden(blender):
     return [number for (number, _), covered in zip(tips, inside, strict=True) if covered]
 
 
-def several_fingers(blender):
+def several_fingers():
     """Press two fingertips, then a hand by its palm; delete it, undo that, copy a fingertip."""
     yield from blender.scene_with_bed(bed="paper")
     yield from blender.open_sidebar()
     yield from blender.start()
     blender.call(bpy.ops.digiclay.add_fingertip)
     yield from blender.settle()
-    note(blender, "two")
+    note("two")
     roles = blender.part("roles")
     for number, x in ((1, -14.0), (2, 14.0)):
         tip = roles.fingertips_of(blender.beds()[0])[number]
         tip.location.x, tip.location.y = 1e-2 * x, 0.0
         blender.select(tip)
         yield from blender.grab((0.0, 0.0, -9.0), "Z", periods=4)
-    note(blender, "two pressed")
+    note("two pressed")
     blender.shot("two")
     blender.select(blender.beds()[0])
     blender.beds()[0].digiclay_display.overlay_full = True
     blender.call(bpy.ops.digiclay.add_hand)
     yield from blender.settle()
-    note(blender, "hand")
-    blender.SEEN["hand"]["hidden"] = list_hidden(blender)
+    note("hand")
+    blender.SEEN["hand"]["hidden"] = list_hidden()
     yield from blender.grab((0.0, 0.0, -9.0), "Z", periods=4)
-    note(blender, "hand pressed")
+    note("hand pressed")
     blender.shot("hand")
     yield from blender.grab((0.0, 0.0, 12.0), "Z", periods=4)
-    blender.key("DEL", blender.middle())
+    blender.key("DEL")
     yield from blender.settle(10)
-    note(blender, "deleted")
+    note("deleted")
     yield from blender.undo("undone")
     yield from blender.settle(10)
-    note(blender, "hand again")
+    note("hand again")
     blender.select(roles.fingertips_of(blender.beds()[0])[4])
-    blender.key("D", blender.middle(), shift=True)
+    blender.key("D", shift=True)
     yield 0.5
-    blender.key("RET", blender.middle())
+    blender.key("RET")
     yield from blender.settle(10)
-    note(blender, "copied")
+    note("copied")
     blender.shot("copied")
     blender.call(bpy.ops.digiclay.session_stop)
     yield from blender.stopped()

@@ -4,6 +4,7 @@ import bpy
 import numpy as np
 from mathutils import Vector
 
+from tests.window import driver as blender
 from tests.window.hand_strokes import (
     act,
     add_bed,
@@ -17,12 +18,12 @@ from tests.window.hand_strokes import (
 )
 
 
-def count_orange(name, blender):
-    red, green, blue = np.moveaxis(read_shot(name, blender), -1, 0)
+def count_orange(name):
+    red, green, blue = np.moveaxis(read_shot(name), -1, 0)
     return int(((red > 0.85) & (green > 0.45) & (green < 0.75) & (blue < 0.35)).sum())
 
 
-def read_shot(name, blender):
+def read_shot(name):
     _, region = blender.view()
     image = bpy.data.images.load(str(blender.OUT / f"{name}.png"))
     width, height = image.size
@@ -31,41 +32,41 @@ def read_shot(name, blender):
     return pixels[region.y : region.y + region.height, region.x : region.x + region.width, :3]
 
 
-def add_by_hand(blender, name, add=bpy.ops.mesh.digital_clay_add, **chosen):
+def add_by_hand(name, add=bpy.ops.mesh.digital_clay_add, **chosen):
     """Add a bed as its menu entry does, beside or on what the factory file has; note how it is seen."""
     area, region = blender.view()
     for thing in [blender.beds()[0], blender.fingertip()] if blender.beds() else []:
         bpy.data.objects.remove(thing)
     blender.call(add, "INVOKE_DEFAULT", **chosen)
     room = blender.part("overlay.views").find_free_room(area, region)
-    blender.SEEN[name] = {"bed": rectangle_of_the_bed(blender), "room": room}
+    blender.SEEN[name] = {"bed": rectangle_of_the_bed(), "room": room}
 
 
-def see_at_once(blender):
+def see_at_once():
     """Add beds from the default perspective and from above, with the sidebar closed and open; press lines."""
     area, region = blender.view()
     looking = area.spaces.active.region_3d
     before = {name: getattr(looking, name) for name in ("view_perspective", "view_distance")}
     turned = looking.view_rotation.copy()
-    add_by_hand(blender, "a sample", bpy.ops.digiclay.add_sample, sample="session:two_hands_bowl")
+    add_by_hand("a sample", bpy.ops.digiclay.add_sample, sample="session:two_hands_bowl")
     for side in ("USER", "TOP"):
         if side == "TOP":
             blender.call(bpy.ops.view3d.view_axis, type=side)
             yield from blender.rounds(20)
-            blender.SEEN["turned"] = [rectangle_of_the_bed(blender), region.width, region.height]
+            blender.SEEN["turned"] = [rectangle_of_the_bed(), region.width, region.height]
         for is_open in (False, True):
             area.spaces.active.show_region_ui = is_open
             yield from blender.rounds(20)
-            add_by_hand(blender, f"{side} {is_open}")
-    note(blender, "added by hand")
-    draw_lines(blender, 10, 3.0)
+            add_by_hand(f"{side} {is_open}")
+    note("added by hand")
+    draw_lines(10, 3.0)
     blender.shot("ten lines")
-    blender.SEEN["lit"] = measure_lines(blender, 10, "ten lines")
+    blender.SEEN["lit"] = measure_lines(10, "ten lines")
     shading, display = area.spaces.active.shading, blender.beds()[0].digiclay_display
     blender.SEEN["shading"] = [shading.light, shading.show_cavity]
     shading.light, shading.show_cavity, display.form = "STUDIO", False, "pins"
     blender.shot("ten lines as pins")
-    blender.SEEN["as pins"] = measure_lines(blender, 10, "ten lines as pins")
+    blender.SEEN["as pins"] = measure_lines(10, "ten lines as pins")
     blender.part("overlay.ready_view").light(bpy.context)
     blender.SEEN["the user's"] = shading.light
     area.spaces.active.show_region_ui = False
@@ -74,7 +75,7 @@ def see_at_once(blender):
         setattr(looking, name, value)
 
 
-def draw_lines(blender, count, depth):
+def draw_lines(count, depth):
     """Put the pins where a fingertip of 8 mm would leave them after lines of 100 mm, of a depth in mm."""
     bed, bridge = blender.beds()[0], blender.part("bridge")
     place = bridge.read_cells(bed.data)["position"]
@@ -92,9 +93,9 @@ def lines_at(count):
     return 12.0 * (np.arange(count) - (count - 1) / 2)
 
 
-def measure_lines(blender, count, name):
+def measure_lines(count, name):
     """Return by how much the luminance differs about each line, as the mean along it over a pitch."""
-    shown, (_, region) = read_shot(name, blender) @ [0.2126, 0.7152, 0.0722], blender.view()
+    shown, (_, region) = read_shot(name) @ [0.2126, 0.7152, 0.0722], blender.view()
     left, right = (blender.on_the_bed(x, 0.0)[0] - region.x for x in (-40.0, -10.0))
     rows = [blender.on_the_bed(0.0, y)[1] - region.y for y in (-1.0, 0.5)]
     profile = np.convolve(shown[:, left:right].mean(axis=1), np.ones(rows[1] - rows[0]), "same")
@@ -105,7 +106,7 @@ def measure_lines(blender, count, name):
     return [float(np.ptp(profile[low:high])) for low, high in ends]
 
 
-def rectangle_of_the_bed(blender):
+def rectangle_of_the_bed():
     bed = blender.beds()[0]
     corners = np.array(
         [blender.pixel(bed.matrix_world @ Vector(corner)) for corner in bed.bound_box]
@@ -115,7 +116,7 @@ def rectangle_of_the_bed(blender):
     return [float(value) for value in (*corners.min(axis=0), *corners.max(axis=0))]
 
 
-def count_covered(blender):
+def count_covered():
     """Return how many pins of the bed the overlay covers."""
     (bed, *_), (_, region) = blender.beds(), blender.view()
     places = np.array([blender.pixel(bed.matrix_world @ pin.co) for pin in bed.data.vertices])
@@ -123,20 +124,20 @@ def count_covered(blender):
     return int(((low < places) & (places < high)).all(axis=1).sum())
 
 
-def note(blender, name):
+def note(name):
     form, bed = blender.part("device.view"), blender.beds()[0]
     blender.shot(name)
     blender.SEEN[name] = {
         "form": bed.digiclay_display.form,
         "skin": form.is_skin_shown(bed),
         "far": form.is_far(bed),
-        "orange": count_orange(name, blender),
+        "orange": count_orange(name),
         "selected": [thing.name for thing in bpy.context.selected_objects],
         "lowest": float(blender.part("bridge").read_cells(bed.data)["height"].min()),
     }
 
 
-def watch_overlay(blender):
+def watch_overlay():
     module = blender.part("overlay.draw")
     draw = module.draw
 
@@ -151,29 +152,29 @@ def watch_overlay(blender):
     module.draw = noted
 
 
-def script(blender):
-    yield from see_at_once(blender)
-    add_bed(blender)
-    watch_overlay(blender)
+def script():
+    yield from see_at_once()
+    add_bed()
+    watch_overlay()
     yield from focus_window()
     blender.select(blender.beds()[0])
-    note(blender, "selected")
-    middle = on_the_screen(blender, 0.0, 0.0)
-    yield from levels_of_detail(blender)
+    note("selected")
+    middle = on_the_screen(0.0, 0.0)
+    yield from levels_of_detail()
     # The key is one of the tool's.
     blender.call(bpy.ops.wm.tool_set_by_id, name="digiclay.press_tool")
     for name in ("alt s", "alt s again"):
-        yield from done(blender, hand(to(middle), "key alt+s"))
-        note(blender, name)
+        yield from done(hand(to(middle), "key alt+s"))
+        note(name)
     blender.call(bpy.ops.digiclay.session)
     yield from blender.settle(5)
-    yield from finish(blender, line(blender, (-24.0, -12.0), (24.0, -12.0)))
-    note(blender, "pressed on the skin")
-    blender.SEEN["bed"] = rectangle_of_the_bed(blender)
+    yield from finish(line((-24.0, -12.0), (24.0, -12.0)))
+    note("pressed on the skin")
+    blender.SEEN["bed"] = rectangle_of_the_bed()
     preferences, texts = bpy.context.preferences.addons[blender.EXTENSION].preferences, []
     for place, is_on in ((20.0, True), (16.0, False)):
         preferences.show_cursor_text = is_on
-        yield from act(blender, to(on_the_screen(blender, place, -4.0), 0.3))
+        yield from act(to(on_the_screen(place, -4.0), 0.3))
         texts.append(blender.SEEN["text"])
     preferences.show_cursor_text, blender.SEEN["texts"] = True, texts
     bed = blender.beds()[0]
@@ -182,41 +183,41 @@ def script(blender):
     before = looking.view_distance, looking.view_location.copy()
     bed.digiclay_display.overlay_full = True
     for _ in range(2):  # and with a session that finds them there
-        yield from act(blender, to(on_the_screen(blender, 24.0, -8.0), 0.3))
-        covered.append(count_covered(blender))
+        yield from act(to(on_the_screen(24.0, -8.0), 0.3))
+        covered.append(count_covered())
         blender.call(bpy.ops.digiclay.session_stop)
         looking.view_distance, looking.view_location = before
         looking.update()
         blender.call(bpy.ops.digiclay.session)
     yield from blender.settle()
-    note(blender, "overlay details")
+    note("overlay details")
     blender.SEEN["covered"] = covered
     bed.digiclay_display.overlay_full = False
     blender.view()[0].spaces.active.show_region_ui = False
     for shown, kind in (("pins", "smooth"), ("skin", "membrane"), ("both", "smooth")):
         bed.digiclay_display.form, bed.digiclay_display.skin = shown, kind
-        yield from act(blender, to(on_the_screen(blender, 23.0, -9.0), 0.3))
-        note(blender, f"{shown} {kind}")
-    yield from act(blender, "key Escape")
-    note(blender, "stopped")
+        yield from act(to(on_the_screen(23.0, -9.0), 0.3))
+        note(f"{shown} {kind}")
+    yield from act("key Escape")
+    note("stopped")
 
 
-def levels_of_detail(blender):
+def levels_of_detail():
     area, _ = blender.view()
     looking = area.spaces.active.region_3d
     distance = looking.view_distance
     steps = {"near": 1.0, "between": 0.0, "far": 14.0, "between again": 0.0, "back": 1.0}
     for name, times in steps.items():
         # Between the limits: 9 pixels a pitch.
-        looking.view_distance = distance * (times or pitch_in_pixels(blender, distance) / 9.0)
+        looking.view_distance = distance * (times or pitch_in_pixels(distance) / 9.0)
         area.tag_redraw()
         # The pitch is measured in a drawing, and acted upon by a timer.
         yield from blender.rounds(20)
-        note(blender, name)
+        note(name)
     looking.view_distance = distance
 
 
-def pitch_in_pixels(blender, distance):
+def pitch_in_pixels(distance):
     """Return a pitch in a view whose middle is as far away, pixels at a UI scale of 1."""
     area, region = blender.view()
     lens = float(area.spaces.active.region_3d.window_matrix[1][1])

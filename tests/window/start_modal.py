@@ -2,14 +2,16 @@
 
 import bpy
 
+from tests.window import driver as blender
 
-def list_modal(blender):
+
+def list_modal():
     return sorted(operator.bl_idname for operator in blender.window().modal_operators)
 
 
-def script(blender):
+def script():
     yield from blender.scene_with_bed(rows=25, columns=25)
-    yield from stamp(blender)
+    yield from stamp()
     blender.call(bpy.ops.digiclay.session_stop)
     blender.event("MOUSEMOVE", "NOTHING", blender.middle())
     yield None
@@ -21,12 +23,12 @@ def script(blender):
     for kind in [kind for kind in every if hasattr(kind, "modal")]:
         begun = {}
         if issubclass(kind, action.Modal):
-            begun = start_failing(blender, kind, action)
+            begun = start_failing(kind, action)
         blender.SEEN[kind.bl_idname] = {"modal": issubclass(kind, action.Modal), **begun}
         yield None
 
 
-def start_failing(blender, kind, action):
+def start_failing(kind, action):
     """Start an operator with all that it prepares, after which something fails."""
 
     def prepare(self, context, event):
@@ -42,12 +44,12 @@ def start_failing(blender, kind, action):
         said = sorted(blender.call(getattr(getattr(bpy.ops, area), verb), "INVOKE_DEFAULT", **path))
     except RuntimeError as error:
         said = [str(error)]
-    left = list_modal(blender)
+    left = list_modal()
     bpy.utils.unregister_class(failing)
     return {"said": said, "left": left}
 
 
-def stamp(blender):
+def stamp():
     """Press on the bed with a stamp from a file that is not there, then with one that is."""
     blender.call(bpy.ops.wm.tool_set_by_id, name="digiclay.press_tool")
     settings = blender.part("press.brush").tool_settings(bpy.context)
@@ -64,7 +66,7 @@ def stamp(blender):
         for step in (5, 10, 20, 30):
             blender.event("MOUSEMOVE", "NOTHING", (at[0] + step, at[1]))
             yield 0.2
-        blender.SEEN[f"stamp {name}"] = list_modal(blender)
+        blender.SEEN[f"stamp {name}"] = list_modal()
         blender.event("LEFTMOUSE", "RELEASE", (at[0] + 30, at[1]))
         yield from blender.rounds(5)
         if name == "FILE":
