@@ -3,8 +3,10 @@
 import json
 from dataclasses import replace
 
+import digiclay
 import numpy as np
 import pytest
+import trimesh
 from digiclay.core.base.errors import ParameterError, SceneError, StateError
 from digiclay.core.engine.simulation import begin
 from digiclay.core.files.tables import parse_tables
@@ -27,10 +29,12 @@ from digiclay.core.session.live_session import simulate_path
 from digiclay.core.session.recent_trace import exceeds_law
 from digiclay.core.session.run_scene import run
 from digiclay.core.session.snapshot import START
+from digiclay.core.shapes.body import pack_mesh
 from digiclay.core.studies.axes import find_value
 from digiclay.overlay.sections import force_message
 
-from tests.assemble import sample, under
+from tests.assemble import sample, table, under
+from tests.scene_files import call, read_json
 
 BED = "[layout]\nrows = 6\ncolumns = 6\n[control]\nmethod = 'elastic'\n"
 #: A thumb and a finger without relaxation.
@@ -239,3 +243,38 @@ def test_the_overlay_says_when_no_finger_presses_so_hard():
         "1e+66 N: no finger",
     ]
     assert force_message(0.7, beyond=True) == "0.70 N: beyond 3 mm"
+
+
+#: A hammer, whose head is 50 mm from its origin, level and turned by 60° about y.
+HAMMER = trimesh.creation.box((4e-3, 4e-3, 4e-3)).apply_translation((50e-3, 0.0, 0.0))
+LEVEL, TURNED = [1.0, 0.0, 0.0, 0.0], [np.cos(np.pi / 6), 0.0, np.sin(np.pi / 6), 0.0]
+
+
+@table(
+    "start, end, turn, cap, fall",
+    {
+        "2 mm per period": (70e-3, 30e-3, LEVEL, 1.6e-3, "2 mm"),
+        "as far as it may": (70e-3, 30e-3, LEVEL, 2.001e-3, ""),
+        "above the pins": (140e-3, 100e-3, LEVEL, 1.6e-3, ""),
+        "upwards": (43e-3, 100e-3, LEVEL, 1.6e-3, ""),
+        "a head that comes down as its handle turns": (70e-3, 70e-3, TURNED, 2.1e-3, "2.3"),
+        "a head that comes down slower": (70e-3, 70e-3, TURNED, 2.4e-3, ""),
+    },
+)
+def test_a_body_that_falls_by_more_than_its_cap_per_period_is_cautioned(
+    start, end, turn, cap, fall, here, capsys
+):
+    x = -50e-3 if turn is LEVEL else -41e-3
+    points = [
+        {"time": time, "position": [x, 0, z], "orientation": turn}
+        for time, z, turn in ((0.0, start, LEVEL), (0.1, end, turn))
+    ]
+    path = {"interpolation": "linear", "waypoints": points}
+    body = {"mesh": pack_mesh(HAMMER.vertices, HAMMER.faces), "cap": cap, "trajectory": path}
+    made = resolve({"layout": {"rows": 5, "columns": 5}, "control": "absent", "body": [body]})
+    (here / "my.toml").write_text(format_scene(made), encoding="utf-8")
+    assert call("run my.toml --out out") == 0
+    said = read_json(here / "out" / "metrics.json")["beyond_cap"]
+    assert said.startswith(f"body 1 falls by up to {fall}") if fall else said == ""
+    assert capsys.readouterr().out.splitlines()[0].endswith(f"; {said}" if said else "mN")
+    assert digiclay.load("out").describe().get("caution", "") == said

@@ -10,7 +10,14 @@ from typing import Any
 
 from ..core.base.errors import DigiclayError, OutputError
 from ..core.files import run_folder
-from ..core.metrics.metric_table import ERRORS, METRICS, RUN, describe_errors, describe_losses
+from ..core.metrics.metric_table import (
+    BEYOND,
+    ERRORS,
+    METRICS,
+    RUN,
+    describe_errors,
+    describe_losses,
+)
 from ..core.scene.toml_table import format_scene
 from ..core.studies.job_table import JOB, SCENE, Job, JobSeries, Outputs
 from ..core.studies.series import Kind, open_series
@@ -146,7 +153,10 @@ class Folder:
                 for name, fact in FACTS.items()
             ),
             ("losses", describe_losses(metrics)),
-            ("not to be trusted", metrics.get("beyond_a_finger", "")),
+            (
+                "not to be trusted",
+                "; ".join(metrics.get(name) or "" for name in BEYOND).strip("; "),
+            ),
             (
                 "errors",
                 metrics.get("errors_in_doubt")

@@ -14,7 +14,7 @@ from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from itertools import repeat
+from itertools import product, repeat
 from operator import itemgetter
 from typing import Any, NamedTuple, Protocol
 
@@ -102,6 +102,13 @@ class MovedMesh:
         under = rasterize(vertices, triangles, grid, self.samples, tip, ceiling)
         return np.minimum(under, ceiling)
 
+    def measure_falls(self, times: Floats) -> Floats:
+        """Return the largest fall of a corner of its box between successive times (t,), s, (t - 1,), m."""
+        ends = zip(self.mesh.vertices.min(axis=0), self.mesh.vertices.max(axis=0), strict=True)
+        poses, corners = self.trajectory.poses(times), np.array(list(product(*ends)))
+        heights = make_matrices(poses[:, 3:])[:, 2] @ corners.T + poses[:, 2, None]
+        return -np.diff(heights, axis=0).min(axis=1)
+
 
 class TracedMesh:
     """Undersides of a mesh at every few control periods of its path; the last ones are remembered."""
@@ -129,6 +136,7 @@ class PathUndersides:
         self, bodies: tuple[MovedMesh, ...], grid: Grid, instants: Floats, ceiling: float
     ) -> None:
         self._instants, self._period = instants, float(instants[-1])
+        self.meshes = bodies
         self._bodies = [TracedMesh(body, grid, self._period, ceiling) for body in bodies]
         self._make_lines = lru_cache(1)(self._join_undersides)
 
@@ -349,3 +357,21 @@ class BodySystem(HandSystem):
                 window[:, : poses.shape[2]] = hand.window
             periods.append(BodyPeriod(hand, self.undersides, number, window))
         return periods
+
+
+def describe_falls(system: System, pressed: Flags) -> str:
+    """Return which bodies of meshes fall by more than their caps while they press, or ``""``.
+
+    `pressed` (t, b): whether a body presses at the end of each control period.
+    """
+    if not (isinstance(system, BodySystem) and isinstance(system.undersides, PathUndersides)):
+        return ""
+    times, said = np.arange(len(pressed) + 1) * system.period, []
+    for number, mesh in enumerate(system.undersides.meshes):
+        fall = mesh.measure_falls(times).max(where=pressed[:, number], initial=0.0)
+        if fall > system.caps[number]:
+            said.append(
+                f"body {number + 1} falls by up to {fall * 1e3:.3g} mm in a control period, its cap is "
+                f"{system.caps[number] * 1e3:.3g} mm: errors are larger than estimated"
+            )
+    return "; ".join(said)

@@ -160,6 +160,8 @@ RUN: dict[str, Metric] = {
     "simulated": Metric("s", "neither", "simulated time", "simulated", "s"),
     "max_indentation": Metric("m", "higher", "largest indentation of the fingertip by a pin"),
 }
+#: Messages among the metrics of a run on what goes beyond the models of finger and body.
+BEYOND = ("beyond_a_finger", "beyond_cap")
 #: Errors of a run, for which it is integrated once more. Each covers the truth in 95 of 100 runs:
 #: no bound.
 ERRORS: dict[str, Metric] = {

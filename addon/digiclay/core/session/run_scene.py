@@ -19,6 +19,7 @@ from ..engine.simulation import Progress, Stopped, begin, periods
 from ..engine.system import System
 from ..files.tables import Described, Record, Table
 from ..metrics.metric_table import (
+    BEYOND,
     ERRORS,
     METRICS,
     RUN,
@@ -98,6 +99,11 @@ class Result(Described):
         return self.periods < self.scene.periods
 
     @property
+    def beyond(self) -> list[str]:
+        """What goes beyond the models of finger and body."""
+        return [said for name in BEYOND if (said := self.metrics.get(name))]
+
+    @property
     def finger_force(self) -> Floats:
         """Total force on each finger over time, (t, f), N."""
         self.require_history("finger_force")
@@ -127,8 +133,7 @@ class Result(Described):
         """Return what matters most of it, by name."""
         largest = self.metrics.get("max_total_force")
         reached = "not recorded" if largest is None else f"at most {largest:.2g} N"
-        beyond = filter(None, (self.metrics.get("beyond_a_finger"), *list_cautions(self.scene)))
-        cautions = "; ".join(beyond)
+        cautions = "; ".join((*self.beyond, *list_cautions(self.scene)))
         rows, pins = len(self.history.get("time", ())), self.scene.cells
         return {
             "time": describe_time(self.metrics)
@@ -145,9 +150,8 @@ class Result(Described):
         """Return the session in one line."""
         felt = self._describe_force(), self._describe_bodies(), describe_errors(self.metrics)
         end = " (incomplete: stopped)" if self.incomplete else ""
-        beyond = self.metrics.get("beyond_a_finger")
-        warning = f"; {beyond}" if beyond else ""
-        return ", ".join(filter(None, (describe_time(self.metrics), *felt))) + end + warning
+        line = ", ".join(filter(None, (describe_time(self.metrics), *felt))) + end
+        return "; ".join((line, *self.beyond))
 
     def _describe_force(self) -> str:
         """Return the deviation of the force, and the losses, or ``""``."""
@@ -238,7 +242,12 @@ def evaluate(
     if len(scene.fingers) > 1:
         metrics["fingers"] = each
     if scene.bodies:
+        from ..engine.bodies import describe_falls
+
         metrics["bodies"] = measure_bodies(history)
+        ends = np.arange(1, ended.periods + 1) * scene.simulation.control_period
+        pressed = history["body_force"].any(axis=2)[history["time"].searchsorted(ends)]
+        metrics["beyond_cap"] = describe_falls(system, pressed)
     metrics |= measure_losses(scene, system.fastest, history["time"], felt)
     if depths:
         depth = np.max(depths, axis=0)
