@@ -9,7 +9,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..base.arrays import Cells, Flags, Floats, Modes
-from ..base.errors import ParameterError
 from ..base.modes import BLISTER, FORCE_FOLLOW, HOLD, REST, SPRING
 from ..base.quantity import quantity
 from ..model.actuator import Actuator
@@ -25,6 +24,7 @@ from .drive import (
     raise_felt_force,
 )
 from .exchange import Exchange, make_exchange
+from .servo import check_order
 
 #: Share of the felt force above which a touched cell remains touched: its spring may press no
 #: harder.
@@ -83,9 +83,7 @@ class Plastic(TouchParameters):
 
     def check(self) -> None:
         """The yield force is at least the felt force."""
-        if not self.yield_force >= self.felt_force:
-            rule = f"must be at least felt_force, {self.felt_force:g} N"
-            raise ParameterError("Plastic", "yield_force", rule, f"{self.yield_force:g} N")
+        check_order(self, "yield_force", "at_least", "felt_force")
 
 
 @dataclass(frozen=True, eq=False)

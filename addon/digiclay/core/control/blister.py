@@ -9,11 +9,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..base.arrays import TIE, Constants, Flags, Floats, Modes
-from ..base.errors import ParameterError
 from ..base.modes import BLISTER, EDGE, FROZEN
 from ..base.quantity import Parameters, quantity
 from ..model.control_interface import Measurement
 from ..model.layout import RELATIVE_TOLERANCE
+from .servo import check_order
 from .travel import measure_offsets
 
 
@@ -39,12 +39,8 @@ class Blister(Parameters):
 
     def check(self) -> None:
         """The flat top lies inside the blister, the edge outside."""
-        if not self.flat_radius < self.radius:
-            rule = f"must be below the radius, {self.radius:g} m"
-            raise ParameterError("Blister", "flat_radius", rule, f"{self.flat_radius:g} m")
-        if not self.edge_radius > self.radius:
-            rule = f"must be above the radius, {self.radius:g} m"
-            raise ParameterError("Blister", "edge_radius", rule, f"{self.edge_radius:g} m")
+        check_order(self, "flat_radius", "below", "radius")
+        check_order(self, "edge_radius", "above", "radius")
 
     def evaluate_profile(self, distance: Floats) -> Floats:
         """Return the profile p(r), 1 at the center, for distances r inside the blister, m."""

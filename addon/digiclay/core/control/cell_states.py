@@ -13,7 +13,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..base.arrays import TIE, Flags, Floats, Modes, any_true
-from ..base.errors import ParameterError
 from ..base.modes import BLISTER, CRITICAL, EDGE, FORCE_FOLLOW, HOLD, SPRING, Mode
 from ..base.quantity import quantity
 from ..model.actuator import Actuator
@@ -22,7 +21,7 @@ from ..model.layout import RELATIVE_TOLERANCE, Disc
 from .blister import Blister
 from .device_info import DeviceInfo, check_floor, suppress_noise
 from .finger_sections import WHOLE, Whole
-from .servo import Tracking, lock_overloaded, mark_formed
+from .servo import Tracking, check_order, lock_overloaded, mark_formed
 from .travel import Heading, Rim, measure_lead, measure_square, update_heading
 
 VIRTUAL_SPRING = (Mode.REST, Mode.HOLD, Mode.SPRING, Mode.EDGE)
@@ -111,11 +110,6 @@ class Patch(NamedTuple):
         """Height of the blister's top, m, estimated as that of the surface around it."""
         return self.edge
 
-    @property
-    def ground(self) -> float:
-        """Height of the surface around the blister, m."""
-        return self.edge
-
 
 @dataclass(frozen=True, eq=False, repr=False)
 class CellStates(Tracking):
@@ -175,16 +169,8 @@ class CellStates(Tracking):
 
     def check(self) -> None:
         """A blister cell starts to follow before one at rest does, and is critical below that."""
-        if not self.blister_trigger < self.spring_trigger:
-            rule = f"must be below spring_trigger, {self.spring_trigger:g} N"
-            raise ParameterError(
-                "CellStates", "blister_trigger", rule, f"{self.blister_trigger:g} N"
-            )
-        if not self.critical_trigger < self.blister_trigger:
-            rule = f"must be below blister_trigger, {self.blister_trigger:g} N"
-            raise ParameterError(
-                "CellStates", "critical_trigger", rule, f"{self.critical_trigger:g} N"
-            )
+        check_order(self, "blister_trigger", "below", "spring_trigger")
+        check_order(self, "critical_trigger", "below", "blister_trigger")
 
 
 @dataclass(frozen=True, eq=False)

@@ -23,7 +23,7 @@ class Follower(Protocol):
         """Height of the blister's top, m."""
 
     @property
-    def ground(self) -> float:
+    def edge(self) -> float:
         """Height of the surface around the blister, m."""
 
     @property

@@ -1,8 +1,22 @@
-"""Control of several fingers on one bed: one controller of the method per finger.
+"""Control of several fingers on one bed: each has a controller of the method, as if it were alone.
 
-In a control period each controller first locates its finger by the pressed pins that belong to it,
-and then commands the pins in its disc. `pin_division` has the rules for pins that several fingers
-press or command.
+Sensors measure the force on a pin, but not whose it is. What happens in a control period to a pin
+that two fingers press, with the rules of `pin_division`:
+
+1. `HandControl.locate` assigns it to the finger whose underside is lowest over it, its owner. A
+   pressed pin far from all fingers begins a new finger.
+2. The controller of the owner locates its finger with the whole force on the pin, the other one as
+   if the pin had none. (With Method III both see shares in the ratio of the predicted forces.)
+   Each answers with the disc of pins to command; the pin is in both.
+3. `HandControl.command` has each controller command its disc. Again the owner sees the force on
+   the pin, the other one none, so that its command is that for an unpressed pin of its blister.
+4. The pin obeys its owner. (A pin that nobody presses obeys the finger above it, else that whose
+   blister moves it farthest, see `PinDivision.choose`.) State rows that belong to the obeyed
+   command are copied to both fingers.
+
+Forces, heights and modes are those of the whole bed; only state rows are kept per finger.
+`HandTogether` calls Method I once for all fingers, as for the runs of a batch, with a column of
+pins per finger; `HandInGroups` calls other methods for groups of fingers, or one by one.
 """
 
 from __future__ import annotations

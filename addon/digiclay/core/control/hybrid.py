@@ -27,7 +27,7 @@ from ..model.fingertip import Fingertip
 from ..model.layout import enclose_discs
 from ..model.null_parts import Unrelaxed
 from ..model.touch import Touch
-from .blister import Blister, BlisterRule
+from .blister import BlisterRule
 from .device_info import DeviceInfo, check_floor
 from .finger_estimate import Aim, FingerFilter, Spread
 from .finger_observer import (
@@ -35,7 +35,6 @@ from .finger_observer import (
     EVERY,
     OWN_ROWS,
     FingerObserver,
-    OwnRows,
     list_rows,
     measure_trust,
 )
@@ -84,52 +83,14 @@ class HybridControl:
     """Controller of Method III for a bed."""
 
     parameters: Hybrid
-    blister: Blister
     device: DeviceInfo
-    pulp: PulpEstimate
-    finger: FingerFilter
-    profile: LeadProfile
+    observer: FingerObserver
+    surface: LedBlister
     servo: FlowServo
-    felt: float
-    noise: float
-    """Force above which a cell is touched, and standard deviation of forces, N."""
     contact_radius: float
     """Radius within which the fingertip may touch, m."""
     substitute: VirtualMasterControl
     """Method I, which takes over when the model does not predict the fingertip."""
-
-    @cached_property
-    def _at(self) -> OwnRows:
-        """Numbers of a cell's rows."""
-        return list_rows(self.pulp.filters)
-
-    @cached_property
-    def _observer(self) -> FingerObserver:
-        """Observer of the fingertips."""
-        gains = self.parameters
-        return FingerObserver(
-            at=self._at,
-            pulp=self.pulp,
-            finger=self.finger,
-            felt=self.felt,
-            noise=self.noise,
-            loss=self.substitute.loss,
-            unknown=self._unknown,
-            asked=gains.force_setpoint,
-            travel=gains.travel,
-        )
-
-    @cached_property
-    def _unknown(self) -> tuple[float, ...]:
-        """Forces of the coming periods before any is predicted."""
-        return (-1.0,) * max(1, round(self.servo.ahead / self.device.period))
-
-    @cached_property
-    def _surface(self) -> LedBlister:
-        """Blister, and the pins led ahead of it."""
-        release = max(self.parameters.release_force, self.felt)
-        rule = BlisterRule(self.blister, self.parameters.behind, release, self.felt)
-        return LedBlister(rule, self.profile, self.servo.ahead)
 
     @cached_property
     def _limits(self) -> Constants:
@@ -140,7 +101,7 @@ class HybridControl:
     @property
     def rows(self) -> int:
         """State rows per cell."""
-        return self.pulp.filters + OWN_ROWS + self.servo.rows
+        return self.observer.pulp.filters + OWN_ROWS + self.servo.rows
 
     #: See `following.FollowingControl`.
     division = "PredictedDivision"
@@ -148,17 +109,17 @@ class HybridControl:
     @property
     def blister_radius(self) -> float:
         """Largest distance of pins in the blister from the fingertip, m."""
-        return self.blister.radius
+        return self.surface.rule.blister.radius
 
     @property
     def pin_rows(self) -> tuple[int, ...]:
         """Rows of the command that a cell obeys, of any finger: lead and speeds."""
-        at = self._at
+        at = self.observer.at
         return at.lead, *range(self.rows)[at.speeds]
 
     def begin(self) -> Follower:
         """Return the memory before a session."""
-        return Follower(due=self._unknown)
+        return Follower(due=self.observer.unknown)
 
     def locate(self, memory: Memory, touched: Measurement) -> tuple[Any, Any]:
         """Observe the pulp, and fit the fingertip; see `Controller`."""
@@ -183,14 +144,16 @@ class HybridControl:
             return [memory], [disc]
         memories = [self._move_on(memory) for memory in memories]
         if touched.force.size:
-            memories = self._observer.observe(memories, touched, sections)
+            memories = self.observer.observe(memories, touched, sections)
         else:
             memories = list(map(self.substitute.loss.wait, memories))
-        return memories, list(map(self._surface.find_disc, memories))
+        return memories, list(map(self.surface.find_disc, memories))
 
     def _move_on(self, memory: Follower) -> Follower:
         """Return the memory a period later, with the fingertip predicted."""
-        estimate = memory.estimate if memory.phase is IDLE else self.finger.predict(memory.estimate)
+        estimate = memory.estimate
+        if memory.phase is not IDLE:
+            estimate = self.observer.finger.predict(estimate)
         return memory._replace(period=memory.period + 1, estimate=estimate)
 
     def _substitute(self, memory: Follower, touched: Measurement) -> tuple[Follower, Any]:
@@ -214,19 +177,20 @@ class HybridControl:
             x, y, z, *_ = memory.estimate.mean.tolist()
             master = memory.master
             aims.append((x, y, z) if master.phase is IDLE else (master.x, master.y, master.height))
-        return self.finger.find_underside(
+        return self.observer.finger.find_underside(
             aims, [memory.estimate for memory in memories], basis, SHARED
         )
 
     def predict_force(self, depth: Floats, rows: Floats) -> Floats:
         """Return the forces of fingertips on pins, (f, m), N, at depths (f, m), m, by rows (f, r, m)."""
-        return self.pulp.predict_force(depth, self.pulp.predict_loss(rows[:, self._at.pulp]))
+        pulp = self.observer.pulp
+        return pulp.predict_force(depth, pulp.predict_loss(rows[:, self.observer.at.pulp]))
 
     def command_all(
         self, memories: list[Follower], seen: Measurement, sections: Whole = WHOLE
     ) -> tuple[list[Follower], Commands]:
         """Form the blisters of fingers with the same `sort` key, and drive all pins to their heights."""
-        lead, speeds = seen.own[self._at.lead], seen.own[self._at.speeds]
+        lead, speeds = seen.own[self.observer.at.lead], seen.own[self.observer.at.speeds]
         if memories[0].master.phase is not IDLE:
             unled = seen._replace(target=seen.target - lead)
             lead[:] = speeds[:] = 0.0
@@ -244,10 +208,10 @@ class HybridControl:
         if memories[0].phase is IDLE:
             memories = [memory._replace(led_radius=0.0) for memory in memories]
         else:
-            region = self._surface.survey(memories, seen.quadratic_basis, left, sections)
+            region = self.surface.survey(memories, seen.quadratic_basis, left, sections)
             memories = self._follow_force(memories, seen, region, coasting, sections)
             edge, top = sections.spread([(memory.edge, memory.top) for memory in memories])
-            left = self._surface.leave((edge, top), seen, left, region.cells, mode)
+            left = self.surface.leave((edge, top), seen, left, region.cells, mode)
             target = lead_heights(left, top, region.drop, sections.spread(region.raised))
             np.maximum(target, lowest, out=target)
             np.minimum(target, highest, out=target)
@@ -272,9 +236,9 @@ class HybridControl:
         """Move tops to the heights of the set point; without contact, to the last height with contact."""
         forces, tops = sections.add(seen.force), list[Top | None]()
         for memory, force, part in zip(memories, forces, sections.parts, strict=True):
-            if memory.period % EVERY and not memory.alone and self._observer.holds(memory, force):
+            if memory.period % EVERY and not memory.alone and self.observer.holds(memory, force):
                 top = self._move_top(memory)
-                later = seen.own[self._at.later, part]
+                later = seen.own[self.observer.at.later, part]
                 later += top - memory.top
                 tops.append((top, self.parameters.force_setpoint + memory.trim))
             else:
@@ -302,7 +266,7 @@ class HybridControl:
         `force` of so many cells, N; surface, m; lowest point of the fingertip, m, and its speed,
         m/s.
         """
-        asked, due, doubt = self.parameters.force_setpoint, self._unknown, memory.doubt
+        asked, due, doubt = self.parameters.force_setpoint, self.observer.unknown, memory.doubt
         top, felt, trim, master = memory.felt, memory.felt, memory.trim, memory.master
         if not memory.alone:
             top, coming = solved or (felt, 0.0)
@@ -336,7 +300,7 @@ class HybridControl:
             felt=felt,
             led_x=x,
             led_y=y,
-            led_radius=self.profile.find_reach(top - edge, speed),
+            led_radius=self.surface.profile.find_reach(top - edge, speed),
             due=due,
             doubt=doubt,
             master=master,
@@ -353,7 +317,9 @@ class HybridControl:
         """Return the doubt, N², after a force on cells, N; beyond a limit Method I takes over."""
         due, most = memory.due[0], LEARNED * self.parameters.force_setpoint
         error = min(abs(force - due), most) if due >= 0.0 else 0.0
-        doubt = memory.doubt + (error * error - cells * self.noise**2 - memory.doubt) / PERIODS
+        doubt = (
+            memory.doubt + (error * error - cells * self.observer.noise**2 - memory.doubt) / PERIODS
+        )
         return max(doubt, 0.0)
 
     def _move_top(self, memory: Follower) -> float:
@@ -382,8 +348,8 @@ class HybridControl:
         forces = [self.parameters.force_setpoint + memory.trim for memory in solved]
         guesses = list(map(self._move_top, solved))
         estimates = [memory.estimate for memory in solved]
-        at, rows = self._at, seen.own.take(near, 1)
-        under = self.finger.find_underside(
+        at, rows = self.observer.at, seen.own.take(near, 1)
+        under = self.observer.finger.find_underside(
             aims, estimates, seen.quadratic_basis.take(near, 1), picked
         )
         under += rows[at.residual]
@@ -396,12 +362,13 @@ class HybridControl:
         *_, lowest, highest = self._limits[ends.shape]
         np.maximum(ends, lowest, out=ends)
         np.minimum(ends, highest, out=ends)
-        part = self.blister.evaluate_profile(region.cells.distance.take(near))
+        part = self.surface.rule.blister.evaluate_profile(region.cells.distance.take(near))
         reach = Reach(
             picked.spread(edges), picked.spread(raised), part, region.drop.take(near), ends
         )
-        lost = self.pulp.predict_loss(rows[at.pulp])
-        results = find_tops(forces, guesses, reach, under, lost, self.pulp, picked)
+        pulp = self.observer.pulp
+        lost = pulp.predict_loss(rows[at.pulp])
+        results = find_tops(forces, guesses, reach, under, lost, pulp, picked)
         for i, top in zip(fingers, results, strict=True):
             tops[i] = top
 
@@ -419,30 +386,37 @@ def build(parameters: Hybrid, device: DeviceInfo) -> HybridControl:
     check_floor(HEAVIEST * asked, "force_setpoint", asked, device.force_floor)
     # Without a fingertip nothing is ever felt.
     touch = device.cell.touch or Touch(Fingertip(), Contact(), Unrelaxed())
+    tip, blister, share = touch.fingertip, device.blister, parameters.speed_share
     servo = make_flow_servo(device.cell, device.period, device.dead_time, parameters.dead_band)
+    felt = max(parameters.felt_force, device.force_floor)
     noise = max(device.force_floor / 5.0, QUIET)
+    substitute = build_master(
+        VirtualMaster(force_setpoint=asked, loss_time=parameters.loss_time), device
+    )
     spread = Spread(
         parameters.acceleration * measure_trust(noise),
         parameters.turn,
         parameters.size_drift,
         parameters.underside_error,
     )
-    share = parameters.speed_share
-    return HybridControl(
-        parameters,
-        device.blister,
-        device,
-        PulpEstimate(touch, device.period, servo.ahead, device.force_floor),
-        FingerFilter(touch.fingertip, spread, device.period),
-        LeadProfile(
-            device.blister.flat_radius + parameters.level_margin,
-            share * servo.rise,
-            share * servo.fall,
-            parameters.skirt_speed,
-        ),
-        servo,
-        max(parameters.felt_force, device.force_floor),
-        noise,
-        max(touch.fingertip.length, touch.fingertip.width) + BESIDE,
-        build_master(VirtualMaster(force_setpoint=asked, loss_time=parameters.loss_time), device),
+    observer = FingerObserver(
+        at=list_rows(touch.pulp.rows),
+        pulp=PulpEstimate(touch, device.period, servo.ahead, device.force_floor),
+        finger=FingerFilter(tip, spread, device.period),
+        felt=felt,
+        noise=noise,
+        loss=substitute.loss,
+        unknown=(-1.0,) * max(1, round(servo.ahead / device.period)),
+        asked=asked,
+        travel=parameters.travel,
     )
+    rule = BlisterRule(blister, parameters.behind, max(parameters.release_force, felt), felt)
+    profile = LeadProfile(
+        level=blister.flat_radius + parameters.level_margin,
+        rise=share * servo.rise,
+        fall=share * servo.fall,
+        skirt=parameters.skirt_speed,
+    )
+    surface = LedBlister(rule, profile, servo.ahead)
+    reach = max(tip.length, tip.width) + BESIDE
+    return HybridControl(parameters, device, observer, surface, servo, reach, substitute)

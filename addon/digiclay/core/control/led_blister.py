@@ -85,11 +85,6 @@ class Follower(NamedTuple):
     """Memory of Method I while it has taken over; else IDLE."""
 
     @property
-    def ground(self) -> float:
-        """Height of the surface around the blister, m."""
-        return self.edge
-
-    @property
     def position(self) -> tuple[float, float] | None:
         """Position of the fingertip, m; None if none is followed."""
         if self.phase is IDLE or self.master.phase is not IDLE:

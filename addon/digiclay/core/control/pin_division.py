@@ -1,17 +1,8 @@
-"""Division of pins among fingers: owner of each pin, visible forces, and the command that it obeys.
+"""Rules that divide pins among fingers; `hands` tells in which order they are applied.
 
-Each finger has a controller, which sees and commands the pins around its finger as if it were
-alone. Sensors measure the force on a pin, but not which finger presses it. Pin ownership is
-therefore recomputed every control period, in two steps:
-
-- `assign`, before the controllers locate their fingertips: a pressed pin belongs to the finger whose
-  underside is lowest over it. This finger sees the whole force, the others see none. A pressed pin
-  far from all fingers begins a new finger.
-- `choose`, after the controllers have commanded their pins: a pin in several discs obeys its owner.
-
-For Method I the undersides are those of balls on top of the blisters, since its master is at the
-fingertip. `CellDivision` has the differences for Method II, `PredictedDivision` those for Method
-III.
+`PinDivision` has those of Method I, whose undersides are balls on top of the blisters, since its
+master is at the fingertip; `CellDivision` the differences of Method II, `PredictedDivision` those
+of Method III.
 """
 
 from __future__ import annotations
@@ -71,12 +62,12 @@ class Hands(NamedTuple):
 
 
 class Blisters(NamedTuple):
-    """Blisters of f fingers, (f,) each: middle and radius, below 0: none; heights of ground and top, m."""
+    """Blisters of f fingers, (f,) each: middle and radius, below 0: none; heights around and on top, m."""
 
     x: Floats
     y: Floats
     radius: Floats
-    ground: Floats
+    edge: Floats
     top: Floats
 
 
@@ -214,14 +205,14 @@ class PinDivision:
         finger, (x, y) = copies.row, columns.positions
         blisters = self.find_blisters(memory)
         limits = blisters.radius * np.abs(blisters.radius), (UNDER * self.captures[:, 0]) ** 2
-        limit, near, ground, at_x, at_y = np.array(
-            (*limits, blisters.ground, blisters.x, blisters.y)
+        limit, near, edge, at_x, at_y = np.array(
+            (*limits, blisters.edge, blisters.x, blisters.y)
         ).take(finger, axis=1)
         square = (x - at_x) ** 2 + (y - at_y) ** 2
         commanded = target[copies.number]
         still = np.abs(commanded - seen.target[columns.cells]) <= TIE
         outside = np.where(still, -1.0, -0.5) - square
-        rank = np.where(square <= limit, np.abs(commanded - ground), outside)
+        rank = np.where(square <= limit, np.abs(commanded - edge), outside)
         rank = np.where(square <= np.minimum(limit, near), 1.0 - square, rank)
         rank[owner[copies.which] == finger] = PRESSING
         return columns.pick(rank)
@@ -232,7 +223,7 @@ class PinDivision:
         for controller, follower in zip(self.controllers, memory.fingers, strict=True):
             middle = follower.position
             radius = controller.blister_radius * (1.0 + RELATIVE_TOLERANCE) if middle else -1.0
-            rows.append((*(middle or NOWHERE), radius, follower.ground, follower.top))
+            rows.append((*(middle or NOWHERE), radius, follower.edge, follower.top))
         return Blisters(*np.array(rows).T)
 
     def remember(self, rows: Floats, obeyed: Cells) -> None:
@@ -372,7 +363,7 @@ class PredictedDivision(PinDivision):
         blisters = self.find_blisters(memory)
         square = measure_square(blisters.x, blisters.y, basis)
         inside = square <= (blisters.radius * np.abs(blisters.radius))[:, None]
-        raised = np.where(inside, np.maximum(blisters.top, blisters.ground)[:, None], -np.inf)
+        raised = np.where(inside, np.maximum(blisters.top, blisters.edge)[:, None], -np.inf)
         harms = raised > lowest + TIE
         pressed = (seen.force[shared] != 0.0) | harms.any(axis=0)
         harms &= (under > lowest + TIE) | (raised > second + TIE)

@@ -19,6 +19,7 @@ from ..model.control_interface import Commands, Measurement
 from ..model.layout import RELATIVE_TOLERANCE, Disc
 from .device_info import DeviceInfo
 from .drive import Drive, DriveParameters, make_drive
+from .servo import check_order
 from .travel import measure_square
 
 #: Control periods of a cycle: up, then down.
@@ -67,11 +68,7 @@ class PushPull(DriveParameters):
 
     def check(self) -> None:
         """The following speed is at least the listening speed."""
-        if not self.following_speed >= self.listening_speed:
-            rule = f"must be at least listening_speed, {self.listening_speed:g} m/s"
-            raise ParameterError(
-                "PushPull", "following_speed", rule, f"{self.following_speed:g} m/s"
-            )
+        check_order(self, "following_speed", "at_least", "listening_speed")
 
 
 @dataclass(frozen=True, eq=False)

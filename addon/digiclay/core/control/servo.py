@@ -14,7 +14,8 @@ from typing import Any
 import numpy as np
 
 from ..base.arrays import Array, Cells, Constants, Flags, Floats, Modes, any_true
-from ..base.quantity import Parameters, quantity
+from ..base.errors import ParameterError
+from ..base.quantity import BOUNDS, Parameters, list_quantities, quantity
 from .methods import ControlParameters
 
 
@@ -66,6 +67,15 @@ def declare_again(owner: type[Parameters], name: str, default: float | None = No
     return dataclasses.field(
         default=field.default if default is None else default, metadata=field.metadata
     )
+
+
+def check_order(parameters: Parameters, name: str, relation: str, other: str) -> None:
+    """Check that a parameter is in a relation of `BOUNDS` to another one with the same unit."""
+    value, limit = getattr(parameters, name), getattr(parameters, other)
+    if not BOUNDS[relation](value, limit):
+        show = list_quantities(parameters)[name].show
+        rule = f"must be {relation.replace('_', ' ')} {other}, {show(limit)}"
+        raise ParameterError(type(parameters).__name__, name, rule, show(value))
 
 
 def mark_formed(target: Floats, rest: float | Floats, band: float | Floats) -> Modes:

@@ -118,11 +118,6 @@ class Master(NamedTuple):
         """Height of the blister's top, m."""
         return self.height
 
-    @property
-    def ground(self) -> float:
-        """Height of the surface around the blister, m."""
-        return self.edge
-
 
 @dataclass(frozen=True, eq=False)
 class MasterCell:
