@@ -70,7 +70,7 @@ import numpy as np
 from ..base.modes import Mode
 from ..base.quantity import quantity
 from ..model.control_interface import Commands
-from .drive import CellwiseControl, TouchParameters, check_damping, make_drive
+from .pin_motion import CellwiseControl, TouchParameters, check_damping, make_pin_motion
 
 
 @dataclass(frozen=True)
@@ -92,13 +92,13 @@ class SpongeControl(CellwiseControl):
         speed = np.where(pressed, -seen.force / known.damping, (rest - seen.height) / known.swelling_time)
         mode = np.where(pressed, np.int8(Mode.SPRING), np.int8(Mode.REST))
         target = np.full(seen.height.shape, rest)
-        return memory, Commands(target, mode, self.drive.command(speed, seen.force))
+        return memory, Commands(target, mode, self.motion.command(speed, seen.force))
 
 
 def build(parameters, device):
     check_damping(parameters.damping, device.cell, device.period)
-    drive = make_drive(parameters, device.cell, device.period)
-    return SpongeControl(parameters, device.cell.actuator, drive)
+    motion = make_pin_motion(parameters, device.cell, device.period)
+    return SpongeControl(parameters, device.cell.actuator, motion)
 """
 #: What runs in the copy: three values of each part alone and in one batch; a line of JSON for each.
 SESSION = """

@@ -126,7 +126,7 @@ def test_a_cell_moves_by_its_law(method, known, given, speed):
     behavior = control(method, **known)
     command = orders(behavior, seen(behavior, **given)).command
     # Without load a pin's speed is the opening squared times the free speed.
-    assert np.sign(command) * command**2 * behavior.drive.up[-1] == pytest.approx(speed, abs=TABLE)
+    assert np.sign(command) * command**2 * behavior.motion.up[-1] == pytest.approx(speed, abs=TABLE)
 
 
 @table(
@@ -202,7 +202,7 @@ def test_push_pull_never_reads_the_force_and_listens_down_as_fast_as_up():
     assert np.all(up > 0.0)
     assert np.array_equal(up, -down)  # the reservoirs are alike
     table = {"supply": {"high": 0.8e5, "low": -0.2e5}, "control": {"method": "push_pull"}}
-    up, down = assemble(resolve(table)).controller.drive.open_for(np.array([8e-3, -8e-3]))
+    up, down = assemble(resolve(table)).controller.motion.open_for(np.array([8e-3, -8e-3]))
     # Flow goes with the square of the opening and the pressure: 4 times the pressure, half the
     # opening. The conduit and the table's interpolation change it by some percent.
     assert -down / up == pytest.approx(2.0, rel=0.05)
@@ -234,7 +234,7 @@ def test_a_move_of_blocked_pins_waits_for_its_patience(patience, starts):
 
 
 def driven(**table):
-    return assemble(resolve({"control": {"method": "elastic"}, **table})).controller.drive
+    return assemble(resolve({"control": {"method": "elastic"}, **table})).controller.motion
 
 
 def bed(arrangement, rows=7, columns=7):
@@ -247,8 +247,8 @@ def test_a_drive_is_limited_to_its_valve_and_approaches_a_height_in_its_settling
     # 1 mm in 20 ms; nothing within the dead band.
     assert driven().approach(np.array([-9.9e-6, 9.9e-6, 1e-3])) == pytest.approx([0.0, 0.0, 50e-3])
     # Reservoirs that cannot raise a pin give finite commands.
-    drive = driven(supply={"high": -0.1e5, "low": -0.5e5})
-    assert np.all(np.abs(drive.open_for(np.array([-0.02, 0.0, 0.02]))) <= 1.0)
+    motion = driven(supply={"high": -0.1e5, "low": -0.5e5})
+    assert np.all(np.abs(motion.open_for(np.array([-0.02, 0.0, 0.02]))) <= 1.0)
 
 
 @pytest.mark.parametrize("arrangement", ARRANGEMENTS)

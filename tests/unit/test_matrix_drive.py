@@ -11,7 +11,7 @@ from digiclay.core.control.orders import place
 from digiclay.core.engine.simulation import begin, periods
 from digiclay.core.model.control_interface import Commands, Measurement
 from digiclay.core.model.layout import Layout
-from digiclay.core.model.matrix_drive import POLICIES, MatrixDrive, make_addressing
+from digiclay.core.model.matrix_drive import POLICIES, DriveParameters, make_addressing
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.toml_table import format_scene, resolve
 from digiclay.core.session import snapshot
@@ -55,7 +55,7 @@ def serve(drive, command, force=(), state=None, period=0):
     """Return state and acting commands of a bed, from a table of commands."""
     command = np.array(command, float)
     layout = Layout(*command.shape)
-    matrix = make_addressing(MatrixDrive(**drive), layout, 5e-3, 0.0)
+    matrix = make_addressing(DriveParameters(**drive), layout, 5e-3, 0.0)
     size, none = command.size, np.zeros(command.size)
     pressing = none if not len(force) else np.array(force, float).ravel()
     seen = Measurement(

@@ -5,7 +5,6 @@ from functools import cache
 import numpy as np
 import pytest
 from digiclay.core.base.modes import Mode
-from digiclay.core.control.drive import DriveParameters
 from digiclay.core.control.methods import METHODS
 from digiclay.core.control.orders import (
     Orders,
@@ -16,6 +15,7 @@ from digiclay.core.control.orders import (
     repeat_order,
     share,
 )
+from digiclay.core.control.pin_motion import MotionParameters
 from digiclay.core.control.virtual_master import Master, Phase
 from digiclay.core.engine.simulation import begin
 from digiclay.core.model.control_interface import Measurement
@@ -29,7 +29,7 @@ from tests.assemble import assert_near, table
 from tests.reliefs import heighten, make_orders, make_spike_and_ridge, measure_roughness, stay_away
 
 ARRANGEMENTS = ("aligned", "staggered", "hexagonal")
-BAND = DriveParameters().dead_band
+BAND = MotionParameters().dead_band
 RADIUS = 10e-3
 KEEP_HEIGHTS = ("virtual_master", "cell_states", "plastic", "push_pull")
 STIFF = {"preset": "fast", "actuator": {"bore": 1e-3}}

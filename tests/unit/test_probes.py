@@ -6,7 +6,7 @@ import digiclay
 import numpy as np
 import pytest
 from digiclay import DigiclayError
-from digiclay.core.model.matrix_drive import MatrixDrive
+from digiclay.core.model.matrix_drive import DriveParameters
 from digiclay.core.scene.toml_table import tabulate
 
 from tests.assemble import refused_in_a_line
@@ -61,7 +61,7 @@ def test_a_pin_moves_as_the_equations_of_valve_and_cylinder_say():
     np.testing.assert_allclose(height, wanted, atol=1e-9)
     assert digiclay.step_response(plain, 1.0, 10.0).height[-1] == plain.actuator.stroke
     for drive in ({"sections": 4}, {"kind": "servo"}):  # the valve alone counts
-        driven = plain.with_sections(drive=MatrixDrive(**drive))
+        driven = plain.with_sections(drive=DriveParameters(**drive))
         assert digiclay.step_response(driven, 1.0, 10.0).height[-1] == plain.actuator.stroke
     assert (
         digiclay.step_response(digiclay.scene("five_fingers_mound"), 0.0).height.tolist()

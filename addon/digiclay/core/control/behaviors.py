@@ -15,15 +15,15 @@ from ..model.actuator import Actuator
 from ..model.control_interface import Commands, Measurement, Memory
 from ..model.layout import Disc
 from .device_info import DeviceInfo, check_floor
-from .drive import (
+from .exchange import Exchange, make_exchange
+from .pin_motion import (
     CellwiseControl,
-    Drive,
+    PinMotion,
     TouchParameters,
     check_damping,
-    make_drive,
+    make_pin_motion,
     raise_felt_force,
 )
-from .exchange import Exchange, make_exchange
 from .servo import check_order
 
 #: Share of the felt force above which a touched cell remains touched: its spring may press no
@@ -60,10 +60,10 @@ class ElasticControl(CellwiseControl):
         error = rest - seen.height
         pressed = seen.force >= gains.felt_force * np.where(seen.mode == SPRING, STILL, 1.0)
         giving = (gains.stiffness * error - seen.force) / gains.damping
-        speed = np.where(pressed, giving, self.drive.approach(error))
+        speed = np.where(pressed, giving, self.motion.approach(error))
         mode = np.where(pressed, SPRING, REST)
         target = np.full(seen.height.shape, rest)
-        return memory, Commands(target, mode, self.drive.command(speed, seen.force))
+        return memory, Commands(target, mode, self.motion.command(speed, seen.force))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -103,13 +103,13 @@ class PlasticControl(CellwiseControl):
         yielding = seen.force > limits.yield_force
         target = np.where(yielding, np.minimum(seen.target, seen.height), seen.target)
         # A pin under the fingertip is not raised again after it has sunk beyond its target.
-        back = self.drive.approach(target - seen.height)
+        back = self.motion.approach(target - seen.height)
         speed = np.where(pressed, np.minimum(back, 0.0), back)
         np.putmask(speed, yielding, (limits.yield_force - seen.force) / limits.damping)
-        mode = self.drive.mark_formed(target, self.actuator.rest_height)
+        mode = self.motion.mark_formed(target, self.actuator.rest_height)
         np.putmask(mode, pressed, SPRING)
         np.putmask(mode, yielding, FORCE_FOLLOW)
-        return memory, Commands(target, mode, self.drive.command(speed, seen.force))
+        return memory, Commands(target, mode, self.motion.command(speed, seen.force))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -176,7 +176,7 @@ class ViscousControl:
 
     parameters: Viscous
     actuator: Actuator
-    drive: Drive
+    motion: PinMotion
     exchange: Exchange
     period: float
     margin: float
@@ -214,7 +214,9 @@ class ViscousControl:
         target, formed = rest + shift, size > gains.dead_band
         # The surface creeps by less than the dead band per period: its speed is added.
         creep = np.where(formed, (target - seen.target) / self.period, 0.0)
-        command = self.drive.command(creep + self.drive.approach(target - seen.height), seen.force)
+        command = self.motion.command(
+            creep + self.motion.approach(target - seen.height), seen.force
+        )
         return memory, Commands(target, self._modes(seen.cells, pressed, formed), command)
 
     def _modes(self, cells: Cells, pressed: Flags, formed: Flags) -> Modes:
@@ -238,12 +240,12 @@ def build(parameters: Any, device: DeviceInfo) -> ElasticControl | PlasticContro
         check_floor(
             parameters.yield_force, "yield_force", parameters.yield_force, device.force_floor
         )
-    actuator, drive = device.cell.actuator, make_drive(parameters, device.cell, device.period)
+    actuator, motion = device.cell.actuator, make_pin_motion(parameters, device.cell, device.period)
     parameters = raise_felt_force(device.force_floor, parameters)
     if isinstance(parameters, Elastic):
-        return ElasticControl(parameters, actuator, drive)
+        return ElasticControl(parameters, actuator, motion)
     if isinstance(parameters, Plastic):
-        return PlasticControl(parameters, actuator, drive)
+        return PlasticControl(parameters, actuator, motion)
     exchange = make_exchange(device.grid, parameters.diffusivity, device.period)
     margin = 2.0 * device.grid.layout.pitch
-    return ViscousControl(parameters, actuator, drive, exchange, device.period, margin)
+    return ViscousControl(parameters, actuator, motion, exchange, device.period, margin)

@@ -21,13 +21,13 @@ from ..model.control_interface import Commands, Controller, Measurement, Memory,
 from ..model.layout import Disc, Grid
 from ..shapes.request import Shape
 from .device_info import DeviceInfo, check_floor
-from .drive import (
+from .pin_motion import (
     CellwiseControl,
-    Drive,
-    DriveParameters,
+    MotionParameters,
+    PinMotion,
     TouchParameters,
     check_damping,
-    make_drive,
+    make_pin_motion,
     raise_felt_force,
 )
 from .servo import declare_again, take_cells
@@ -153,12 +153,12 @@ class ForceDisplayControl(CellwiseControl):
         seen.own[0] = np.where(felt, alone, 0.0)
         limit = np.minimum(rest + gains.rise, self.actuator.stroke)
         pressing = np.minimum(
-            (asked - seen.force) / gains.damping, (limit - seen.height) / self.drive.settling_time
+            (asked - seen.force) / gains.damping, (limit - seen.height) / self.motion.settling_time
         )
-        speed = np.where(felt, pressing, self.drive.approach(rest - seen.height))
+        speed = np.where(felt, pressing, self.motion.approach(rest - seen.height))
         mode = np.where(felt, FORCE_FOLLOW, REST)
         target = np.full(seen.height.shape, rest)
-        return memory, Commands(target, mode, self.drive.command(speed, seen.force))
+        return memory, Commands(target, mode, self.motion.command(speed, seen.force))
 
 
 def make_force_display(parameters: ForceDisplay, device: DeviceInfo) -> ForceDisplayControl:
@@ -184,8 +184,8 @@ def make_force_display(parameters: ForceDisplay, device: DeviceInfo) -> ForceDis
             raise ParameterError(
                 "control", "contrast", rule, f"{field.min():.3g} N at its smallest"
             )
-    drive = make_drive(parameters, device.cell, device.period)
-    return ForceDisplayControl(parameters, device.cell.actuator, drive, device.period, field)
+    motion = make_pin_motion(parameters, device.cell, device.period)
+    return ForceDisplayControl(parameters, device.cell.actuator, motion, device.period, field)
 
 
 class Move(NamedTuple):
@@ -204,7 +204,7 @@ class Progress(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class ShapeDisplay(DriveParameters):
+class ShapeDisplay(MotionParameters):
     """Displayed shape and its refresh."""
 
     shape: str = quantity("dome", "displayed shape: its name, or a file .npy of heights, m")
@@ -255,7 +255,7 @@ class ShapeDisplayControl:
     parameters: ShapeDisplay
     grid: Grid
     actuator: Actuator
-    drive: Drive
+    motion: PinMotion
     heights: Floats
     """(n,): Of the shape, m."""
     moves: tuple[Move, ...]
@@ -280,8 +280,8 @@ class ShapeDisplayControl:
         if memory.move < len(self.moves):
             memory, target = self._make_moves(memory, seen)
         error = target - seen.height
-        command = self.drive.command(self.drive.approach(error), seen.force)
-        mode = self.drive.mark_formed(target, self.actuator.rest_height)
+        command = self.motion.command(self.motion.approach(error), seen.force)
+        mode = self.motion.mark_formed(target, self.actuator.rest_height)
         np.putmask(mode, np.abs(error) > self.parameters.dead_band, BLISTER)
         return memory, Commands(target, mode, command)
 
@@ -318,11 +318,11 @@ def make_shape_display(parameters: ShapeDisplay, device: DeviceInfo) -> ShapeDis
             raise ParameterError(
                 "control", "amplitude", rule, f"heights from {low:.6g} m to {high:.6g} m"
             )
-    drive = make_drive(parameters, device.cell, device.period)
+    motion = make_pin_motion(parameters, device.cell, device.period)
     moves = parameters.moves(grid.layout.rows)
     patience = math.ceil(parameters.patience / device.period)
     whole = 0.0, 0.0, float(np.hypot(grid.x, grid.y).max())
-    return ShapeDisplayControl(parameters, grid, actuator, drive, heights, moves, patience, whole)
+    return ShapeDisplayControl(parameters, grid, actuator, motion, heights, moves, patience, whole)
 
 
 def build(
@@ -404,7 +404,7 @@ def make_handover(
     """Return a shape's display followed by a method; `recovers`: whether its cells return to rest."""
     assert device.heights is not None
     # As fast as a display alone, within the limit of the control period.
-    settling = max(DriveParameters().settling_time, 2.0 * device.period)
+    settling = max(MotionParameters().settling_time, 2.0 * device.period)
     parameters = ShapeDisplay(
         refresh=shape.refresh,
         surfaces=shape.surfaces,

@@ -14,7 +14,7 @@ import numpy as np
 from ..base.arrays import Constants, Floats
 from ..model.delay import Queue
 from ..model.physics import Cell
-from .drive import OPENINGS, find_free_speeds
+from .pin_motion import OPENINGS, find_free_speeds
 
 #: Instants of a control period at which the lag of the valve is evaluated.
 INSTANTS = 64

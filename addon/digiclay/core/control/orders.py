@@ -43,8 +43,8 @@ from ..model.control_interface import Commands, Controller, Measurement, Memory
 from ..model.layout import Disc, Grid, add_disc, widen_disc
 from ..model.null_parts import Uncontrolled
 from ..model.physics import Cell
-from .drive import Drive, DriveParameters, make_drive
 from .exchange import Exchange, make_exchange
+from .pin_motion import MotionParameters, PinMotion, make_pin_motion
 from .servo import mark_formed
 from .travel import measure_square
 
@@ -159,7 +159,7 @@ class DrivingControl(Around):
 
     free: bool
     """Whether the bed has no method."""
-    drive: Drive
+    motion: PinMotion
     actuator: Actuator
     reach: Disc
     """Disc of the driven cells, and of those whose heights they depend on, m."""
@@ -180,13 +180,13 @@ class DrivingControl(Around):
         target, driven, busy = self.aim(seen)
         # Pins that the method moves as part of its blister are not driven by an order.
         ordered = driven | (moved & (orders.mode <= HOLD))
-        error, band = target - seen.height, self.drive.dead_band
+        error, band = target - seen.height, self.motion.dead_band
         # An error within the dead band of what is placed may be one of what forms pins.
         mode = mark_formed(
-            target, self.actuator.rest_height, max(band, DriveParameters().dead_band)
+            target, self.actuator.rest_height, max(band, MotionParameters().dead_band)
         )
         np.putmask(mode, busy | (np.abs(error) > band), BLISTER)
-        command = self.drive.command(self.drive.approach(error), seen.force)
+        command = self.motion.command(self.motion.approach(error), seen.force)
         np.copyto(target, orders.target, where=~ordered)
         np.copyto(mode, orders.mode, where=~ordered)
         np.copyto(command, orders.command, where=~ordered)
@@ -295,7 +295,7 @@ class LockingControl(Around):
         if not any_true(locked):
             return seen
         formed = mark_formed(
-            seen.target, self.cell.actuator.rest_height, DriveParameters().dead_band
+            seen.target, self.cell.actuator.rest_height, MotionParameters().dead_band
         )
         return seen._replace(mode=np.where(locked, formed, seen.mode))
 
@@ -318,11 +318,13 @@ def order_periods(
     """
     quick, plan = 2.0 * period, grid.layout
     # As fast as a display, within the limit of the control period.
-    drive = make_drive(DriveParameters(max(DriveParameters().settling_time, quick)), cell, period)
+    motion = make_pin_motion(
+        MotionParameters(max(MotionParameters().settling_time, quick)), cell, period
+    )
     # A loop of gain 1/T oscillates if T is below e times its dead time; sampling adds half a
     # control period.
     settling = max(quick, math.e * (latency + 0.5 * period))
-    exact = make_drive(DriveParameters(settling, max(BAND, floor)), cell, period)
+    exact = make_pin_motion(MotionParameters(settling, max(BAND, floor)), cell, period)
     margin, free = MARGIN * max(plan.pitch, plan.row_spacing), isinstance(method, Uncontrolled)
     circles: dict[int, Disc | None] = {}
     actuator, held = cell.actuator, method
@@ -351,7 +353,7 @@ def order_periods(
             even, time = (smooth, SPREADING) if verb is Verb.SMOOTH else (average, AVERAGING)
             exchange = make_exchange(grid, strength * radius**2 / time, period)
             aim, reach = brush(disc, strength, partial(even, exchange)), (x, y, radius + margin)
-            yield DrivingControl(held, free, drive, actuator, reach, aim)
+            yield DrivingControl(held, free, motion, actuator, reach, aim)
 
 
 def find_fault(orders: Orders, periods: int, pins: int, stroke: float) -> str:

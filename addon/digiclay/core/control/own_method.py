@@ -26,7 +26,7 @@ from ..base.quantity import quantity
 from ..model.control_interface import Commands, Controller, Measurement, Memory
 from ..model.layout import Disc
 from .device_info import DeviceInfo, suppress_noise
-from .drive import Drive, DriveParameters, make_drive
+from .pin_motion import MotionParameters, PinMotion, make_pin_motion
 
 #: The highest code of a mode; the lowest is 0.
 HIGHEST = int(Mode.FROZEN)
@@ -66,7 +66,7 @@ class Orders(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class OwnMethod(DriveParameters):
+class OwnMethod(MotionParameters):
     """Base of the control methods of one's own; a subclass is a frozen dataclass with fields of `quantity`.
 
     Its first line of documentation is what Blender shows of it. What is no field, below, a subclass
@@ -120,7 +120,7 @@ class OwnMethod(DriveParameters):
 
     def build(self, device: DeviceInfo) -> Controller:
         """Return the controller for a device; a method with a controller of its own overrides this."""
-        return OwnControl(self, device, make_drive(self, device.cell, device.period))
+        return OwnControl(self, device, make_pin_motion(self, device.cell, device.period))
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,7 +129,7 @@ class OwnControl:
 
     parameters: OwnMethod
     device: DeviceInfo
-    drive: Drive
+    motion: PinMotion
 
     @property
     def rows(self) -> int:
@@ -166,12 +166,12 @@ class OwnControl:
             raise ValueError("must order heights with drive.kind = servo, not openings alone")
         target = np.clip(seen.target if height is None else height, 0.0, actuator.stroke)
         if opening is None:
-            command = self.drive.command(self.drive.approach(target - seen.height), seen.force)
+            command = self.motion.command(self.motion.approach(target - seen.height), seen.force)
         else:
             command = np.clip(opening, -1.0, 1.0)
         if mode is None:
             touched = suppress_noise(seen.force, self.device.force_floor) > 0.0
-            formed = self.drive.mark_formed(target, actuator.rest_height)
+            formed = self.motion.mark_formed(target, actuator.rest_height)
             mode = np.where(touched, FORCE_FOLLOW, formed)
         if rows is not None:
             seen.own[:] = rows

@@ -18,7 +18,7 @@ from ..model.actuator import Actuator
 from ..model.control_interface import Commands, Measurement
 from ..model.layout import RELATIVE_TOLERANCE, Disc
 from .device_info import DeviceInfo
-from .drive import Drive, DriveParameters, make_drive
+from .pin_motion import MotionParameters, PinMotion, make_pin_motion
 from .servo import check_order
 from .travel import measure_square
 
@@ -36,7 +36,7 @@ class Listening(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class PushPull(DriveParameters):
+class PushPull(MotionParameters):
     """Motion of listening pins, and their compliance."""
 
     listening_speed: float = quantity(
@@ -82,7 +82,7 @@ class PushPullControl:
 
     parameters: PushPull
     actuator: Actuator
-    drive: Drive
+    motion: PinMotion
     period: float
     margin: float
 
@@ -121,10 +121,12 @@ class PushPullControl:
         # Centering acts only in the rising half, and so at twice the speed.
         centering = CYCLE * error / speeds.centring_time
         swing = stroke + centering if rising else -stroke
-        speed = np.where(listening, swing + speeds.assist * seen.own[1], self.drive.approach(error))
-        mode = self.drive.mark_formed(target, self.actuator.rest_height)
+        speed = np.where(
+            listening, swing + speeds.assist * seen.own[1], self.motion.approach(error)
+        )
+        mode = self.motion.mark_formed(target, self.actuator.rest_height)
         np.putmask(mode, touched & listening, FORCE_FOLLOW)
-        return memory, Commands(target, mode, self.drive.open_for(speed))
+        return memory, Commands(target, mode, self.motion.open_for(speed))
 
     def _drag_targets(self, seen: Measurement, listening: Flags) -> Floats:
         """Return the targets after a cycle; updates the rows of the cells in place."""
@@ -152,6 +154,6 @@ def build(parameters: PushPull, device: DeviceInfo) -> PushPullControl:
     if not parameters.threshold > ripple:
         rule = f"must be above a listening pin's own way in a control period, {ripple:g} m"
         raise ParameterError("control", "threshold", rule, f"{parameters.threshold:g} m")
-    drive = make_drive(parameters, device.cell, device.period)
+    motion = make_pin_motion(parameters, device.cell, device.period)
     margin = device.grid.layout.pitch
-    return PushPullControl(parameters, device.cell.actuator, drive, device.period, margin)
+    return PushPullControl(parameters, device.cell.actuator, motion, device.period, margin)

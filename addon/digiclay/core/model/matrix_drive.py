@@ -54,8 +54,8 @@ PRESSED = 5.0
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class MatrixDrive(Parameters):
-    """Valves for lines and columns of cells."""
+class DriveParameters(Parameters):
+    """Parameters of a drive: of valves for lines and columns of cells, or of servos."""
 
     kind: str = quantity(
         "matrix",
@@ -220,7 +220,7 @@ class Addressing(NamedTuple):
 class MatrixAddressing:
     """Drive of a bed by lines and columns."""
 
-    parameters: MatrixDrive
+    parameters: DriveParameters
     layout: Layout
     slot: int
     """Control periods."""
@@ -307,7 +307,7 @@ class MatrixAddressing:
 
 
 def make_addressing(
-    drive: MatrixDrive, layout: Layout, period: float, floor: float
+    drive: DriveParameters, layout: Layout, period: float, floor: float
 ) -> MatrixAddressing:
     """Put the drive of a bed together; control period, s; noise floor of a cell's force, N."""
     return MatrixAddressing(drive, layout, count_periods(drive.slot, period), max(floor, TIE))

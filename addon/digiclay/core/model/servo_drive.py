@@ -11,7 +11,7 @@ from ..base.arrays import Cells, Flags, Floats
 from ..base.modes import LOCKED
 from .control_interface import Commands, Measurement
 from .layout import Layout
-from .matrix_drive import MatrixDrive, count_periods
+from .matrix_drive import DriveParameters, count_periods
 
 
 class FrameState(NamedTuple):
@@ -28,7 +28,7 @@ class FrameState(NamedTuple):
 class ServoDrive:
     """Servos of all pins; of a control method they take the heights, not the valve commands."""
 
-    parameters: MatrixDrive
+    parameters: DriveParameters
     frame: int
     """Control periods."""
     start: FrameState
@@ -63,7 +63,7 @@ class ServoDrive:
         return state, orders._replace(command=command)
 
 
-def make_servos(drive: MatrixDrive, layout: Layout, period: float) -> ServoDrive:
+def make_servos(drive: DriveParameters, layout: Layout, period: float) -> ServoDrive:
     """Put the drive of a bed together; control period, s."""
     lines, cells = drive.count_lines(layout), layout.rows * layout.columns
     served, last, none = np.ones(lines, np.bool_), np.zeros(lines, np.intp), np.empty(0, np.intp)

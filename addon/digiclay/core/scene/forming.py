@@ -43,12 +43,14 @@ def compute_display_time(display: ShapeDisplayControl) -> float:
     A move lasts as long as its distance takes at the slower reservoir's speed, plus the settling of
     the height control to the dead band; at most its patience.
     """
-    shape, drive = display.parameters, display.drive
+    shape, motion = display.parameters, display.motion
     distance = float(np.abs(display.heights - display.actuator.rest_height).max(initial=0.0))
     if shape.refresh != "one_time":
         distance /= shape.surfaces
-    speed = min(float(drive.up[-1]), float(drive.down[-1]))
-    settling = drive.settling_time * math.log(max(distance / max(drive.dead_band, 1e-9), 1.0) + 1.0)
+    speed = min(float(motion.up[-1]), float(motion.down[-1]))
+    settling = motion.settling_time * math.log(
+        max(distance / max(motion.dead_band, 1e-9), 1.0) + 1.0
+    )
     move = min(distance / speed + settling + 0.05, shape.patience)
     return math.ceil(10.0 * (MARGIN + len(display.moves) * move)) / 10.0
 

@@ -25,7 +25,7 @@ if TYPE_CHECKING:  # a part that is left out is never imported, see `import_part
     from ..model.fingertip import Fingertip
     from ..model.lag import ValveLag
     from ..model.layout import Layout
-    from ..model.matrix_drive import MatrixDrive
+    from ..model.matrix_drive import DriveParameters
     from ..model.relaxation import Relaxation
     from ..model.sensors import Sensing
     from ..model.valve import Fluid, Valve
@@ -44,7 +44,7 @@ PARTS: dict[str, tuple[str, str]] = {
     "conduit": ("model.conduit", "Conduit"),
     "valve_lag": ("model.lag", "ValveLag"),
     "delay": ("model.delay", "Delay"),
-    "drive": ("model.matrix_drive", "MatrixDrive"),
+    "drive": ("model.matrix_drive", "DriveParameters"),
     "fingertip": ("model.fingertip", "Fingertip"),
     "relaxation": ("model.relaxation", "Relaxation"),
     "hand": ("model.yielding_hand", "Hand"),
@@ -224,7 +224,7 @@ class Scene(Described):
     sensors: Sensing | None = None
     shape: Shape | None = None
     bodies: tuple[Presser, ...] = ()
-    drive: MatrixDrive | None = None
+    drive: DriveParameters | None = None
 
     def __post_init__(self) -> None:
         self._refuse_wrong_parts()

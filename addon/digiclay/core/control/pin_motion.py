@@ -24,7 +24,7 @@ OPENINGS = np.linspace(0.0, 1.0, 129)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class DriveParameters(ControlParameters):
+class MotionParameters(ControlParameters):
     """Parameters of the height control of every behavior."""
 
     settling_time: float = quantity(
@@ -38,7 +38,7 @@ class DriveParameters(ControlParameters):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class TouchParameters(DriveParameters):
+class TouchParameters(MotionParameters):
     """Parameters of the behaviors that use the force on each cell."""
 
     felt_force: float = quantity(
@@ -61,7 +61,7 @@ def raise_felt_force(floor: float, parameters: Touch) -> Touch:
 
 
 @dataclass(frozen=True, eq=False)
-class Drive:
+class PinMotion:
     """Conversion of pin speeds to valve commands."""
 
     settling_time: float
@@ -91,8 +91,8 @@ class Drive:
         return mark_formed(target, rest, self.dead_band)
 
 
-class BalancingDrive(Drive):
-    """Drive of back-drivable motors, which balance the load."""
+class BalancingMotion(PinMotion):
+    """Motion by back-drivable motors, which balance the load."""
 
     def command(self, speed: Floats, force: Floats) -> Floats:
         """Return motor commands for speeds, m/s, under forces, N: ``K = v / v0 + F / F_stall``."""
@@ -103,9 +103,9 @@ class BalancingDrive(Drive):
 class CellwiseControl(BatchControl):
     """Controller without memory: the orders for a cell depend on that cell alone."""
 
-    parameters: DriveParameters
+    parameters: MotionParameters
     actuator: Actuator
-    drive: Drive
+    motion: PinMotion
 
     rows = 0
 
@@ -136,13 +136,13 @@ def find_free_speeds(cell: Cell, way: float) -> Floats:
     return np.maximum(free, 0.0) + 1e-12 * OPENINGS
 
 
-def make_drive(parameters: DriveParameters, cell: Cell, period: float) -> Drive:
-    """Make the drive; ParameterError when the height control would be faster than its control period, s."""
+def make_pin_motion(parameters: MotionParameters, cell: Cell, period: float) -> PinMotion:
+    """Return the motion of pins; ParameterError when heights are approached faster than in two periods, s."""
     if parameters.settling_time < 2.0 * period:
         rule = f"must be at least two control periods, {2.0 * period:g} s"
         raise ParameterError("control", "settling_time", rule, f"{parameters.settling_time:g} s")
     supply = cell.supply
-    kind = Drive if supply.locks else BalancingDrive
+    kind = PinMotion if supply.locks else BalancingMotion
     return kind(
         parameters.settling_time,
         parameters.dead_band,
