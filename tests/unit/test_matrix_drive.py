@@ -241,6 +241,22 @@ def test_a_state_of_a_bed_without_a_drive_goes_on_with_one_and_of_other_lines_is
         snapshot.load(rows, snapshot.dump(driven, state))
 
 
+@pytest.mark.parametrize("other", [{"axis": "columns"}, {"sections": 2}], ids=str)
+@pytest.mark.parametrize("gates", [{}, {"line_lag": "1 ms"}], ids=str)
+def test_in_mid_slot_a_state_of_other_sets_of_lines_addresses_the_first_of_its_own(other, gates):
+    square, drive = {"rows": 11, "columns": 11}, {"sections": 3, "slot": 15e-3, **gates}
+    rows, others = (assemble(scene(given, layout=square)) for given in (drive, {**drive, **other}))
+    paths = scene(drive, layout=square).trajectories()
+    *_, half = periods(rows, paths, begin(rows), 40)
+    data = snapshot.dump(rows, half)
+    assert snapshot.load(rows, data).addressing.served.tolist() == half.addressing.served.tolist()
+    former = snapshot.load(others, data)
+    assert np.flatnonzero(former.addressing.served).tolist() == [*range(others.drive.sets[1])]
+    for state in periods(others, paths, former, 20):
+        served = np.flatnonzero(state.addressing.served)
+        assert np.unique(served % others.drive.sets[1]).size == served.size
+
+
 def test_orders_to_the_valves_pass_the_drive_and_a_take_is_replayed_bit_for_bit():
     made = scene({"sections": 1})
     system, count = assemble(made), 400

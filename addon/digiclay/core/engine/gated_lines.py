@@ -78,6 +78,11 @@ class GatedDrive:
         return gates
 
     @property
+    def sets(self) -> list[str | int]:
+        """Axis and number of sets."""
+        return self.lines.sets
+
+    @property
     def filled(self) -> slice[int, int, None]:
         """Row of the volumes between gates, none without them."""
         return slice(self.cell.lag_rows.start + 2, self.cell.lag_rows.stop)

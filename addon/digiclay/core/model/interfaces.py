@@ -116,6 +116,10 @@ class Sensors(Protocol):
 class Drive(Protocol):
     """Valves between a controller's commands and the cells; its state is an argument and a result."""
 
+    @property
+    def sets(self) -> list[str | int]:
+        """Axis of its lines, and number of their sets: a stored state of others begins anew."""
+
     def begin(self) -> Any:
         """Return the state before a session."""
 

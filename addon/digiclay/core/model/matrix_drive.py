@@ -232,6 +232,11 @@ class MatrixAddressing:
         """Number of lines."""
         return self.parameters.count_lines(self.layout)
 
+    @property
+    def sets(self) -> list[str | int]:
+        """Axis and number of sets."""
+        return [self.parameters.axis, self.parameters.sections]
+
     def begin(self) -> Addressing:
         """Return the state before a session: each set addresses its first line."""
         lines = self.lines

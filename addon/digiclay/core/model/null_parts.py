@@ -81,6 +81,8 @@ class PerfectSensors(Alike, Sensors):
 class DirectDrive(Alike):
     """A valve per cell: every command acts."""
 
+    sets: ClassVar[list[str | int]] = []
+
     def begin(self) -> None:
         """Nothing to remember."""
 

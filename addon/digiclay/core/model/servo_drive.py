@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
@@ -32,6 +32,8 @@ class ServoDrive:
     frame: int
     """Control periods."""
     start: FrameState
+
+    sets: ClassVar[list[str | int]] = []
 
     def begin(self) -> FrameState:
         """Return the state before a session: no pin has a height to follow."""

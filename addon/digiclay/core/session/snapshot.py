@@ -132,6 +132,7 @@ def dump(system: System, state: State) -> bytes:
     given = {name: flatten(array, arrays) for name, array in optional.items() if array is not None}
     if state.addressing is not None:
         given["addressing"] = flatten(state.addressing, arrays)
+        given["sets"] = system.drive.sets
     values = state.rows, state.modes, state.aged, active.cells, active.block, active.mode
     body = [
         np.ascontiguousarray(array, kind)
@@ -203,8 +204,11 @@ def load(system: System, data: bytes) -> State:
     locks = stored.arrays.get("locks")
     deflection, addressing = rest_hands(system.hands), system.drive.begin()
     if addressing is not None and "addressing" in header:
-        addressing = rebuild(addressing, header["addressing"], stored.memory)
-        _check_same("lines of the drive", addressing.last.size, system.drive.begin().last.size)
+        former = rebuild(addressing, header["addressing"], stored.memory)
+        _check_same("lines of the drive", former.last.size, addressing.last.size)
+        # Lines of other sets are addressed anew.
+        if header.get("sets", system.drive.sets) == system.drive.sets:
+            addressing = former
     if deflection and "hands" in stored.arrays:
         deflection = type(deflection)(*stored.arrays["hands"])
     peak = header["peak"]
