@@ -96,6 +96,9 @@ def fit_ranges(ranges: Sequence[Range], path: Path, settings: Sequence[Setting])
 
 def _fit(varied: Range, scene: Scene, path: Path, settings: Sequence[Setting]) -> Range:
     """Return a range as the scene's parameter has it."""
+    if axes.find_quantity(scene, varied.key) is None:
+        # A part that is absent, until it is varied; an unknown key is refused.
+        scene = load(path, [*settings, Setting(varied.key, varied.find_word(0.0), "--vary")])
     declared = axes.find_quantity(scene, varied.key)
     if declared is None or varied.words:
         # An unknown key, or a word: the scene file's own rules tell.

@@ -225,6 +225,12 @@ def fit(*said, settings=()):
     return fit_ranges([read_range(one) for one in said], find("slow_press"), settings)
 
 
+def test_a_range_of_a_part_that_the_scene_does_not_have_has_whole_numbers_and_units_too():
+    sections, noise = fit("drive.sections=2:9", "sensors.force_noise=0 mN:4 mN")
+    assert [sections.find_word(share) for share in (0.0, 0.4, 1.0)] == ["2", "5", "9"]
+    assert (noise.si, noise.convert(noise.find_word(0.5))) == ("N", pytest.approx(2e-3))
+
+
 def test_a_parameter_is_given_once_with_the_values_it_can_have():
     rows, stroke = fit("layout.rows=11:15", "valve.stroke=20 um:40 um")
     # Every whole number of a range has an equal share, and stays one in SI.
