@@ -8,7 +8,7 @@ from digiclay.live import handlers, tick
 from digiclay.operators.press_curves import read_lines
 from digiclay.press import brush, tool
 from digiclay.sessions import running
-from digiclay.sessions.forming_device import find_device
+from digiclay.sessions.running import find_device
 from digiclay.strokes.nominal import find_nominal
 from digiclay.strokes.stroke import Brush, Combine
 

@@ -345,18 +345,11 @@ def test_a_stroke_combines_and_is_limited_as_the_tool_is_set(
 
 
 def test_a_falloff_of_the_tool_is_that_of_its_brush_and_smooth_has_one(settings):
-    kinds = Brush.RAISE, Brush.SMOOTH, Brush.ERASE
-    assert [brush.find_falloff(settings, kind).name for kind in kinds] == [
-        "DEVICE",
-        "SMOOTH",
-        "DEVICE",
-    ]
-    settings.falloff = "SPHERE"  # of the brush in hand, Lower, and of its inverse
-    assert [brush.find_falloff(settings, kind).name for kind in kinds] == [
-        "SPHERE",
-        "SMOOTH",
-        "DEVICE",
-    ]
+    for own, falloffs in (("DEVICE", ["DEVICE", "SMOOTH"]), ("SPHERE", ["SPHERE", "SMOOTH"])):
+        settings.falloff = own  # of the brush in hand, Lower, and of its inverse
+        kinds = Brush.RAISE, Brush.SMOOTH, Brush.ERASE
+        found = [brush.find_options(settings, kind)["falloff"].name for kind in kinds]
+        assert found == [*falloffs, "DEVICE"]
 
 
 #: Why the user's folder of presets cannot be written, by what stands there.

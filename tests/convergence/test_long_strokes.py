@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from digiclay.recorded.pointer_strokes import play_strokes, read_strokes
-from digiclay.sessions.forming_device import find_device
+from digiclay.sessions.running import find_device
 from digiclay.strokes import drawn
 from digiclay.strokes.queue_ghosts import find_ghosts
 from digiclay.strokes.stroke import make_images

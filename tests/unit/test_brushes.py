@@ -16,11 +16,11 @@ from digiclay.core.session import snapshot
 from digiclay.core.session.live_session import simulate_path
 from digiclay.recorded.takes import read_recording
 from digiclay.sessions import sculpting
-from digiclay.sessions.forming_device import find_device
+from digiclay.sessions.running import find_device
 from digiclay.sessions.sculpting import change_stroke, queue_stroke
 from digiclay.settings.devices import BEDS, make_scene
 from digiclay.strokes.nominal import find_nominal, find_radius
-from digiclay.strokes.stroke import Brush, draw, make_images, start
+from digiclay.strokes.stroke import SWEPT, Brush, draw, lay_path, make_images, start
 
 from tests.assemble import assert_near, replayed, table
 from tests.hand import TICK, go_on, heights, let_go, pin, pose, risen, started
@@ -210,6 +210,17 @@ def test_a_recording_of_strokes_is_a_take_that_replays_bit_for_bit(make):
     take = read_recording(make())
     assert take.orders is not None
     assert replayed(take)
+
+
+@pytest.mark.parametrize("brush", SWEPT)
+def test_a_sweep_that_comes_back_is_one_pass_although_strokes_accumulate(brush):
+    there = 1e-3 * np.column_stack([np.arange(-15.0, 16.0), np.zeros(31)])
+    left = []
+    for accumulate in (False, True):
+        stroke = start(0, *there[0], 4e-3, brush=brush, accumulate=accumulate)
+        session, _ = queue_stroke(started(), lay_path(stroke, [*there, *there[::-1]]))
+        left.append(finish(session).snapshot)
+    assert left[0] == left[1]
 
 
 def test_undo_shortens_the_orders_of_a_recording_with_its_path():

@@ -6,7 +6,7 @@ from functools import cache, partial
 import numpy as np
 import pytest
 from digiclay.sessions import sculpting
-from digiclay.sessions.forming_device import find_device
+from digiclay.sessions.running import find_device
 from digiclay.sessions.sculpting import change_stroke, queue_stroke
 from digiclay.strokes.queue_ghosts import find_ghosts
 from digiclay.strokes.stroke import ALONE, Brush, Combine, draw, lay_path, start

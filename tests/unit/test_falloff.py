@@ -13,7 +13,7 @@ from digiclay.core.model.layout import Layout, make_grid
 from digiclay.core.scene.toml_table import resolve
 from digiclay.recorded.takes import read_recording
 from digiclay.sessions import sculpting
-from digiclay.sessions.forming_device import find_device
+from digiclay.sessions.running import find_device
 from digiclay.sessions.sculpting import queue_stroke
 from digiclay.strokes import drawn
 from digiclay.strokes.falloff import Falloff, evaluate

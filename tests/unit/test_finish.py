@@ -11,7 +11,7 @@ from digiclay.core.shapes.heightmap import make_height_map
 from digiclay.recorded.pointer_strokes import PointerStroke, play_strokes, read_strokes
 from digiclay.recorded.takes import read_recording
 from digiclay.sessions import sculpting
-from digiclay.sessions.forming_device import find_device
+from digiclay.sessions.running import find_device
 from digiclay.sessions.sculpting import change_scene, change_stroke
 from digiclay.strokes import drawn
 from digiclay.strokes.nominal import find_nominal

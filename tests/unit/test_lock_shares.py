@@ -16,7 +16,7 @@ from digiclay.core.session.take import replay
 from digiclay.device.instant import find_ellipsoid
 from digiclay.recorded.takes import read_recording
 from digiclay.sessions import sculpting
-from digiclay.sessions.forming_device import find_device
+from digiclay.sessions.running import find_device
 from digiclay.sessions.sculpting import queue_stroke
 from digiclay.strokes import drawn
 from digiclay.strokes.falloff import Falloff, evaluate

@@ -12,7 +12,7 @@ from digiclay.core.model.layout import Layout, make_grid
 from digiclay.core.shapes.heightmap import make_height_map
 from digiclay.recorded.pointer_strokes import PointerStroke, play_strokes, read_strokes
 from digiclay.sessions import sculpting
-from digiclay.sessions.forming_device import find_device
+from digiclay.sessions.running import find_device
 from digiclay.sessions.sculpting import queue_stroke, reset, rewind
 from digiclay.settings.devices import BEDS, make_scene
 from digiclay.strokes import drawn

@@ -12,7 +12,7 @@ from digiclay.core.base.arrays import Floats
 from digiclay.core.model.fingertip import LEVEL, Fingertip
 from digiclay.core.model.layout import Layout
 from digiclay.sessions import sculpting
-from digiclay.sessions.forming_device import find_device
+from digiclay.sessions.running import find_device
 from digiclay.sessions.sculpting import change_stroke, queue_stroke, rewind
 from digiclay.settings.devices import BEDS, make_scene, scale_blister
 from digiclay.strokes import drawn

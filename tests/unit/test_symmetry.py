@@ -11,8 +11,7 @@ from digiclay.core.model.layout import Layout
 from digiclay.core.session import snapshot
 from digiclay.core.session.take import from_bytes, make_take, play, to_bytes
 from digiclay.recorded.takes import read_recording
-from digiclay.sessions.forming_device import find_device
-from digiclay.sessions.running import list_pressing
+from digiclay.sessions.running import find_device, list_pressing
 from digiclay.sessions.sculpting import (
     advance,
     begin_session,

@@ -20,8 +20,7 @@ from ..recorded import takes
 from ..recorded.bake import is_baked
 from ..roles import fingertips_of
 from ..sessions import running, sculpting, stored
-from ..sessions.forming_device import suit_scene
-from ..sessions.running import Running
+from ..sessions.running import Running, suit_scene
 from ..sessions.sculpting import drop_strokes
 from ..settings import properties
 from ..ui_text import localize

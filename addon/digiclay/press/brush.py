@@ -107,17 +107,17 @@ SYMMETRY_ITEMS = (
     ("XY", "X and Y", "Form the stroke and its three mirror images"),
     ("RADIAL", "Radial", "Form the stroke and its images rotated about the center"),
 )
-FALLOFF_WORDS = {
-    Falloff.DEVICE: "Profile of the blister; of brushes that press nothing, their own falloff",
-    Falloff.SMOOTH: "Rounded at both ends",
-    Falloff.SPHERE: "Rounded, steep at the rim",
-    Falloff.ROOT: "Broad, steep at the rim",
-    Falloff.SHARP: "Pointed, flat at the rim",
-    Falloff.LINEAR: "Straight",
-    Falloff.CONSTANT: "Full up to the rim",
-}
 FALLOFF_ITEMS = tuple(
-    (kind.value, kind.value.title(), words) for kind, words in FALLOFF_WORDS.items()
+    (kind.value, kind.value.title(), words)
+    for kind, words in {
+        Falloff.DEVICE: "Profile of the blister; of brushes that press nothing, their own falloff",
+        Falloff.SMOOTH: "Rounded at both ends",
+        Falloff.SPHERE: "Rounded, steep at the rim",
+        Falloff.ROOT: "Broad, steep at the rim",
+        Falloff.SHARP: "Pointed, flat at the rim",
+        Falloff.LINEAR: "Straight",
+        Falloff.CONSTANT: "Full up to the rim",
+    }.items()
 )
 #: Settings of a placed symmetry, and the shortest drag that turns its axis, m.
 PLACED, SHORT = ("symmetry", "center_x", "center_y", "axis"), 1e-3
@@ -207,7 +207,9 @@ def find_options(settings: OperatorProperties, brush: Brush) -> dict[str, Any]:
         combine = combine if settings.accumulate else EXTREMES[brush]
     elif brush in COMBINATIONS:
         combine = Combine(settings.combine)
-    falloff = find_falloff(settings, brush)
+    falloff = Falloff(read_own(settings, "falloff", brush))
+    if (brush, falloff) == (Brush.SMOOTH, Falloff.DEVICE):  # Smooth has one in any case
+        falloff = Falloff.SMOOTH
     options = {"accumulate": settings.accumulate, "falloff": falloff, "combine": combine}
     options["as_left"] = settings.finish == "AS_LEFT"
     if settings.use_limit:
@@ -312,13 +314,6 @@ def find_path(settings: OperatorProperties, brush: Brush) -> str:
     return "STAMP" if brush in STAMPS else str(settings.path)
 
 
-def find_falloff(settings: OperatorProperties, brush: Brush) -> Falloff:
-    """Return the falloff of a brush, by the settings of the tool; Smooth has one in any case."""
-    falloff = Falloff(read_own(settings, "falloff", brush))
-    own = (brush, falloff) == (Brush.SMOOTH, Falloff.DEVICE)
-    return Falloff.SMOOTH if own else falloff
-
-
 def find_stamp(settings: OperatorProperties, brush: Brush) -> HeightMap | None:
     """Return what a brush stamps; a DigiclayError where it cannot be read."""
     if brush not in STAMPS:
@@ -345,7 +340,7 @@ def localize_label(brush: Brush) -> str:
     return localize(LABELS[brush], context=CONTEXT)
 
 
-def describe_stroke(brush: Brush, depth: float, strength: float = 1.0) -> str:
+def describe_stroke(brush: Brush, depth: float, strength: float) -> str:
     """Return a brush, and its depth or height (m) times strength, in mm."""
     if brush in (*LOCKS, Brush.SET_BASE):
         return localize_label(brush)

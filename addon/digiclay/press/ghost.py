@@ -18,8 +18,7 @@ from ..core.base.arrays import Floats
 from ..core.model.layout import Grid, Layout
 from ..core.surface.formed import take_corners
 from ..sessions import running
-from ..sessions.forming_device import find_device
-from ..sessions.running import Running
+from ..sessions.running import Running, find_device
 from ..strokes.queue_ghosts import Ghost, find_ghosts
 from ..strokes.stroke import Stroke
 from .brush import find_bed
@@ -93,11 +92,9 @@ def find_colors(light: Floats, rise: Floats) -> NDArray[np.float32]:
     """Return colors (n, 4), times opacity, of a lit surface (n,) to which pins have a way (n,), m."""
     # Times the opacity: from a pin that has no way its color does not reach those beside it.
     opacity = (OPACITY / OPAQUE) * np.minimum(np.abs(rise), OPAQUE)
-    color = np.empty((rise.size, 4), np.float32)
-    for part, (raised, lowered) in enumerate(zip(RAISED, LOWERED, strict=True)):
-        color[:, part] = np.where(rise > 0.0, raised, lowered) * light * opacity
-    color[:, 3] = opacity
-    return color
+    hue = np.where(rise[:, None] > 0.0, RAISED, LOWERED)
+    colors = np.column_stack([hue * light[:, None], np.ones(rise.size)])
+    return (colors * opacity[:, None]).astype(np.float32)
 
 
 @lru_cache(maxsize=4)
@@ -118,7 +115,7 @@ def _make_batch(grid: Grid, surface: Floats, light: Floats, height: Floats) -> A
 
     triangles, rise = _list_triangles(grid.layout), surface - height
     moves = np.abs(rise) > LEAST
-    chosen = triangles[moves[triangles[:, 0]] | moves[triangles[:, 1]] | moves[triangles[:, 2]]]
+    chosen = triangles[moves[triangles].any(axis=1)]
     if not len(chosen):
         return None
     shader = gpu.shader.from_builtin("SMOOTH_COLOR")

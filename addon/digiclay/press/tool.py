@@ -191,14 +191,6 @@ def _number(layout: UILayout, owner: OperatorProperties, name: str, units: float
     row.prop(owner, name)
 
 
-def touch_outline(
-    bed: Object, layout: Layout, middle: Floats, depth: float, brush: Brush = Brush.LOWER
-) -> Floats:
-    """Return the rim of what a brush would form at a place (2,), m, (k, 2), m."""
-    finger, turn = devices.read_finger(devices.find_first(bed)), bridge.pose(fingertip_of(bed))[3:]
-    return middle + find_outline(finger, turn, depth, brush, layout)
-
-
 def find_outline(
     finger: Fingertip, turn: Floats, depth: float, brush: Brush, layout: Layout
 ) -> Floats:
@@ -228,11 +220,13 @@ def _draw_cursor(context: Context, tool: WorkSpaceTool, xy: tuple[int, int]) -> 
     if hider is not None:
         cursor([], make_label(context, name_hider(target.bed, hider), xy, corner))
         return
-    if fingertip_of(target.bed) is None:
+    tip = fingertip_of(target.bed)
+    if tip is None:
         return
     brush, amount, _ = find_shown(target.bed, settings)
     depth = 1e-3 * settings.depth if brush.rises else amount
-    rim = close(touch_outline(target.bed, target.grid.layout, target.point[:2], depth, brush))
+    finger, turn = devices.read_finger(devices.find_first(target.bed)), bridge.pose(tip)[3:]
+    rim = close(target.point[:2] + find_outline(finger, turn, depth, brush, target.grid.layout))
     rims = [np.column_stack(image.place(*rim.T)) for image in find_images(settings)]
     paths = map_paths(partial(drape, target.grid, target.height), [*rims, *_trail(target)])
     paths += find_axes(target.grid, target.height, settings)

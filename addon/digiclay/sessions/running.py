@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..core.base.arrays import Floats
 from ..core.model.fingers import MOST_FINGERS
+from ..core.scene.schema import Scene
 from ..core.session.live_session import Clock, LiveSession, Moment
 from ..core.session.recent_trace import RecentTrace
+from ..device.instant import find_ellipsoid
+from ..strokes.nominal import Device
 from ..strokes.stroke import Correction, Place, Stroke
+from ..strokes.tracking import find_blister
 
 if TYPE_CHECKING:
     from bpy.types import Object
@@ -80,6 +84,11 @@ class Running(LiveSession):
     correction: Correction | None = None
     #: Stored settings of the bed that `scene` was made of; None: unknown.
     settings: tuple[Any, ...] | None = None
+
+    @property
+    def present(self) -> Moment:
+        """The moment before the tick that is being simulated."""
+        return Moment(self.state.period, self.snapshot, self.poses, self.tick - 1, self.base)
 
     @property
     def standing(self) -> Moment:
@@ -178,3 +187,28 @@ def last_place(running: Running) -> Place | None:
 def list_pressing(running: Running) -> list[int]:
     """Return the places of the fingertips of strokes: the first one's, and those of further images."""
     return [0, *range(len(running.numbers), len(running.poses))]
+
+
+def find_device(running: Running) -> Device:
+    """Return what forms the strokes of a session."""
+    scene, system = running.scene, running.system
+    shares, actuator = running.state.shares(), system.cell.actuator
+    parts = system.grid, find_ellipsoid(scene), find_blister(scene), actuator.stroke
+    locks = shares if shares.any() else None
+    return Device(*parts, locks, actuator.rest_height, running.base)
+
+
+def suit_scene(scene: Scene, stroke: Stroke) -> Scene:
+    """Return a scene with fingertip and blister of a stroke."""
+    first, *others = scene.fingers
+    if stroke.finger is None or first.fingertip is None:
+        return scene
+    blister = scene.blister and (stroke.blister or scene.blister)
+    fingers = replace(first, fingertip=stroke.finger), *others
+    return replace(scene, fingers=fingers, blister=blister)
+
+
+def is_resized(former: Scene, scene: Scene) -> bool:
+    """Return whether a scene differs from a former one in nothing that strokes do not carry."""
+    sizes = Stroke(0, (), finger=scene.fingers[0].fingertip, blister=scene.blister)
+    return suit_scene(former, sizes) == scene

@@ -24,9 +24,18 @@ from ..strokes.pose import turn_image
 from ..strokes.stroke import FINISHING, RETURNING, Brush, Stroke
 from ..strokes.sweep import SWEEPS, finish, sweep
 from ..strokes.tracking import find_tracking
-from .forming_device import find_device, is_resized, suit_scene
 from .restored_states import Numbers, change_fingers, fit_base, load_state
-from .running import Gesture, Running, find_stroke, list_pressing, match_poses, name_fingers
+from .running import (
+    Gesture,
+    Running,
+    find_device,
+    find_stroke,
+    is_resized,
+    list_pressing,
+    match_poses,
+    name_fingers,
+    suit_scene,
+)
 
 #: How many gestures can be taken back, and the most memory their states may take, bytes.
 GESTURES, GESTURE_BYTES = 20, 200_000_000
@@ -231,15 +240,8 @@ def _mark_gesture_start(running: Running, poses: Floats, count: int) -> Running:
         and recent_trace.measure_total_force(running.system, running.state) == 0.0
     )
     if free or (moved and running.rest_time >= REST):
-        next_gesture = _mark(running)
+        next_gesture = running.present
     return replace(running, rest_time=rest_time, next_gesture=next_gesture)
-
-
-def _mark(running: Running) -> Moment:
-    """Return the moment before the tick that is being simulated."""
-    return Moment(
-        running.state.period, running.snapshot, running.poses, running.tick - 1, running.base
-    )
 
 
 def _count_gesture(running: Running, *, ordered: bool) -> Running:
@@ -247,9 +249,8 @@ def _count_gesture(running: Running, *, ordered: bool) -> Running:
     touched = ordered or recent_trace.measure_total_force(running.system, running.state) > 0.0
     if running.next_gesture is None or not touched:
         return running
-    begun = running.next_gesture
     room = max(1, min(GESTURES, GESTURE_BYTES // len(running.snapshot)))
-    gesture = Gesture(begun.period, begun.snapshot, begun.poses, begun.tick, begun.base)
+    gesture = Gesture(**vars(running.next_gesture))
     return replace(
         running, gestures=(*running.gestures, gesture)[-room:], undone=(), next_gesture=None
     )
@@ -282,9 +283,8 @@ def restore(
     state = load_state(running.system, stored).state
     now = snapshot.dump(running.system, state)
     base = fit_base(base, state)
-    keep = running.recording
-    if keep is not None:
-        keep = keep.cut_at_tick(running.tick if tick is None else tick, state.period)
+    tick = running.tick if tick is None else tick
+    recording = running.recording and running.recording.cut_at_tick(tick, state.period)
     gestures = tuple(gesture for gesture in running.gestures if gesture.period < state.period)
     free = recent_trace.measure_total_force(running.system, state) == 0.0
     return replace(
@@ -296,7 +296,7 @@ def restore(
         poses=live_session.clamp_pose(poses.reshape(-1, 7), running.system.cell.actuator.stroke),
         monitor=running.monitor and accuracy.reset(running.monitor),
         errors=None,
-        recording=keep,
+        recording=recording,
         gestures=gestures,
         tick=running.tick + 1,
         base=base,
@@ -332,7 +332,9 @@ def change_scene(
         running.base,
     )
 
-    def change(moment: Any) -> Any:
+    def carry(moment: Any) -> Any:
+        if numbers == was:
+            return moment
         had = name_fingers(was, len(moment.poses))
         stored = change_fingers(scene, plain, moment.snapshot, had, numbers)
         assert stored is not None
@@ -342,20 +344,19 @@ def change_scene(
 
     plain = assemble(scene) if images else other.system
     # The end of a stroke that was formed with other parameters cannot be restored.
-    line = {} if is_resized(running.scene, scene) else {"stroke": ""}
-    for name in ("gestures", "undone"):
-        some = (replace(gesture, **line) for gesture in getattr(running, name))
-        carried: dict[str, Any] = {name: tuple(some if numbers == was else map(change, some))}
-        running = replace(running, **carried)
-    if numbers != was:
-        running = replace(
-            running, stroke_start=running.stroke_start and change(running.stroke_start)
-        )
+    line: dict[str, Any] = {} if is_resized(running.scene, scene) else {"stroke": ""}
+    gestures, undone = (
+        tuple(carry(replace(gesture, **line)) for gesture in gestures)
+        for gestures in (running.gestures, running.undone)
+    )
+    start = running.stroke_start and carry(running.stroke_start)
+    running = replace(running, gestures=gestures, undone=undone, stroke_start=start)
     names = ["clock", "paused", "blocking_reason", "stale", "reached", "aim"]
     names += ["begun_strokes", "finished_strokes", "last_place", "correction"]
-    names += [] if lost else ["gestures", "undone", "strokes", "stroke_start"]
     if lost:
         other = _give_fingers(other, 1)
+    else:
+        names += ["gestures", "undone", "strokes", "stroke_start"]
     trace = recent_trace.pick(other.trace, running.trace.pins, other.system.grid.count)
     return replace(other, trace=trace, **{name: getattr(running, name) for name in names}), lost
 
@@ -396,14 +397,13 @@ def restore_moment(running: Running, moment: Moment) -> Running:
 def restore_gesture(running: Running, gesture: Moment) -> Running:
     """Bring state, fingertip and recording back to where a gesture of the session began."""
     back = restore_moment(replace(running, recording=None), gesture)
-    keep = running.recording
     # The gesture a reset leaves behind has periods of another count.
-    if keep is not None:
-        keep = keep.cut_at_period(gesture.period) if gesture.period == back.state.period else None
+    recording = running.recording if gesture.period == back.state.period else None
+    recording = recording and recording.cut_at_period(gesture.period)
     # A fingertip that touched there already has to move on before it makes another gesture: it
     # would be counted at once, and hide those before it for ever.
     next_gesture = gesture if back.next_gesture is not None else None
-    return replace(back, next_gesture=next_gesture, rest_time=REST, recording=keep)
+    return replace(back, next_gesture=next_gesture, rest_time=REST, recording=recording)
 
 
 def reset(running: Running) -> Running:
@@ -454,7 +454,7 @@ def take_path(running: Running, count: int) -> tuple[Running, Floats, Orders | N
     stroke = running.strokes[0]
     if stroke.height is None:
         running, _ = change_scene(running, suit_scene(running.scene, stroke))
-        running = replace(running, next_gesture=_mark(running), stroke_start=_mark(running))
+        running = replace(running, next_gesture=running.present, stroke_start=running.present)
         if stroke.brush not in AT_ONCE:
             tracking = (
                 None if stroke.brush in SWEEPS else find_tracking(running.scene, running.system)

@@ -345,9 +345,10 @@ def drag(
 
 def _reach(stroke: Stroke, device: Device, reached: int) -> Stroke:
     """Return the stroke with its fingertip at a sample, which may begin another pass."""
-    if returns(stroke, stroke.first, reached, device.finger.width):
+    if stroke.brush in LIMITS and returns(stroke, stroke.first, reached, device.finger.width):
         assert stroke.height is not None
-        ground = find_nominal(stroke, device, stroke.height, reached).full
+        earlier = replace(stroke, samples=stroke.samples[:reached])
+        ground = find_nominal(earlier, device, stroke.height).full
         stroke = replace(stroke, ground=ground, first=reached)
     return replace(stroke, reached=reached)
 

@@ -103,6 +103,11 @@ class Device:
         finger = max(self.finger.length, self.finger.width, self.finger.height)
         return self.blister.radius if self.blister else finger
 
+    @property
+    def ring(self) -> float:
+        """Radius of the ring in which valves work, m."""
+        return find_radius(self.finger, self.grid.layout)
+
     def find_section(self, falloff: Falloff, distance: Floats) -> Floats:
         """Return the share of the height at distances from the path, m: 1 on the blister's flat top."""
         assert self.blister is not None
@@ -190,38 +195,35 @@ class Nominal:
     stepped: "Nominal | None" = None
 
 
-def find_nominal(
-    stroke: Stroke, device: Device, before: Floats, count: int | None = None
-) -> Nominal:
-    """Return the nominal surface of a stroke, or of its first samples, on pins at heights (n,), m."""
+def find_nominal(stroke: Stroke, device: Device, before: Floats) -> Nominal:
+    """Return the nominal surface of a stroke on pins at heights (n,), m."""
     near = np.zeros(before.size, np.bool_)
-    return extend(Nominal(before, before, before, before, near), stroke, device, count)
+    return extend(Nominal(before, before, before, before, near), stroke, device)
 
 
-def extend(nominal: Nominal, stroke: Stroke, device: Device, count: int | None = None) -> Nominal:
-    """Return a nominal surface with all samples of its stroke, or its first ones, for all images."""
-    nominal = _extend(nominal, stroke, device, count)
-    return replace(nominal, height=device.hold_back(nominal.before, nominal.full))
-
-
-def _extend(nominal: Nominal, stroke: Stroke, device: Device, count: int | None) -> Nominal:
-    """Return what a stroke forms where no pin is locked in part; see `extend`."""
-    end = len(stroke.samples) if count is None else count
+def extend(nominal: Nominal, stroke: Stroke, device: Device) -> Nominal:
+    """Return a nominal surface with all samples of its stroke, for all images."""
     if stroke.brush in STAMPS:
-        return _stamp(nominal, stroke, device)
-    if stroke.placed:
-        return _brush(nominal, stroke, device, end)
-    if device.blister is None and needs_blister(stroke.brush, stroke.falloff):
-        return replace(nominal, count=end)
+        nominal = _stamp(nominal, stroke, device)
+    elif stroke.placed:
+        nominal = _brush(nominal, stroke, device)
+    elif device.blister is not None or not needs_blister(stroke.brush, stroke.falloff):
+        nominal = _press(nominal, stroke, device)
+    height = device.hold_back(nominal.before, nominal.full)
+    return replace(nominal, count=len(stroke.samples), height=height)
+
+
+def _press(nominal: Nominal, stroke: Stroke, device: Device) -> Nominal:
+    """Return what a fingertip, or a blister under it, leaves along all samples of a path."""
     nominal = nominal.stepped or nominal
     full, near = nominal.full.copy(), nominal.near.copy()
     nominal = replace(nominal, full=full, near=near)
-    for index in range(nominal.count, end):
+    for index in range(nominal.count, len(stroke.samples)):
         if returns(stroke, nominal.first, index, device.finger.width):
             nominal = replace(nominal, ground=full.copy(), first=index)
         for image in stroke.images:
             _mark(nominal, stroke, device, image, index)
-    return _slant(replace(nominal, count=end), stroke, device)
+    return _slant(nominal, stroke, device)
 
 
 def _slant(nominal: Nominal, stroke: Stroke, device: Device) -> Nominal:
@@ -338,25 +340,25 @@ def weigh_path(stroke: Stroke, device: Device) -> Floats:
     return weight
 
 
-def _brush(nominal: Nominal, stroke: Stroke, device: Device, end: int) -> Nominal:
-    """Return what the valves leave in the ring along the first samples of a path."""
+def _brush(nominal: Nominal, stroke: Stroke, device: Device) -> Nominal:
+    """Return what the valves leave in the ring along all samples of a path."""
     weight = np.zeros((len(stroke.images), nominal.before.size))
     nominal = replace(nominal, weight=weight if nominal.weight is None else nominal.weight.copy())
-    for index in range(nominal.count, end):
+    for index in range(nominal.count, len(stroke.samples)):
         if returns(stroke, nominal.first, index, device.finger.width):
             nominal = _shape(nominal, stroke, device)
             nominal = replace(nominal, ground=nominal.full, first=index, weight=weight.copy())
         assert nominal.weight is not None
         for row, image in zip(nominal.weight, stroke.images, strict=True):
             _weigh(row, stroke, device, image, index)
-    return replace(_shape(nominal, stroke, device), count=end)
+    return _shape(nominal, stroke, device)
 
 
 def _weigh(weight: Floats, stroke: Stroke, device: Device, image: Image, index: int) -> None:
     """Raise weights (n,) about the path from a sample to the next one, `index`, in place."""
     last, sample = stroke.samples[max(index - 1, 0)], stroke.samples[index]
     start, end = image.place(last.x, last.y), image.place(sample.x, sample.y)
-    radius, falloff = find_radius(device.finger, device.grid.layout), stroke.falloff
+    radius, falloff = device.ring, stroke.falloff
     cells = _find_beside(device.grid, start, end, radius)
     distance, share = _measure(device.grid, cells, start, end)
     named = evaluate(RING[stroke.brush] if falloff is Falloff.DEVICE else falloff, distance, radius)
@@ -374,7 +376,7 @@ def _shape(nominal: Nominal, stroke: Stroke, device: Device) -> Nominal:
         weight = weight * (1.0 - device.locked)
     most = weight.max(axis=0)
     if stroke.brush is Brush.SMOOTH:
-        height = smooth(grid, ground, most, find_radius(device.finger, grid.layout))
+        height = smooth(grid, ground, most, device.ring)
     elif stroke.brush in LOCKS:
         height = ground
     elif stroke.brush is Brush.ERASE:
@@ -390,33 +392,26 @@ def _shape(nominal: Nominal, stroke: Stroke, device: Device) -> Nominal:
     return replace(nominal, full=height, near=near)
 
 
-def find_frame(stroke: Stroke, device: Device) -> Place:
-    """Return half the side of what a stroke stamps, m, and how far it is turned, rad.
+def _stamp(nominal: Nominal, stroke: Stroke, device: Device) -> Nominal:
+    """Return what a stroke stamps, on the surface before it; where images meet, what goes farther.
 
     Drawn from its middle it reaches to the place where its right side is; a click gives the ring's
     size.
     """
-    first, last = stroke.samples[0], stroke.samples[-1]
-    x, y = last.x - first.x, last.y - first.y
-    half = math.hypot(x, y)
-    if half < device.grid.layout.pitch - TIE:
-        return find_radius(device.finger, device.grid.layout), 0.0
-    return half, math.atan2(y, x)
-
-
-def _stamp(nominal: Nominal, stroke: Stroke, device: Device) -> Nominal:
-    """Return what a stroke stamps, on the surface before it; where images meet, what goes farther."""
-    nominal = replace(nominal, count=len(stroke.samples))
     if stroke.stamp is None:
         return nominal
-    (half, angle), first, last = find_frame(stroke, device), stroke.samples[0], stroke.samples[-1]
+    first, last = stroke.samples[0], stroke.samples[-1]
+    x, y = last.x - first.x, last.y - first.y
+    half, angle = math.hypot(x, y), math.atan2(y, x)
+    if half < device.grid.layout.pitch - TIE:
+        half, angle = device.ring, 0.0
     cos, sin = math.cos(angle), math.sin(angle)
     scale = 2.0 * half / np.array(stroke.stamp.pixels)
     rise, grid = np.zeros(nominal.before.size), device.grid
     for image in stroke.images:
-        x, y = image.trace(grid.x, grid.y)
-        x, y = x - first.x, y - first.y
-        turned = Grid(grid.layout, cos * x + sin * y, cos * y - sin * x)
+        pin_x, pin_y = image.trace(grid.x, grid.y)
+        pin_x, pin_y = pin_x - first.x, pin_y - first.y
+        turned = Grid(grid.layout, cos * pin_x + sin * pin_y, cos * pin_y - sin * pin_x)
         rise = np.maximum(
             rise, stroke.stamp.tops(turned, Placement(scale[1], scale[0], -half, -half)).value
         )

@@ -82,9 +82,8 @@ def make_images(
     else:
         # A mirror image across the line at an angle a is (cos 2a, sin 2a; sin 2a, -cos 2a).
         cos, sin = math.cos(2.0 * angle), math.sin(2.0 * angle)
-        kinds = {"X": (-cos, -sin, -1.0), "Y": (cos, sin, -1.0), "XY": (-1.0, 0.0, 1.0)}
-        names = {"X": "X", "Y": "Y", "XY": ("X", "XY", "Y")}[symmetry]
-        turns = [(1.0, 0.0, 1.0), *(kinds[name] for name in names)]
+        x, y, opposite = (-cos, -sin, -1.0), (cos, sin, -1.0), (-1.0, 0.0, 1.0)
+        turns = [(1.0, 0.0, 1.0), *{"X": [x], "Y": [y], "XY": [x, opposite, y]}[symmetry]]
     return tuple(_about(center, cos, sin, side) for cos, sin, side in turns)
 
 

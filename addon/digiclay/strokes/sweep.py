@@ -15,7 +15,7 @@ from ..core.base.arrays import Floats
 from ..core.control.orders import ORDER, Orders, Verb, place, repeat_order
 from .locks import LEAST_CHANGE, find_return, order_at_once
 from .motion import DESCEND, DRAG, cross, drag, find_safe
-from .nominal import Device, Nominal, find_nominal, find_radius
+from .nominal import Device, Nominal, find_nominal
 from .stroke import (
     ABOVE,
     DONE,
@@ -44,6 +44,8 @@ SWEEPS = {
 BESIDE = 0.4
 #: What pins that stand move within a look, m.
 STILL = 10e-6
+#: Orders of a period that has none.
+UNORDERED = Orders(np.zeros((1, ORDER)))
 
 
 def sweep(
@@ -57,7 +59,7 @@ def sweep(
     arrived: bool,
 ) -> tuple[Stroke, Floats, Orders]:
     """Advance the fingertip over a stroke of the valves; return path (k + 1, 7), k <= count, and orders."""
-    radius = find_radius(device.finger, device.grid.layout)
+    radius = device.ring
     if stroke.phase == FINISHING:
         x, y = pose[:2].tolist()
         rest = Orders(repeat_order(1, verb, x, y, radius))
@@ -149,8 +151,7 @@ def _settle(
         moved = np.inf if stroke.finish is None else float(np.abs(now - stroke.finish).max())
         stands = moved < STILL and _has_searched(stroke, period)
         stroke = replace(stroke, finish=now.copy())
-    none = Orders(np.zeros((1, ORDER)))
-    stroke, path, orders = _wait(stroke, pose, count, period, none, arrived=stands)
+    stroke, path, orders = _wait(stroke, pose, count, period, UNORDERED, arrived=stands)
     if stroke.done:
         nominal = find_nominal(stroke, device, before)
         left = device.hold_back(before, now)
@@ -178,7 +179,7 @@ def _wait(
             stroke, phase=ABOVE, image=stroke.image + 1, reached=0, first=0, ground=stroke.height
         )
         stroke = replace(stroke, phase=DONE) if last else later
-        return stroke, np.array([pose, pose]), Orders(np.zeros((1, ORDER)))
+        return stroke, np.array([pose, pose]), UNORDERED
     most = min(count, LOOK - stroke.waited % LOOK)
     stroke = replace(
         stroke, waited=stroke.waited + most, arrived=arrived if looks else stroke.arrived

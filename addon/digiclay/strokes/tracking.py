@@ -105,23 +105,23 @@ def find_tracking(scene: Scene, system: System) -> Tracking | None:
     # sum.
     if isinstance(control, CellStates):
         sink, trigger = _find_sink(touch, np.zeros(1), 1.0, asked), control.spring_trigger
+        hard, search = math.inf, 0.0
     else:
         gap, share = _sample_underside(find_ellipsoid(scene), system.grid.layout)
         sink, trigger = _find_sink(touch, gap, share, asked), asked
+        hard, search = HARD * asked, control.loss_time
     # Before a blister starts the pins give way like springs; Method III follows from the first
-    # touch on.
-    spring = 0.0 if isinstance(control, Hybrid) else trigger / control.spring_stiffness
+    # touch on. A valve that feels no force opens by gain times set point; the flow goes with the
+    # square of that.
+    spring, opening = 0.0, 1.0
+    if not isinstance(control, Hybrid):
+        spring = trigger / control.spring_stiffness
+        opening = min(1.0, control.force_gain * asked)
     press = sink + spring + MARGIN
-    # A valve that feels no force opens by gain times set point; the flow goes with the square of
-    # that.
-    opening = 1.0 if isinstance(control, Hybrid) else min(1.0, control.force_gain * asked)
     speed, pace = float(system.fastest), control.pace
     lift, slope = pace.lift * speed * opening**2, _find_slope(blister)
     drag, push = (min(pace.fastest, radii * blister.radius) for radii in (pace.drag, pace.push))
     gain, down = min(lift / pace.gain, SUDDEN), min(pace.press, PRESS * speed)
-    radius, highest = blister.radius, system.cell.actuator.stroke
-    hard = math.inf if isinstance(control, CellStates) else HARD * asked
-    search = 0.0 if isinstance(control, CellStates) else control.loss_time
     return Tracking(
         sink,
         press,
@@ -132,8 +132,8 @@ def find_tracking(scene: Scene, system: System) -> Tracking | None:
         drag,
         push,
         slope,
-        radius,
-        highest,
+        blister.radius,
+        system.cell.actuator.stroke,
         search,
         hard,
         pace.ready,
