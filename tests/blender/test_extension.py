@@ -89,7 +89,7 @@ def test_an_imported_run_has_its_settings_and_shows_the_row_asked_for(tmp_path, 
         height=heights,
         mode=np.stack([formed.mode] * 2),
         force=np.stack([formed.force] * 2),
-        fingertip=np.stack([formed.fingertip] * 2),
+        fingertip=np.concatenate([formed.fingertip] * 2),
     )
     path = str(tmp_path / "history.npz")
     for row, wanted in ((0, heights[0]), (-1, heights[1])):

@@ -39,15 +39,14 @@ class Instant:
     mode: Codes
     #: (n,), on each pin, N, pressing down is positive.
     force: Floats
-    #: (7,), or (f, 7) of several: lowest point of the fingertip, m, and its orientation, w, x, y,
-    #: z.
+    #: (f, 7), of each fingertip, here also (7,) of one: lowest point, m, and orientation, w, x, y, z.
     fingertip: Floats
     #: Distance between neighboring pins, m.
     pitch: float = Layout().pitch
     #: Gives the pins' thickness (bore), stroke and rest height.
     actuator: Actuator = field(default_factory=Actuator)
-    #: Gives the semi-axes of the fingertip, or of each.
-    finger: Fingertip | tuple[Fingertip, ...] = field(default_factory=Fingertip)
+    #: Gives the semi-axes of each fingertip.
+    finger: tuple[Fingertip, ...] = (Fingertip(),)
     #: Meshes that press the pins, and their poses (b, 7).
     bodies: tuple[Mesh, ...] = ()
     body: Floats | None = None
@@ -55,8 +54,8 @@ class Instant:
     def __post_init__(self) -> None:
         for name in ARRAYS:
             array = np.array(getattr(self, name), np.int8 if name == "mode" else np.float64)
-            single = name == "fingertip" and array.shape == (1, 7)
-            object.__setattr__(self, name, array[0] if single else array)
+            object.__setattr__(self, name, array)
+        object.__setattr__(self, "fingertip", self.fingertip.reshape(-1, 7))
 
     @classmethod
     def of(cls, history: Mapping[str, Any], index: int = -1, **sizes: Any) -> Instant:
@@ -73,32 +72,21 @@ class Instant:
         cls,
         layout: Layout,
         actuator: Actuator | None = None,
-        finger: Fingertip | tuple[Fingertip, ...] | None = None,
+        finger: tuple[Fingertip, ...] = (Fingertip(),),
     ) -> Instant:
         """Return a bed nobody has touched yet, the fingertips above its center."""
-        actuator, finger = actuator or Actuator(), finger or Fingertip()
-        bed = make_grid(layout)
-        rest, count = actuator.rest_height, len(finger) if isinstance(finger, tuple) else 1
+        actuator, bed = actuator or Actuator(), make_grid(layout)
+        rest = actuator.rest_height
         return cls(
             bed.positions,
             np.full(bed.count, rest),
             np.full(bed.count, Mode.REST, np.int8),
             np.zeros(bed.count),
-            np.tile([0.0, 0.0, rest + CLEARANCE, *LEVEL], (count, 1)),
+            np.tile([0.0, 0.0, rest + CLEARANCE, *LEVEL], (len(finger), 1)),
             layout.pitch,
             actuator,
             finger,
         )
-
-    @property
-    def fingertips(self) -> Floats:
-        """Poses (f, 7) of the fingertips."""
-        return self.fingertip.reshape(-1, 7)
-
-    @property
-    def fingers(self) -> tuple[Fingertip, ...]:
-        """Gives the semi-axes of each fingertip."""
-        return self.finger if isinstance(self.finger, tuple) else (self.finger,)
 
     @property
     def modes(self) -> list[Mode]:

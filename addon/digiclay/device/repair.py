@@ -134,7 +134,7 @@ def give_fingertip(bed: Object, scene: Scene) -> str:
         return f"{bed.name} got its fingertip back"
     parts.make_fingertip(bed)
     rest = Instant.at_rest(scene.layout, scene.actuator, find_ellipsoids(scene)[:1])
-    bridge.place_fingertips(bed, rest.fingertips, rest.fingers)
+    bridge.place_fingertips(bed, rest.fingertip, rest.finger)
     view.hold_parts(bed)
     return f"{bed.name} got a new fingertip"
 

@@ -264,7 +264,7 @@ def rebuild(bed: Object) -> Scene:
         view.add_modifier(bed, instant)
         _discard(tree)
     repair.give_fingertip(bed, scene)
-    for tip, finger in zip(fingertips_of(bed).values(), instant.fingers, strict=False):
+    for tip, finger in zip(fingertips_of(bed).values(), instant.finger, strict=False):
         bridge.resize_fingertip(tip, finger)
     view.hold_parts(bed)
     _remove(child for child in bed.children if child.get(ROLE) == HOUSING)
