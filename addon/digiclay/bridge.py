@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .compat import Context, Mesh, Object, bpy
+from .compat import Context, Mesh, Object, Region, bpy
 from .core.base.arrays import Array, Cells, Floats
 from .core.base.errors import DigiclayError
 from .core.model.fingertip import LEVEL, Fingertip, make_matrices
@@ -36,7 +36,9 @@ ATTRIBUTES = {"mode": ("INT", "value", np.int32), "force": ("FLOAT", "value", np
 WRITTEN = ATTRIBUTES | {"waiting": ("BOOLEAN", "value", np.bool_)}
 
 
-def mesh(name: str, shape: tuple[Floats, list[tuple[int, ...]]], smooth_below: float = 0.6) -> Mesh:
+def mesh(
+    name: str, shape: tuple[Floats, Sequence[Sequence[int]]], smooth_below: float = 0.6
+) -> Mesh:
     """Make a mesh of a shape in Blender units, smooth where faces meet at less than an angle, rad."""
     vertices, faces = shape
     mesh = bpy.data.meshes.new(name)
@@ -92,16 +94,20 @@ def write_cells(bed: Mesh, position: Floats, height: Floats, **values: Array) ->
     bed.update()  # 4.2 shows stale data without
 
 
+def read_points(mesh: Mesh) -> Floats:
+    """Return the vertices (k, 3) of a mesh in its own space, Blender units."""
+    points = np.empty(3 * len(mesh.vertices), np.float32)
+    mesh.vertices.foreach_get("co", points)
+    return points.reshape(-1, 3).astype(np.float64)
+
+
 def read_cells(bed: Mesh) -> dict[str, Array]:
     """Return `position` (n, 2) and `height` (n,), m, `mode` and `force` of a bed's mesh."""
     _require_cells(bed)
-    count = len(bed.vertices)
-    placed = np.empty(3 * count, np.float32)
-    bed.vertices.foreach_get("co", placed)
-    table = placed.reshape(count, 3).astype(np.float64) / SCALE
-    cells: dict[str, Array] = {"position": table[:, :2], "height": table[:, 2]}
+    points = read_points(bed) / SCALE
+    cells: dict[str, Array] = {"position": points[:, :2], "height": points[:, 2]}
     for name, (_, value, kind) in ATTRIBUTES.items():
-        array = np.empty(count, kind)
+        array = np.empty(len(points), kind)
         bed.attributes[name].data.foreach_get(value, array)
         cells[name] = array
     return cells
@@ -248,20 +254,22 @@ def read_place(bed: Object, thing: Object) -> NDArray[np.float32]:
 def read_triangles(mesh: Mesh) -> tuple[Floats, Cells]:
     """Return vertices (v, 3), in the mesh's own space, and triangles (t, 3) of a mesh."""
     mesh.calc_loop_triangles()
-    places = np.empty(3 * len(mesh.vertices), np.float32)
     faces = np.empty(3 * len(mesh.loop_triangles), np.int32)
-    mesh.vertices.foreach_get("co", places)
     mesh.loop_triangles.foreach_get("vertices", faces)
-    return places.reshape(-1, 3).astype(np.float64), faces.reshape(-1, 3).astype(np.intp)
+    return read_points(mesh), faces.reshape(-1, 3).astype(np.intp)
 
 
 def project(context: Context, bed: Object, points: Floats) -> Floats:
     """Return where points (k, 3) of a bed's space, m, appear in the region (k, 2), pixels; or NaN."""
     to_clip = np.array(context.region_data.perspective_matrix @ bed.matrix_world)
-    clip = np.column_stack([points * SCALE, np.ones(len(points))]) @ to_clip.T
+    return find_pixels(to_clip, points * SCALE, context.region)
+
+
+def find_pixels(to_clip: Floats, points: Floats, region: Region) -> Floats:
+    """Return where a matrix (4, 4) shows points (k, 3) in a region (k, 2), pixels; NaN behind the eye."""
+    clip = np.column_stack([points, np.ones(len(points))]) @ to_clip.T
     depth = np.where(clip[:, 3] > 0.0, clip[:, 3], np.nan)[:, None]
-    size = np.array([context.region.width, context.region.height])
-    return (clip[:, :2] / depth + 1.0) / 2.0 * size
+    return (clip[:, :2] / depth + 1.0) / 2.0 * [region.width, region.height]
 
 
 def linear(

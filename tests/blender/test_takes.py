@@ -223,7 +223,7 @@ def taken(count=COUNT):
 
 def build():
     made = scene()
-    rest = Instant.at_rest(made.layout, made.actuator, made.section("fingertip"))
+    rest = Instant.at_rest(made.layout, made.actuator)
     return view.build(rest, bpy.context.collection)
 
 

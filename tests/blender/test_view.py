@@ -85,7 +85,7 @@ def test_a_tilted_fingertip_touches_down_at_its_lowest_point(bed, formed):
     turn = np.array([0.8, 0.3, -0.4, 0.33])
     at = np.array([0.004, -0.002, 0.055, *(turn / np.linalg.norm(turn))])
     fingertip = fingertip_of(bed)
-    bridge.place_fingertips(bed, at[None], formed.fingers)
+    bridge.place_fingertips(bed, at[None], formed.finger)
     bpy.context.view_layer.update()
     (ball,) = fingertip.children
     # The ball is taken hold of as its fingertip (test_unit): it does not move in it.
@@ -121,16 +121,17 @@ def test_the_pose_of_a_fingertip_is_read_back_however_things_are_scaled(bed, for
         (0.2, -0.4, 0.9),
         (2.5, 2.5, 2.5),
     )
-    for pose, finger in ((formed.fingertip, formed.finger), (at, Fingertip(length=0.012))):
+    (rest,) = formed.fingertip
+    for pose, finger in ((rest, Fingertip()), (at, Fingertip(length=0.012))):
         bridge.place_fingertips(bed, pose[None], [finger])
         bpy.context.view_layer.update()
         # Blender's matrices are float32, and this one is inverted three units from the origin.
         assert_near(bridge.pose(fingertip), pose, 2e-6)
     assert bridge.uniform(bed) == pytest.approx(2.5, rel=1e-6)
-    bridge.place_fingertips(bed, formed.fingertips, formed.fingers)
+    bridge.place_fingertips(bed, formed.fingertip, formed.finger)
     fingertip.scale = (3.0, 1.0, 0.5)  # by hand: what touches stays
     bpy.context.view_layer.update()
-    assert_near(bridge.pose(fingertip), formed.fingertip, 2e-6)
+    assert_near(bridge.pose(fingertip), rest, 2e-6)
 
 
 @pytest.mark.parametrize(

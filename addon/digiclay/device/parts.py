@@ -10,6 +10,7 @@ from ..bridge import SCALE
 from ..compat import ID, Collection, Material, Mesh, Object, bpy, shader_nodes
 from ..core.base.errors import DigiclayError
 from ..core.base.modes import COLORS, WAITING, Mode
+from ..core.model.underside import Mesh as Body
 from ..ui_text import localize
 from . import heat, primitives
 from .instant import Instant
@@ -203,6 +204,13 @@ def _write_weights(mesh: Mesh, step: Pass) -> None:
         for name, share in zip(WEIGHTS, weights, strict=True):
             attribute = mesh.attributes.new(name + kind, "FLOAT_VECTOR", "POINT")
             attribute.data.foreach_set("vector", share.astype(np.float32).ravel())
+
+
+def make_body(name: str, body: Body) -> Mesh:
+    """Make the mesh of a body that presses the pins; its vertices in m."""
+    mesh = bridge.mesh(name, (body.vertices * SCALE, body.triangles.tolist()))
+    mesh.materials.append(material("body", SKIN, roughness=0.6))
+    return mesh
 
 
 def make_fingertip(bed: Object, number: int = 1, palm: Object | None = None) -> Object:

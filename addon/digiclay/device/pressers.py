@@ -20,7 +20,7 @@ from ..roles import PRESSES, list_pressers
 from ..settings.declared import fill
 from ..settings.groups import PRESSER_FIELDS
 from ..ui_text import localize
-from .parts import SKIN, material
+from .parts import make_body
 
 #: Largest turn between two keys, rad: Blender turns at an uneven speed between them, here by 0.01
 #: degrees.
@@ -87,9 +87,7 @@ def make_presser(
     bed: Object, name: str, given: Presser, mesh: Mesh, first: float, rate: float
 ) -> Object:
     """Make an object of a mesh, m, that presses a bed as a body does, keyed from a frame on; `rate`: 1/s."""
-    faces = list(map(tuple, mesh.triangles.tolist()))
-    made = bpy.data.objects.new(name, bridge.mesh(name, (mesh.vertices * bridge.SCALE, faces)))
-    made.data.materials.append(material("body", SKIN, roughness=0.6))
+    made = bpy.data.objects.new(name, make_body(name, mesh))
     made.parent, made[PRESSES], made.rotation_mode = bed, bed, "QUATERNION"
     made.scale = (given.body.scale,) * 3
     fill(made.digiclay.presser, Body, PRESSER_FIELDS, vars(given.body))

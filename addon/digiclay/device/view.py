@@ -58,10 +58,10 @@ def build(instant: Instant, collection: Collection, lowest: float | None = None)
     cells = make_cells(instant)
     bed = parts.marked(cells, cells.name, BED, collection)
     bed.modifiers.new(MODIFIER, "NODES").node_group = _make_tree(instant, lowest)
-    for number in range(1, len(instant.fingers) + 1):
+    for number in range(1, len(instant.finger) + 1):
         parts.make_fingertip(bed, number)
     hold_parts(bed)
-    bridge.place_fingertips(bed, instant.fingertips, instant.fingers)
+    bridge.place_fingertips(bed, instant.fingertip, instant.finger)
     return bed
 
 
@@ -105,7 +105,7 @@ def show(bed: Object, instant: Instant) -> None:
     bridge.write_cells(
         bed.data, instant.position, instant.height, mode=instant.mode, force=instant.force
     )
-    bridge.place_fingertips(bed, instant.fingertips, instant.fingers)
+    bridge.place_fingertips(bed, instant.fingertip, instant.finger)
 
 
 def show_state(bed: Object, system: System, state: State) -> None:
@@ -249,4 +249,4 @@ def _read_node(bed: Object, name: str, input_name: str) -> ID | None:
 def underside(bed: Object) -> float:
     """Return the height of the housing's underside in the space of its bed, Blender units."""
     housing: Object = housing_of(bed)
-    return min(float(vertex.co.z) for vertex in housing.data.vertices)
+    return float(bridge.read_points(housing.data)[:, 2].min())

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from .. import bridge
 from ..bridge import SCALE
 from ..compat import (
     ID,
@@ -78,14 +79,12 @@ def _read_edges(context: Context, thing: Object, bed: Object) -> list[Floats]:
         if len(mesh.polygons):
             rule = "must be lines, not the surface that its modifiers make of them"
             raise ParameterError(name, "modifiers", rule, f"{len(mesh.polygons)} faces")
-        places = np.empty(3 * len(mesh.vertices), np.float32)
+        flat = bridge.read_points(mesh)[:, :2] / SCALE
         edges = np.empty(2 * len(mesh.edges), np.int32)
-        mesh.vertices.foreach_get("co", places)
         mesh.edges.foreach_get("vertices", edges)
         evaluated.to_mesh_clear()
     finally:
         bpy.data.batch_remove(made)
-    flat = places.reshape(-1, 3)[:, :2].astype(np.float64) / SCALE
     return join_edges(flat, edges.reshape(-1, 2).astype(np.int64))
 
 

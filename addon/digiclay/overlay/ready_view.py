@@ -4,7 +4,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from .. import preferences
+from .. import bridge, preferences
 from ..compat import Area, Context, Matrix, Object, Region, bpy
 from ..core.base.arrays import Floats
 from ..device import detail, view
@@ -113,12 +113,9 @@ def reveal(context: Context, bed: Object, things: Iterable[Object]) -> None:
         return
     context.view_layer.update()
     (free, taken), region = _find_room(context, bed, *shown), shown[1]
-    points = np.concatenate([_place(_list_points(thing), thing) for thing in things])
-    clip = (
-        np.column_stack([points, np.ones(len(points))]) @ np.array(region.data.perspective_matrix).T
-    )
-    places = 0.5 * (clip[:, :2] / clip[:, 3:] + 1.0) * [region.width, region.height]
-    seen = (clip[:, 3] > 0.0) & ((places >= free[0]) & (places <= free[1])).all(axis=1)
+    points = np.concatenate([_place(bridge.read_points(thing.data), thing) for thing in things])
+    places = bridge.find_pixels(np.array(region.data.perspective_matrix), points, region)
+    seen = ((places >= free[0]) & (places <= free[1])).all(axis=1)
     if not (seen & ~((places > taken[0]) & (places < taken[1])).all(axis=1)).all():
         frame(context, bed)
 
@@ -177,17 +174,12 @@ def _list_corners(things: list[tuple[Object, Matrix]]) -> Floats:
     """Return the corners (k, 3) of the boxes about shapes of placed objects, world."""
     boxes = []
     for shape, placed in things:
-        points = _list_points(shape)
+        points = bridge.read_points(shape.data)
         corners = np.stack(
             np.meshgrid(*zip(points.min(axis=0), points.max(axis=0), strict=True)), axis=-1
         )
         boxes.append(_place(corners.reshape(-1, 3), placed))
     return np.concatenate(boxes)
-
-
-def _list_points(thing: Object) -> Floats:
-    """Return the points (k, 3) of an object's mesh."""
-    return np.array([vertex.co for vertex in thing.data.vertices])
 
 
 def _place(points: Floats, placed: Matrix) -> Floats:

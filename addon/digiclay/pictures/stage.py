@@ -57,9 +57,7 @@ def set_up(
 def add_bodies(scene: Scene, bed: Object, instant: Instant) -> None:
     """Add the bodies of an instant, at their poses over a bed."""
     for number, body in enumerate(instant.bodies):
-        faces = list(map(tuple, body.triangles.tolist()))
-        mesh = bridge.mesh("Digital Clay Body", (body.vertices * bridge.SCALE, faces))
-        mesh.materials.append(parts.material("body", parts.SKIN, roughness=0.6))
+        mesh = parts.make_body("Digital Clay Body", body)
         made = bpy.data.objects.new(mesh.name, mesh)
         made.parent, made[BODY] = bed, number
         scene.collection.objects.link(made)
@@ -106,9 +104,7 @@ def outline(bed: Object) -> Floats:
     if case is not None and case.parent != bed:
         meshes.append((bed, case.data))
     for part, mesh in meshes:
-        flat = np.empty(3 * len(mesh.vertices), np.float32)
-        mesh.vertices.foreach_get("co", flat)
-        cloud = flat.reshape(-1, 3)
+        cloud = bridge.read_points(mesh)
         while part is not None:
             matrix = np.array(part.matrix_basis)
             cloud, part = cloud @ matrix[:3, :3].T + matrix[:3, 3], part.parent

@@ -235,9 +235,8 @@ def find_layout_mismatch(bed: Object, layout: Layout) -> str:
     pins, wanted = len(bed.data.vertices), layout.rows * layout.columns
     if pins != wanted:
         return f"The bed has {pins} pins, not {wanted}"
-    places = np.empty(3 * pins, np.float32)
-    bed.data.vertices.foreach_get("co", places)
-    if np.abs(places.reshape(-1, 3)[:, :2] / bridge.SCALE - _find_places(layout)).max() > AWAY:
+    places = bridge.read_points(bed.data)[:, :2] / bridge.SCALE
+    if np.abs(places - _find_places(layout)).max() > AWAY:
         return "The pins differ from the parameters of Layout"
     return ""
 
