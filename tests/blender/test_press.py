@@ -246,7 +246,7 @@ def test_a_blister_that_the_bed_limits_is_the_same_again_with_the_size_before(pa
 
 @pytest.mark.parametrize("asked, got", [(-5.0, 1.0), (0.0, 1.0), (1e9, 200.0)])
 def test_a_size_stays_within_what_a_finger_can_have(paper, asked, got):
-    devices.set_size(paper.digiclay, 1e-3 * asked)
+    devices.set_size(paper, 1e-3 * asked)
     assert lengths(paper)[0] == pytest.approx(got, rel=1e-6)
 
 

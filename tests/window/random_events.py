@@ -152,7 +152,7 @@ def check():
         assert np.isfinite(height).all()
         assert height.min() >= 0.0
         assert height.max() <= session.system.cell.actuator.stroke
-        bed = blender.part("live.beds").find_bed(session.uid, session.name)
+        bed = blender.part("live.beds").find_bed(session)
         if bed is not None and not session.stale:
             assert blender.part("live.beds").read_snapshot(bed) == session.snapshot
     for bed in blender.beds():

@@ -35,16 +35,21 @@ def select_active(uids: frozenset[int]) -> None:
         active.select_set(True)
 
 
-def find_bed(uid: int, name: str) -> Object | None:
-    """Return the object of a `session_uid`, its last name looked up first; None when it was deleted."""
-    bed = bpy.data.objects.get(name)
-    if bed is None or bed.session_uid != uid:
-        bed = next((thing for thing in bpy.data.objects if thing.session_uid == uid), None)
+def find_bed(session: Running) -> Object | None:
+    """Return the object of a session, its last name looked up first; None when it was deleted."""
+    bed = bpy.data.objects.get(session.name)
+    if bed is None or bed.session_uid != session.uid:
+        bed = find_object(session.uid)
     if bed is None or bed.get(ROLE) != BED:  # one that was converted can come back by undo
         return None
     # Blender looks through all objects of all scenes for `users_scene`: only a bed not shown is
     # worth that.
     return bed if _is_shown(bpy.context, bed) or bed.users_scene else None
+
+
+def find_object(uid: int) -> Object | None:
+    """Return the object of a `session_uid`; None when it was deleted."""
+    return next((thing for thing in bpy.data.objects if thing.session_uid == uid), None)
 
 
 def _is_shown(context: Context, thing: Object) -> bool:
@@ -115,7 +120,7 @@ def active_session(context: Context) -> tuple[Object, Running] | None:
     """Return the bed that is active, or the only one with a session, and its session; None without."""
     bed, sessions = bed_of(context), running.list_sessions()
     if bed is None and len(sessions) == 1:
-        bed = find_bed(sessions[0].uid, sessions[0].name)
+        bed = find_bed(sessions[0])
     session = running.find(bed)
     return None if session is None else (bed, session)
 
@@ -167,7 +172,7 @@ def _identify(running: Running) -> tuple[object, ...]:
 def put(running: Running) -> None:
     """Make a value the present one of its bed's session, and write its strokes: an undo step is to come."""
     TABLE.sessions[running.uid] = running
-    bed = find_bed(running.uid, running.name)
+    bed = find_bed(running)
     if bed is not None and not running.stale:
         write(bed, running)
 

@@ -39,7 +39,7 @@ def write_recovery(*_: object) -> None:
     """Write each recording into its bed, as a take: the file is about to be saved."""
     clear_recovery()
     for session in running.list_sessions():
-        bed, take = find_bed(session.uid, session.name), takes.read_recording(session)
+        bed, take = find_bed(session), takes.read_recording(session)
         if bed is not None and take is not None:
             running.put(replace(session, saved_take=takes.add(bed, take, session=session).number))
 
@@ -51,7 +51,7 @@ def clear_recovery(path: str = "", *_: object) -> None:
         number, later = session.saved_take, replace(session, saved_take="")
         if not number:
             continue
-        bed = find_bed(session.uid, session.name)
+        bed = find_bed(session)
         if bed is not None and number in [entry.number for entry in takes.list_takes(bed)]:
             # Undo does not bring the take back.
             takes.remove(bed, number)

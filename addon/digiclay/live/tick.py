@@ -96,7 +96,7 @@ def start(context: Context, bed: Object) -> list[Note]:
 def stop(uid: int) -> str:
     """End a session: its bed keeps the state, and a take of the recording; return words about the take."""
     ended = running.TABLE.sessions.get(uid)
-    bed = find_bed(uid, ended.name) if ended else None
+    bed = find_bed(ended) if ended else None
     if ended is not None and bed is not None and ended.stroke_start:
         # The stroke is then kept whole, from its beginning.
         back = sculpting.restore_moment(ended, ended.standing)
@@ -176,7 +176,7 @@ def end_haste(context: Context) -> None:
     if loop.LOOP.in_haste:
         loop.LOOP.in_haste = False
         for session in running.list_sessions():
-            bed = find_bed(session.uid, session.name)
+            bed = find_bed(session)
             if bed is not None:
                 bring_back(context, bed, session)
 
@@ -186,7 +186,7 @@ def tick(context: Context, now: float) -> list[Note]:
     notes: list[Note] = []
     most = preferences.get(context).most_periods
     for session in running.list_sessions():
-        bed = find_bed(session.uid, session.name)
+        bed = find_bed(session)
         if bed is not None:
             notes += _advance_session(context, bed, session, now, most)
             continue

@@ -9,6 +9,7 @@ from typing import Any
 
 from ..compat import Area, Context, Event, Operator, bpy
 from ..core.base.errors import DigiclayError, one_line
+from ..overlay import views
 from ..panels.base import declare
 from ..settings.declared import number
 from ..ui_text import localize
@@ -170,6 +171,10 @@ class Modal(Polled):
     def borrow(self, context: Context) -> None:
         """Borrow timers, draw handlers and the like of Blender; nothing here may fail."""
 
+    def locate(self, event: Event) -> tuple[float, float]:
+        """Return where the mouse is, pixels of the region."""
+        return event.mouse_x - self.region.x, event.mouse_y - self.region.y
+
 
 class TimedAction(Modal, Action):
     """Mixin of an action that also goes on by a timer while Blender draws; Esc ends it."""
@@ -253,8 +258,7 @@ class Drawing(Modal):
         if self.handler is not None:
             bpy.types.SpaceView3D.draw_handler_remove(self.handler, "WINDOW")
             self.handler = None
-        for area in context.screen.areas if context.screen else ():
-            area.tag_redraw()
+        views.redraw()
         return set(result)
 
     def cancel(self, context: Context) -> None:

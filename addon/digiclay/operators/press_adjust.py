@@ -16,6 +16,7 @@ from ..core.base.arrays import Floats
 from ..core.model.fingertip import Fingertip
 from ..core.surface.pointing import find_contact_outline
 from ..live.beds import Use, find_obstacle
+from ..overlay import views
 from ..panels.base import menu
 from ..press import aim, brush, brush_presets, tool
 from ..press.brush import FINGERS
@@ -132,9 +133,7 @@ class AdjustMixin(Drawing):
         """Show the number in the status bar, and draw it."""
         self.words = self.describe(self._shown()) + (f"   [{self.text}]" if self.text else "")
         show_status(context, localize(KEYS, self.words))
-        for area in context.screen.areas:
-            if area.type == "VIEW_3D":
-                area.tag_redraw()
+        views.redraw()
 
     def draw_view(self, area: Area) -> None:
         """Draw outline and number in the view the operator was called in."""
@@ -175,10 +174,10 @@ class AdjustSize(AdjustMixin, Operator):
     low, high, snap = devices.SMALLEST, devices.LARGEST, 1e-3
 
     def read(self, bed: Object, settings: OperatorProperties) -> float:
-        return devices.read_size(devices.find_first(bed))
+        return devices.read_size(bed)
 
     def write(self, bed: Object, settings: OperatorProperties, value: float) -> None:
-        devices.set_size(devices.find_first(bed), value)
+        devices.set_size(bed, value)
 
     def rate(self, context: Context, bed: Object) -> float:
         """Return the meters per pixel at which the outline's side keeps up with the mouse."""
@@ -193,8 +192,7 @@ class AdjustSize(AdjustMixin, Operator):
 
     def outlines(self, finger: Fingertip, turn: Floats, depth: float, value: float) -> list[Any]:
         """Return the widest section of the fingertip, and what of it touches."""
-        share = value / (2.0 * finger.width)
-        scaled = Fingertip(finger.length * share, finger.width * share, finger.height * share)
+        scaled = devices.scale_tip(finger, value / (2.0 * finger.width))
         return [
             find_contact_outline(scaled, turn, np.inf),
             find_contact_outline(scaled, turn, depth),
@@ -256,9 +254,7 @@ class AdjustStrength(AdjustMixin, Operator):
 def scale_size(operator: Operator, context: Context) -> None:
     """Scale the fingertip; its blister follows"""
     bed: Object = brush.bed_in_use(context)
-    devices.set_size(
-        devices.find_first(bed), devices.read_size(devices.find_first(bed)) * operator.scalar
-    )
+    devices.set_size(bed, devices.read_size(bed) * operator.scalar)
 
 
 class TakeFinger(Action, Operator):

@@ -103,7 +103,7 @@ class LockArea(Drawing, Operator):
             event.type in ("ESC", "RIGHTMOUSE") and event.value == "PRESS"
         ):
             return self.end(context, "CANCELLED")
-        place = event.mouse_x - self.region.x, event.mouse_y - self.region.y
+        place = self.locate(event)
         if event.type == "LEFTMOUSE" and event.value == "PRESS":
             self.path, self.unlock = [place], self.unlock != event.ctrl
         elif event.type in ("MOUSEMOVE", "INBETWEEN_MOUSEMOVE", "LEFTMOUSE") and self.path:

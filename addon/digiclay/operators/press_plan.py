@@ -11,7 +11,7 @@ from ..strokes.stroke import SHALLOWEST, Brush, let_go, start
 from ..ui_text import localize
 from .action import Drawing, Polled, Result, action, show_status
 from .poll_messages import no_finger, no_tool, no_tool_in_view
-from .press_stroke import find_pressed, open_session
+from .press_stroke import find_place, find_pressed, hit_place, open_session
 
 KEYS = "Press where the center is to be, and drag along the axis  |  Esc or right click: cancel"
 
@@ -39,23 +39,19 @@ class PlaceCenter(Drawing, Operator):
             for name, value in self.before.items():
                 setattr(settings, name, value)
             return self.end(context, "CANCELLED")
-        xy = event.mouse_x - self.region.x, event.mouse_y - self.region.y
         if event.type == "LEFTMOUSE" and event.value == "PRESS":
             with context.temp_override(region=self.region):
-                target = find_pressed(self, bpy.context, xy, settings)
+                target = find_pressed(self, bpy.context, self.locate(event), settings)
             if target is not None:
                 self.uid, self.grid = target.bed.session_uid, target.grid
                 self.canvas = target.canvas.copy()
-                self.center = float(target.point[0]), float(target.point[1])
+                self.center = find_place(target.point)
                 brush.put_center(settings, *self.center)
         elif event.type in ("MOUSEMOVE", "LEFTMOUSE") and self.uid:
             bed = brush.find_bed(context, self.uid)
-            with context.temp_override(region=self.region):
-                point = bed and aim.hit_point(bpy.context, bed, self.grid, self.canvas, xy)
-            if point is not None:
-                brush.turn_axis(
-                    settings, float(point[0]) - self.center[0], float(point[1]) - self.center[1]
-                )
+            place = bed and hit_place(self, context, bed, event)
+            if place is not None:
+                brush.turn_axis(settings, place[0] - self.center[0], place[1] - self.center[1])
             if event.type == "LEFTMOUSE":
                 return self.end(context, "FINISHED")
         else:

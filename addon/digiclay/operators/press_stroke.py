@@ -86,7 +86,7 @@ class Press(PressSettings, Modal, Operator):
         self.pressure, self.lean = 1.0, (0.0, 0.0)
         self.button = begin_button(event.value, (event.type_prev, event.value_prev))
         self._feel(context, target.bed, event)
-        self.lagged = place = float(target.point[0]), float(target.point[1])
+        self.lagged = place = find_place(target.point)
         depth, share = self._amount()
         images = brush.find_images(self)
         options |= devices.read_sizes(target.bed)
@@ -139,14 +139,13 @@ class Press(PressSettings, Modal, Operator):
 
     def _move(self, context: Context, bed: Object, event: Event) -> None:
         """Draw on to the place under the mouse."""
-        xy = event.mouse_x - self.region.x, event.mouse_y - self.region.y
         with context.temp_override(region=self.region):
             self._feel(bpy.context, bed, event)
-            point = aim.hit_point(bpy.context, bed, self.grid, self.canvas, xy)
-        if point is not None and event.value != "PRESS":
+        place = hit_place(self, context, bed, event)
+        if place is not None and event.value != "PRESS":
             # Released, the stroke goes on to the mouse: a stabilized one has not come there yet.
             string = 1e-3 * self.stabilizer if event.type != "LEFTMOUSE" else 0.0
-            x, y = self.lagged = pull(self.lagged, (float(point[0]), float(point[1])), string)
+            x, y = self.lagged = pull(self.lagged, place, string)
             depth, share = self._amount()
             self._change(partial(draw, x=x, y=y, depth=depth, share=share, lean=self.lean))
 
@@ -218,6 +217,21 @@ def find_pressed(
     if hider is not None:
         inform(operator, HIDDEN, hider.name, level="WARNING")
     return target if hider is None else None
+
+
+def find_place(point: Floats) -> Place:
+    """Return where a point (3,) of a bed is in plan, m."""
+    x, y, _ = point.tolist()
+    return x, y
+
+
+def hit_place(operator: Operator, context: Context, bed: Object, event: Event) -> Place | None:
+    """Return the place of a bed under the mouse, m, on the surface that an operator began on; or None."""
+    with context.temp_override(region=operator.region):
+        point = aim.hit_point(
+            bpy.context, bed, operator.grid, operator.canvas, operator.locate(event)
+        )
+    return None if point is None else find_place(point)
 
 
 def open_session(
@@ -302,7 +316,7 @@ class PressShape(Drawing, Operator):
             return NOT_PRESSED
         self.uid, self.grid, self.height = target.bed.session_uid, target.grid, target.height.copy()
         self.canvas = target.canvas.copy()
-        self.start = self.to = float(target.point[0]), float(target.point[1])
+        self.start = self.to = find_place(target.point)
         self._show(context)
         return None
 
@@ -315,11 +329,7 @@ class PressShape(Drawing, Operator):
             return self.end(context, "CANCELLED")
         if event.type not in ("MOUSEMOVE", "LEFTMOUSE"):
             return {"PASS_THROUGH"}
-        xy = event.mouse_x - self.region.x, event.mouse_y - self.region.y
-        with context.temp_override(region=self.region):
-            point = aim.hit_point(bpy.context, bed, self.grid, self.canvas, xy)
-        if point is not None:
-            self.to = float(point[0]), float(point[1])
+        self.to = hit_place(self, context, bed, event) or self.to
         self._show(context)
         if event.type == "MOUSEMOVE":
             return {"RUNNING_MODAL"}
@@ -377,7 +387,7 @@ class PressLine(Polled, Operator):
         target = find_pressed(self, context, xy, settings)
         if target is None:
             return NOT_PRESSED
-        to = float(target.point[0]), float(target.point[1])
+        to = find_place(target.point)
         session = running.find(target.bed)
         start = last_place(session) if session is not None else None
         kind = Brush(settings.brush)

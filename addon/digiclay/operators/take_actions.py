@@ -295,7 +295,7 @@ class ReplayTake(TimedAction, Operator):
     def _restore(self, context: Context) -> Result:
         """Show the bed as it was before."""
         self.cancel(context)
-        bed = next((thing for thing in bpy.data.objects if thing.session_uid == self._uid), None)
+        bed = beds.find_object(self._uid)
         if bed is not None:
             try:
                 scene = properties.scene_of(bed)

@@ -125,19 +125,18 @@ def _scale_finger(scene: Scene, share: float) -> Scene:
     """Return a scene with fingertip and blister of another size, and with forces and gains to match."""
     return replace(
         scene,
-        fingers=tuple(_scale_tip(finger, share) for finger in scene.fingers),
+        fingers=tuple(
+            replace(finger, fingertip=finger.fingertip and scale_tip(finger.fingertip, share))
+            for finger in scene.fingers
+        ),
         blister=scene.blister and scale_blister(scene.blister, share),
         control=scene.control and _scale_control(scene.control, share),
     )
 
 
-def _scale_tip(finger: Finger, share: float) -> Finger:
-    """Return a finger with a tip of another size, of the same pulp."""
-    tip = finger.fingertip
-    if tip is None:
-        return finger
-    size = Fingertip(tip.length * share, tip.width * share, tip.height * share)
-    return replace(finger, fingertip=size)
+def scale_tip(tip: Fingertip, share: float) -> Fingertip:
+    """Return a fingertip of another size, in the same proportions."""
+    return Fingertip(tip.length * share, tip.width * share, tip.height * share)
 
 
 def _scale_control(control: ControlParameters, share: float) -> ControlParameters:
@@ -192,9 +191,9 @@ def read_sizes(bed: Object) -> dict[str, Any]:
     return {"finger": read_finger(find_first(bed)), "blister": blister}
 
 
-def read_size(settings: PropertyGroup) -> float:
-    """Return the size of the fingertip of a bed's settings: how wide it is, m."""
-    return 2.0 * read_finger(settings).width
+def read_size(owner: Object) -> float:
+    """Return the size of the fingertip that `find_first` finds: how wide it is, m."""
+    return 2.0 * read_finger(find_first(owner)).width
 
 
 def set_axis(settings: PropertyGroup, name: str, size: float) -> None:
@@ -203,11 +202,10 @@ def set_axis(settings: PropertyGroup, name: str, size: float) -> None:
     resize(settings, replace(read_finger(settings), **{name: half}))
 
 
-def set_size(settings: PropertyGroup, size: float) -> None:
-    """Make a bed's fingertip as wide as a size, m, in the same proportions; within what a finger can have."""
-    finger = read_finger(settings)
-    share = min(max(size, SMALLEST), LARGEST) / (2.0 * finger.width)
-    resize(settings, Fingertip(finger.length * share, finger.width * share, finger.height * share))
+def set_size(owner: Object, size: float) -> None:
+    """Make that fingertip as wide as a size, m, in the same proportions; within what a finger can have."""
+    settings, share = find_first(owner), min(max(size, SMALLEST), LARGEST) / read_size(owner)
+    resize(settings, scale_tip(read_finger(settings), share))
 
 
 def find_first(owner: Object) -> PropertyGroup:

@@ -216,10 +216,8 @@ SETTINGS = make_group(
         "size": number(
             "Size (mm)",
             "Width of the fingertip, in mm; its length and height change in proportion",
-            get=lambda settings: 1e3 * devices.read_size(devices.find_first(settings.id_data)),
-            set=lambda settings, value: devices.set_size(
-                devices.find_first(settings.id_data), 1e-3 * value
-            ),
+            get=lambda settings: 1e3 * devices.read_size(settings.id_data),
+            set=lambda settings, value: devices.set_size(settings.id_data, 1e-3 * value),
             min=1e3 * devices.SMALLEST,
             max=1e3 * devices.LARGEST,
             soft_max=60.0,
