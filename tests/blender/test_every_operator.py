@@ -8,11 +8,10 @@ from digiclay.live import handlers, tick
 from digiclay.press import tool
 from digiclay.roles import fingertip_of
 from digiclay.sessions import running
-from digiclay.sessions.sculpting import queue_stroke
 from digiclay.strokes.stroke import start
 
 from tests.blender.at_hand import in_the_view, new_bed, select
-from tests.blender.session.live import Clock
+from tests.blender.session.live import Clock, queue
 
 OPERATORS = [kind for kind in operators.CLASSES if issubclass(kind, bpy.types.Operator)]
 #: Settings with which long work takes less time.
@@ -32,7 +31,6 @@ ODD = {
     "its fingertip": lambda bed: select(fingertip_of(bed)),
     "nothing": lambda bed: setattr(bpy.context.view_layer.objects, "active", None),
     "another mesh": lambda bed: select(bpy.data.objects["Cube"]),
-    "a light": lambda bed: select(bpy.data.objects["Light"]),
     "no bed in the file": lambda bed: BPY.wm.read_homefile(use_empty=True),
     "a linked duplicate": lambda bed: BPY.object.duplicate(linked=True),
     "edited": lambda bed: enter("EDIT"),
@@ -41,24 +39,19 @@ ODD = {
         setattr(bpy.context.view_layer.objects, "active", bed),
     ),
     "sculpted": lambda bed: enter("SCULPT"),
-    "painted": lambda bed: enter("VERTEX_PAINT"),
-    "weighted": lambda bed: enter("WEIGHT_PAINT"),
     "another mesh edited": lambda bed: (select(bpy.data.objects["Cube"]), enter("EDIT")),
     "pins deleted": lambda bed: (
         enter("EDIT"), BPY.mesh.select_all(action="SELECT"), BPY.mesh.delete(type="VERT"),
     ),
-    "no vertices": lambda bed: bed.data.clear_geometry(),
     "mesh swapped": lambda bed: setattr(bed, "data", bpy.data.meshes["Cube"]),
     "attribute removed": lambda bed: bed.data.attributes.remove(bed.data.attributes["mode"]),
     "converted to what is no mesh": lambda bed: BPY.object.convert(target=NO_MESH),
-    "converted as it is drawn": lambda bed: BPY.object.convert(target="MESH"),
     "joined with a cube": lambda bed: (select(bpy.data.objects["Cube"], bed), BPY.object.join()),
     "joined into a cube": lambda bed: (select(bed, bpy.data.objects["Cube"]), BPY.object.join()),
     "geometry nodes removed": lambda bed: bed.modifiers.clear(),
     "fingertip deleted": lambda bed: bpy.data.objects.remove(fingertip_of(bed)),
     "fingertip without parent": lambda bed: setattr(fingertip_of(bed), "parent", None),
     "hidden": lambda bed: bed.hide_set(True),
-    "stretched": lambda bed: setattr(bed, "scale", (1.0, 2.0, 1.0)),
     "mirrored": lambda bed: setattr(bed, "scale", (-1.0, 1.0, 1.0)),
     "scaled to nothing": lambda bed: setattr(bed, "scale", (0.0, 0.0, 0.0)),
 }  # fmt: skip
@@ -89,7 +82,7 @@ def prepare(file, odd, live):
     bed, clock = bpy.context.object, Clock()
     if live:
         tick.start(bpy.context, bed)
-        running.put(queue_stroke(running.find(bed), start(0, 0.0, 0.0, 4e-3))[0])
+        queue(bed, start(0, 0.0, 0.0, 4e-3))
         clock.tick(2)
         assert running.find(bed).strokes[0].height is not None  # it has begun
     ODD[odd](bed)
@@ -136,7 +129,7 @@ def call(operator, how, settings):
 
 
 #: What `test_bed_states.py` has without a session.
-TABLED = {"a bed", "edited", "hidden", "stretched", "mirrored"}
+TABLED = {"a bed", "edited", "hidden", "mirrored"}
 
 
 @pytest.mark.parametrize(

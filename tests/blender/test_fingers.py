@@ -13,7 +13,17 @@ from digiclay.roles import BALL, PALM, ROLE, ellipsoid, fingertips_of, is_linked
 from digiclay.settings import own_presets, properties
 
 from tests.assemble import assert_near
-from tests.blender.at_hand import added, beds, done, looked, redone, select, undone
+from tests.blender.at_hand import (
+    added,
+    beds,
+    delete,
+    done,
+    duplicate,
+    looked,
+    redone,
+    select,
+    undone,
+)
 
 pytestmark = pytest.mark.usefixtures("watched")
 
@@ -181,9 +191,7 @@ def test_a_deleted_fingertip_leaves_its_number_to_the_next_one_and_comes_back_wi
     bed = with_finger()
     bpy.ops.digiclay.add_fingertip()
     done("Add Fingertip")
-    select(fingertips_of(bed)[2])
-    bpy.ops.object.delete()
-    done("Delete")
+    delete(fingertips_of(bed)[2])
     assert sound(bed, 1, 3)
     undone()
     assert sound(beds()[0], 1, 2, 3)
@@ -194,9 +202,7 @@ def test_a_deleted_fingertip_leaves_its_number_to_the_next_one_and_comes_back_wi
     bpy.ops.digiclay.add_fingertip()
     done("Add Fingertip")
     assert sound(bed, 1, 2, 3)
-    select(*fingertips_of(bed).values())
-    bpy.ops.object.delete()
-    done("Delete")
+    delete(*fingertips_of(bed).values())
     assert fingertips_of(bed) == {}
 
 
@@ -216,9 +222,7 @@ def test_a_hand_moves_is_hidden_and_is_deleted_with_its_palm(where):
     whole.hide_set(False)
     done("Show")
     assert not any(tip.hide_get() for tip in fingertips_of(bed).values())
-    select(whole)
-    bpy.ops.object.delete()
-    done("Delete")
+    delete(whole)
     assert palms() == []
     if where == "bed":
         assert len(bpy.context.scene.objects) == 0
@@ -327,9 +331,7 @@ def test_a_bed_has_at_most_32_fingertips():
             with pytest.raises(RuntimeError, match=rf"^(Error:|\S* \S*\.poll\(\)) {rule}"):
                 add()
     assert len(bpy.data.objects) == objects
-    select(fingertips_of(bed)[7])
-    bpy.ops.object.duplicate()
-    done("Duplicate")  # it stays what it looks like, and touches nothing
+    duplicate(fingertips_of(bed)[7])  # it stays what it looks like, and touches nothing
     assert tuple(fingertips_of(bed)) == tuple(range(1, 33))
 
 

@@ -21,7 +21,7 @@ from digiclay.settings.declared import LABELS, title
 from digiclay.settings.groups import CLASSES
 from digiclay.ui_text import localize
 
-from tests.blender.at_hand import new_bed
+from tests.blender.at_hand import activate, new_bed
 
 #: Sections drawn by a panel of another kind: a shape is chosen rather than typed.
 ELSEWHERE = {"shape"}
@@ -42,7 +42,7 @@ def test_the_panels_are_about_the_bed_that_the_active_object_belongs_to(bed):
     cube = bpy.data.objects["Cube"]
     cube.parent = fingertip_of(bed)
     for part in (bed, *bed.children_recursive):
-        bpy.context.view_layer.objects.active = part
+        activate(part)
         assert bed_of(bpy.context) == bed
     assert len(bed.children_recursive) == 3  # fingertip, its ellipsoid, the cube
     assert not panel("start").poll(bpy.context)
@@ -51,7 +51,7 @@ def test_the_panels_are_about_the_bed_that_the_active_object_belongs_to(bed):
 
 @pytest.mark.parametrize("active", ["Cube", None])
 def test_without_a_bed_there_is_only_the_panel_that_offers_one(active, bed):
-    bpy.context.view_layer.objects.active = bpy.data.objects[active] if active else None
+    activate(bpy.data.objects[active] if active else None)
     shown = [
         kind.bl_idname
         for kind in panels.CLASSES

@@ -19,6 +19,7 @@ from digiclay.sessions import running
 from digiclay.settings import properties
 
 from tests.assemble import assert_near
+from tests.blender.at_hand import activate
 from tests.blender.session.live import FLOAT32, Clock, exact, press, shown
 
 pytestmark = pytest.mark.usefixtures("extension")
@@ -37,7 +38,7 @@ def older_file(extension):
 
 def bed(name):
     found = bpy.data.objects[name]
-    bpy.context.view_layer.objects.active = found
+    activate(found)
     return found
 
 

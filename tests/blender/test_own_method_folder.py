@@ -10,7 +10,7 @@ from digiclay.live import tick
 from digiclay.sessions import running
 from digiclay.settings import own_folder, properties
 
-from tests.blender.at_hand import new_bed
+from tests.blender.at_hand import activate, new_bed
 from tests.blender.session.live import Clock, exact, move, press
 from tests.own_methods import HEAD, PAD, write_method
 
@@ -143,7 +143,7 @@ def test_a_file_without_its_method_says_so_and_uses_no_other(chosen, tmp_path):
     chosen.run_own_methods = False
     bpy.ops.wm.open_mainfile(filepath=file)
     bed = next(one for one in bpy.data.objects if one.digiclay.own_method)
-    bpy.context.view_layer.objects.active = bed
+    activate(bed)
     assert bed.digiclay.chosen_method == "soft_pad"
     with pytest.raises(
         ParameterError, match=r"^Control: Method must be one of .* \(got 'soft_pad'\)"
@@ -154,6 +154,6 @@ def test_a_file_without_its_method_says_so_and_uses_no_other(chosen, tmp_path):
     assert running.list_sessions() == ()
     assert not bpy.types.DIGICLAY_PT_part_control.poll(bpy.context)
     assert bpy.ops.mesh.digital_clay_make() == {"FINISHED"}  # a mesh needs no method
-    bpy.context.view_layer.objects.active = bed
+    activate(bed)
     chosen.run_own_methods = True
     assert format_scene(properties.scene_of(bed)) == format_scene(scene)  # its class is a new one

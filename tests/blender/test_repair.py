@@ -16,6 +16,7 @@ from digiclay.settings import properties
 
 from tests.assemble import assert_near
 from tests.blender.at_hand import (
+    activate,
     added,
     beds,
     delete,
@@ -148,7 +149,7 @@ def test_a_bed_joined_into_another_object_takes_its_fingertips_along_and_undo_br
     name, before = bed.name, {one.name for one in bpy.context.scene.objects}
     select(bed)
     into.select_set(True)
-    bpy.context.view_layer.objects.active = into
+    activate(into)
     assert bpy.ops.object.join() == {"FINISHED"}
     done("Join")
     (kept,) = (one for one in bpy.context.scene.objects if one.parent is None)

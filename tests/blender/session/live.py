@@ -9,6 +9,7 @@ from digiclay.core.session import snapshot
 from digiclay.live import beds, handlers, tick
 from digiclay.roles import fingertip_of, is_bed
 from digiclay.sessions import running
+from digiclay.sessions.sculpting import queue_stroke, set_recording
 from digiclay.settings import properties
 
 #: Attributes are float32: 24 bits of at most 0.1 m, drawn ten times as large.
@@ -63,16 +64,34 @@ def press(bed, clock, x=0.0):
     assert move(bed, clock, [*down, *[(x, 37.0)] * 8, *down[::-1], *[(x, 46.0)] * 20]) == []
 
 
-def exact(bed):
-    """Return the pin tops the bed keeps, exactly, m."""
+def only_session():
+    """Return the session of the only bed."""
+    return running.find(only_bed())
+
+
+def record(bed):
+    """Have the session of a bed record from now on."""
+    running.put(set_recording(running.find(bed), True))
+
+
+def queue(bed, stroke):
+    """Queue a stroke for the session of a bed; return its number."""
+    session, number = queue_stroke(running.find(bed), stroke)
+    running.put(session)
+    return number
+
+
+def exact(bed=None):
+    """Return the pin tops that a bed, or the only one, keeps, exactly, m."""
+    bed = bed or only_bed()
     system = assemble(properties.scene_of(bed))
     kept = beds.read_snapshot(bed)
     return (begin(system) if kept is None else snapshot.load(system, kept)).row(0)
 
 
-def shown(bed):
-    """Return the pin tops drawn, m."""
-    return bridge.read_cells(bed.data)["height"]
+def shown(bed=None):
+    """Return the pin tops drawn of a bed, or the only one, m."""
+    return bridge.read_cells((bed or only_bed()).data)["height"]
 
 
 def undone(clock, times=1):

@@ -5,35 +5,47 @@ import numpy as np
 import pytest
 from digiclay.core.session import snapshot
 from digiclay.live import beds, handlers, tick
-from digiclay.sessions import running, sculpting
+from digiclay.sessions import running
 
 from tests.assemble import assert_near
-from tests.blender.session.live import FLOAT32, exact, move, only_bed, press, shown, started, undone
+from tests.blender.at_hand import push_step
+from tests.blender.session.live import (
+    FLOAT32,
+    exact,
+    move,
+    only_bed,
+    only_session,
+    press,
+    record,
+    shown,
+    started,
+    undone,
+)
 
 
 def test_undo_takes_back_one_gesture_exactly_and_the_session_goes_on(bed, clock):
     started(bed)
-    bpy.ops.ed.undo_push(message="Start")
+    push_step("Start")
     press(bed, clock, -6.0)
-    bpy.ops.ed.undo_push(message="First")
+    push_step("First")
     first = beds.read_snapshot(bed)
     press(bed, clock, 6.0)
-    bpy.ops.ed.undo_push(message="Second")
+    push_step("Second")
     second = beds.read_snapshot(bed)
     undone(clock)
-    session = running.find(only_bed())
+    session = only_session()
     assert snapshot.dump(session.system, session.state) == first
     # The finger has not come from elsewhere.
     assert session.pose[0] == pytest.approx(-6e-3, abs=FLOAT32)
-    assert_near(shown(only_bed()), exact(only_bed()), FLOAT32)
+    assert_near(shown(), exact(), FLOAT32)
     undone(clock)
-    assert (exact(only_bed()) == 40e-3).all()
+    assert (exact() == 40e-3).all()
     bpy.ops.ed.redo()
     bpy.ops.ed.redo()
     clock.tick(handlers.STALE)
     assert beds.read_snapshot(only_bed()) == second
     press(only_bed(), clock)
-    assert exact(only_bed())[6 * 13 + 6] < 39e-3
+    assert exact()[6 * 13 + 6] < 39e-3
 
 
 def test_undo_takes_back_what_was_formed_after_a_gesture_in_a_pause(bed, clock):
@@ -42,21 +54,21 @@ def test_undo_takes_back_what_was_formed_after_a_gesture_in_a_pause(bed, clock):
     clock.tick(3)
     bpy.ops.digiclay.session_pause()
     clock.tick()
-    bpy.ops.ed.undo_push(message="Start")
+    push_step("Start")
     clock.tick()
     move(bed, clock, [(0.0, 38.0)])
-    bpy.ops.ed.undo_push(message="Moved in the pause")
+    push_step("Moved in the pause")
     bpy.ops.digiclay.session_pause()
     clock.tick(20)
     assert exact(bed).min() < 39.8e-3
     undone(clock)
-    assert (exact(only_bed()) == 40e-3).all()
+    assert (exact() == 40e-3).all()
 
 
 def test_undo_to_before_the_bed_was_there_ends_the_session_with_a_message(clock):
-    bpy.ops.ed.undo_push(message="Nothing")
+    push_step("Nothing")
     bpy.ops.mesh.digital_clay_add(rows=13, columns=13)
-    bpy.ops.ed.undo_push(message="Bed")
+    push_step("Bed")
     tick.start(bpy.context, bpy.context.object)
     bpy.ops.ed.undo()
     notes = clock.tick()
@@ -147,11 +159,11 @@ def test_a_state_somebody_has_broken_begins_at_rest_with_a_message(bed, junk):
 
 def test_a_recording_that_undo_has_left_ends_with_a_message(bed, clock):
     started(bed)
-    bpy.ops.ed.undo_push(message="Start")
+    push_step("Start")
     press(bed, clock)
-    bpy.ops.ed.undo_push(message="Press")
-    running.put(sculpting.set_recording(running.find(bed), True))
+    push_step("Press")
+    record(bed)
     clock.tick(3)
     bpy.ops.ed.undo()
     assert ["recording ended" in note.message for note in clock.tick(handlers.STALE)] == [True]
-    assert running.find(only_bed()).recording is None
+    assert only_session().recording is None

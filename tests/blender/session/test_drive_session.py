@@ -14,9 +14,9 @@ from digiclay.overlay import views
 from digiclay.overlay.picture import choose_colors
 from digiclay.overlay.sections import lay_out
 from digiclay.recorded import bake, takes
-from digiclay.sessions import running, sculpting
+from digiclay.sessions import running
 
-from tests.blender.session.live import exact, move, press, started
+from tests.blender.session.live import exact, move, press, record, started
 
 
 def count_marked(bed):
@@ -35,7 +35,7 @@ def test_a_session_serves_lines_says_how_many_wait_and_its_take_is_replayed_bit_
     settings = bed.digiclay
     settings.use_drive, settings.drive.sections, settings.drive.slot = True, 2, 20.0
     started(bed)
-    running.put(sculpting.set_recording(running.find(bed), True))
+    record(bed)
     assert move(bed, clock, [(0.0, z) for z in np.linspace(46, 37, 8)]) == []
     session = running.find(bed)
     now = session.state.addressing
@@ -57,7 +57,7 @@ def test_a_session_serves_lines_says_how_many_wait_and_its_take_is_replayed_bit_
 def test_a_bake_marks_in_each_frame_the_pins_that_wait_then_and_none_when_colored_alike(bed, clock):
     bed.digiclay.use_drive, bed.digiclay.drive.sections, bed.digiclay.drive.slot = True, 2, 20.0
     started(bed)
-    running.put(sculpting.set_recording(running.find(bed), True))
+    record(bed)
     press(bed, clock)
     take = takes.read_recording(running.find(bed))
     counts = [state.addressing.waiting.size for _, state in play(take)]

@@ -9,10 +9,10 @@ from digiclay.core.session import snapshot
 from digiclay.live import beds
 from digiclay.recorded import bake
 from digiclay.roles import fingertip_of
-from digiclay.sessions import running, sculpting
+from digiclay.sessions import running
 
 from tests.assemble import assert_near
-from tests.blender.session.live import FLOAT32, TICK, exact, move, press, shown, started
+from tests.blender.session.live import FLOAT32, TICK, exact, move, press, record, shown, started
 
 
 def test_the_bed_forms_while_the_fingertip_moves_and_keeps_and_shows_what_the_session_is(
@@ -115,7 +115,7 @@ def test_a_session_in_a_playback_has_the_path_that_a_bake_has(bed, clock, how):
     clock.tick(3)
     bpy.ops.screen.animation_play()
     clock.tick()
-    running.put(sculpting.set_recording(running.find(bed), True))
+    record(bed)
     for count in range(int(ticks * 48 / frames) + 2):
         scene.frame_set(start + min(frames * int(count / ticks), 48))
         clock.now += wall - TICK

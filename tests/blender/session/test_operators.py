@@ -15,11 +15,12 @@ from digiclay.operators.session_loop import LoopMixin
 from digiclay.press import ghost
 from digiclay.roles import fingertip_of
 from digiclay.sessions import running
-from digiclay.sessions.sculpting import change_stroke, queue_stroke
+from digiclay.sessions.sculpting import change_stroke
 from digiclay.strokes.stroke import lay_path, start
 
 from tests.assemble import assert_near
-from tests.blender.session.live import FLOAT32, exact, move, press, shown, started
+from tests.blender.at_hand import activate
+from tests.blender.session.live import FLOAT32, exact, move, press, queue, shown, started
 from tests.hand import let_go
 
 
@@ -74,7 +75,7 @@ def test_a_single_step_pauses_and_is_one_control_period(bed, clock):
 
 def test_the_session_of_a_bed_that_is_not_active_is_found_while_it_is_the_only_one(bed):
     started(bed)
-    bpy.context.view_layer.objects.active = bpy.data.objects["Cube"]
+    activate(bpy.data.objects["Cube"])
     assert bpy.ops.digiclay.session_pause() == {"FINISHED"}
     assert running.find(bed).paused
 
@@ -104,7 +105,7 @@ def test_after_the_session_the_active_bed_is_selected_as_before(bed, case, wante
     beds.deselect(bed)
     assert (bed.select_get(), bpy.context.object) == (False, bed)
     if case == "another is active":
-        bpy.context.view_layer.objects.active = cube
+        activate(cube)
     cube.select_set(case == "another was selected meanwhile")
     beds.select_active(frozenset({bed.session_uid}))
     assert [thing.name for thing in bpy.context.selected_objects] == wanted
@@ -137,7 +138,7 @@ def test_a_script_finishes_strokes_at_once_and_what_was_in_haste_is_shown(bed, c
     across = [(-6e-3, 0.0), (6e-3, 0.0)]
     for number in (1, 2):
         assert bpy.ops.digiclay.finish_strokes.poll() == (number > 1)
-        running.put(queue_stroke(running.find(bed), start(0, -6e-3, 0.0, 4e-3))[0])
+        queue(bed, start(0, -6e-3, 0.0, 4e-3))
         assert bpy.ops.digiclay.finish_strokes.poll() == (number > 1)  # the hand still draws
         running.put(change_stroke(running.find(bed), number, partial(lay_path, points=across)))
     running.put(change_stroke(running.find(bed), 1, partial(replace, held=True)))
@@ -159,7 +160,7 @@ def test_the_ghost_is_there_with_the_queue_and_goes_with_it(bed, clock):
     ghost.plan(bed.session_uid, start(0, 0.0, 0.0, 4e-3))
     assert ghost.find_surface(running.find(bed)).min() == pytest.approx(36e-3, abs=1e-6)
     ghost.plan(bed.session_uid, None)
-    running.put(queue_stroke(running.find(bed), start(0, 0.0, 0.0, 4e-3))[0])
+    queue(bed, start(0, 0.0, 0.0, 4e-3))
     surface = ghost.find_surface(running.find(bed))
     assert surface.min() == pytest.approx(36e-3, abs=1e-6)
     way = surface - shown(bed)

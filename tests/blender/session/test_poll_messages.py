@@ -6,6 +6,7 @@ from digiclay import operators
 from digiclay.live import tick
 from digiclay.roles import fingertip_of
 
+from tests.blender.at_hand import activate
 from tests.blender.session.live import press, started
 
 NAMES = sorted(kind.bl_idname for kind in operators.CLASSES if issubclass(kind, bpy.types.Operator))
@@ -80,10 +81,10 @@ def test_in_edit_mode_and_without_a_bed_nothing_can_be_changed(bed, clock):
     press(bed, clock)
     tick.stop(bed.session_uid)
     bpy.ops.object.mode_set(mode="EDIT")
-    bpy.context.view_layer.objects.active = fingertip_of(bed)
+    activate(fingertip_of(bed))
     assert bpy.context.mode == "OBJECT"
     assert refused("digiclay.session_reset") == "Go back to Object Mode first"
-    bpy.context.view_layer.objects.active = bed
+    activate(bed)
     assert set(NAMES) - declining().keys() == IN_EDIT_MODE
     bpy.ops.object.mode_set(mode="OBJECT")
     bpy.data.objects.remove(bed)

@@ -17,8 +17,16 @@ from digiclay.strokes.stamps import load_stamp
 from digiclay.strokes.stroke import Brush, Combine, lay_path, make_images, start
 
 from tests.assemble import assert_near
-from tests.blender.at_hand import new_bed
-from tests.blender.session.live import FLOAT32, exact, only_bed, shown, started, undone
+from tests.blender.at_hand import new_bed, push_step
+from tests.blender.session.live import (
+    FLOAT32,
+    exact,
+    only_bed,
+    only_session,
+    shown,
+    started,
+    undone,
+)
 
 #: Rows of the strokes, mm, and where they begin and end.
 ROWS, ENDS = (-12.0, 0.0, 12.0), (-9.0, 9.0)
@@ -26,27 +34,27 @@ ROWS, ENDS = (-12.0, 0.0, 12.0), (-9.0, 9.0)
 
 def draw(y, **how):
     """Draw a stroke along a row, as the Press tool does, with its undo step."""
-    session = running.find(only_bed())
+    session = only_session()
     path = [(1e-3 * x, 1e-3 * y) for x in ENDS]
     session, number = queue_stroke(session, start(0, *path[0], 3e-3, **how))
     beds.put(change_stroke(session, number, partial(lay_path, points=path)))
-    bpy.ops.ed.undo_push(message="Press")
+    push_step("Press")
 
 
 def begin(bed, method="plastic"):
     bed.digiclay.method = method
     started(bed)
-    bpy.ops.ed.undo_push(message="Start Session")
+    push_step("Start Session")
 
 
 def form(clock):
-    clock.until(lambda: not running.find(only_bed()).strokes)
+    clock.until(lambda: not only_session().strokes)
     clock.tick()
 
 
 def rows():
     """Tell which strokes are formed, each wholly or not at all."""
-    down = 40e-3 - exact(only_bed()).reshape(13, 13)[[round(6 + y / 3) for y in ROWS]][:, 4:9]
+    down = 40e-3 - exact().reshape(13, 13)[[round(6 + y / 3) for y in ROWS]][:, 4:9]
     assert all(row.min() > 1e-3 or row.max() < 0.7e-3 for row in down), down
     return [bool(row.min() > 1e-3) for row in down]
 
@@ -57,12 +65,12 @@ def redone(clock):
 
 
 def half_formed():
-    return shown(only_bed()).min() < 39e-3
+    return shown().min() < 39e-3
 
 
 WHEN = {
     "queued": lambda: True,
-    "begun": lambda: running.find(only_bed()).strokes[0].height is not None,
+    "begun": lambda: only_session().strokes[0].height is not None,
     "half-formed": half_formed,
 }
 
@@ -99,7 +107,7 @@ def test_a_file_has_every_stroke_that_was_drawn(bed, clock, tmp_path, slow, when
     form(clock)
     formed = exact(bed)
     bpy.ops.wm.open_mainfile(filepath=path)
-    assert (exact(only_bed()) == 40e-3).all()  # nothing of it half
+    assert (exact() == 40e-3).all()  # nothing of it half
     assert len(beds.read_queue(only_bed())[-1]) == 3
     if how == "at once":
         handlers.form_left()
@@ -107,8 +115,8 @@ def test_a_file_has_every_stroke_that_was_drawn(bed, clock, tmp_path, slow, when
     else:
         begin(only_bed())
         form(clock)
-    np.testing.assert_array_equal(exact(only_bed()), formed)
-    assert_near(shown(only_bed()), formed, FLOAT32)
+    np.testing.assert_array_equal(exact(), formed)
+    assert_near(shown(), formed, FLOAT32)
     assert beds.read_queue(only_bed())[-1] == []
 
 
@@ -119,22 +127,22 @@ def test_undo_takes_back_one_stroke_and_redo_brings_it_back(bed, clock, slow, wh
         draw(y)
     form(clock) if when == "all formed" else slow(clock, WHEN[when])
     for count in (2, 1, 0):
-        before = running.find(only_bed()).state.period
+        before = only_session().state.period
         undone(clock)
         if count == 2 and when == "half-formed":  # the first one goes on
-            assert running.find(only_bed()).state.period >= before
+            assert only_session().state.period >= before
         if when == "all formed":  # and none is formed once more
-            assert running.find(only_bed()).strokes == ()
+            assert only_session().strokes == ()
         form(clock)
         assert rows() == [True] * count + [False] * (3 - count)
     for count in (1, 2, 3):
         redone(clock)
-        assert running.find(only_bed()).strokes == () or when != "all formed"
+        assert only_session().strokes == () or when != "all formed"
         form(clock)
         assert rows() == [True] * count + [False] * (3 - count)
     gestures = [True] * 3
     while any(gestures):  # Backspace takes back one at a time, in the order they were drawn
-        assert len(running.find(only_bed()).gestures) == sum(gestures)
+        assert len(only_session().gestures) == sum(gestures)
         bpy.ops.digiclay.session_rewind("EXEC_DEFAULT", True)
         gestures[sum(gestures) - 1] = False
         clock.tick()
@@ -149,7 +157,7 @@ def test_undo_of_backspace_and_of_a_reset_brings_the_gestures_back(bed, clock):
     for step in ("rewind", "reset"):
         getattr(bpy.ops.digiclay, f"session_{step}")("EXEC_DEFAULT", True)
         undone(clock)
-        assert (rows(), len(running.find(only_bed()).gestures)) == ([True, True, False], 2)
+        assert (rows(), len(only_session().gestures)) == ([True, True, False], 2)
 
 
 def test_without_a_session_undo_and_redo_leave_no_stroke_unformed(bed, clock, slow):
@@ -158,20 +166,20 @@ def test_without_a_session_undo_and_redo_leave_no_stroke_unformed(bed, clock, sl
     slow(clock, half_formed)
     other = bpy.data.objects["Cube"]
     other.location.x += 1.0
-    bpy.ops.ed.undo_push(message="Move")
+    push_step("Move")
     form(clock)
     handlers.end_all(handlers.STOPPED)
-    formed = exact(only_bed())
+    formed = exact()
     for step in (bpy.ops.ed.undo, bpy.ops.ed.undo, bpy.ops.ed.redo, bpy.ops.ed.redo):
         step()
         handlers.form_left()
         # Pins settle by hundredths of a millimeter when the fingertip has left.
-        assert_near(exact(only_bed()), formed, 1e-4)
-        assert_near(shown(only_bed()), exact(only_bed()), FLOAT32)
+        assert_near(exact(), formed, 1e-4)
+        assert_near(shown(), exact(), FLOAT32)
     for _ in range(3):
         bpy.ops.ed.undo()
     handlers.form_left()
-    assert_near(shown(only_bed()), 40e-3, FLOAT32)
+    assert_near(shown(), 40e-3, FLOAT32)
 
 
 @pytest.mark.parametrize("stopped", [False, True])
@@ -203,19 +211,19 @@ def test_strokes_from_the_base_leave_one_depth_until_set_base_which_undo_takes_b
     # Pins that give way to a force stand 1.1 mm less deep than the fingertip came, and a little
     # deeper after each pass.
     once, twice = 40e-3 - 1.9e-3, 40e-3 - 3.8e-3
-    assert_near(exact(only_bed())[row], twice, 0.5e-3)
-    assert_near(running.find(only_bed()).base[row], once, 0.5e-3)
+    assert_near(exact()[row], twice, 0.5e-3)
+    assert_near(only_session().base[row], once, 0.5e-3)
     undone(clock, 2)
     form(clock)
-    assert (running.find(only_bed()).base == 40e-3).all()
-    assert_near(exact(only_bed())[row], once, 0.5e-3)
+    assert (only_session().base == 40e-3).all()
+    assert_near(exact()[row], once, 0.5e-3)
     redone(clock)
     form(clock)
-    assert_near(running.find(only_bed()).base[row], once, 0.5e-3)
+    assert_near(only_session().base[row], once, 0.5e-3)
     bpy.ops.digiclay.session_rewind("EXEC_DEFAULT", True)
-    assert (running.find(only_bed()).base == 40e-3).all()
+    assert (only_session().base == 40e-3).all()
     bpy.ops.digiclay.session_reset("EXEC_DEFAULT", True)
-    assert (running.find(only_bed()).base == 40e-3).all()
+    assert (only_session().base == 40e-3).all()
 
 
 @pytest.mark.parametrize("when", ["formed", "queued"])
@@ -224,7 +232,7 @@ def test_a_file_and_the_next_session_have_the_base(bed, clock, tmp_path, when):
     press(0.0)
     press(0.0, base=True)
     form(clock)
-    base = running.find(only_bed()).base
+    base = only_session().base
     press(0.0)
     if when == "formed":
         form(clock)
@@ -233,12 +241,12 @@ def test_a_file_and_the_next_session_have_the_base(bed, clock, tmp_path, when):
     bpy.ops.wm.open_mainfile(filepath=path)
     begin(only_bed())
     form(clock)
-    np.testing.assert_array_equal(running.find(only_bed()).base, base)
-    before = exact(only_bed())
+    np.testing.assert_array_equal(only_session().base, base)
+    before = exact()
     press(0.0)
     form(clock)
     # What was pressed to its depth settles a little under the fingertip, no more.
-    assert_near(exact(only_bed()), before, 0.3e-3)
+    assert_near(exact(), before, 0.3e-3)
 
 
 @pytest.mark.parametrize(
@@ -327,11 +335,11 @@ def form_with_sizes(clock, queued):
     handlers.watch()
     begin(bed)
     for y, size in zip(ROWS, CHOSEN, strict=False):
-        devices.set_size(bed.digiclay, 1e-3 * size)
+        devices.set_size(bed, 1e-3 * size)
         draw(y, **devices.read_sizes(bed))
         if not queued:
             form(clock)
-    devices.set_size(bed.digiclay, 1e-3 * CHOSEN[-1])
+    devices.set_size(bed, 1e-3 * CHOSEN[-1])
     seen = {}
     while (session := running.find(bed)).strokes:
         clock.tick()

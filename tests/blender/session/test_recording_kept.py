@@ -11,10 +11,10 @@ from digiclay.core.session.live_session import Recording
 from digiclay.live import handlers
 from digiclay.recorded import takes
 from digiclay.sessions import running
-from digiclay.sessions.sculpting import queue_stroke
 from digiclay.strokes.stroke import let_go, start
 
-from tests.blender.session.live import move, only_bed, started, undone
+from tests.blender.at_hand import activate, push_step
+from tests.blender.session.live import move, only_bed, only_session, queue, started, undone
 
 #: Ticks that are recorded, and the time they take, s: ten periods of 5 ms in three ticks.
 TICKS, SECONDS = 15, 0.5
@@ -63,7 +63,7 @@ def test_disabling_the_extension_keeps_what_was_recorded_in_an_undo_step(recordi
     try:
         assert "kept as Take 1" in running.last_message()
         assert seconds(recording) == [SECONDS]
-        bpy.ops.ed.undo_push(message="Later")
+        push_step("Later")
         bpy.ops.ed.undo()
         assert seconds(only_bed()) == [SECONDS]
     finally:
@@ -75,7 +75,7 @@ def test_stopping_one_of_two_sessions_keeps_its_recording_alone(recording, clock
     bpy.ops.mesh.digital_clay_add(rows=5, columns=5)
     other = bpy.context.object
     started(other)
-    bpy.context.view_layer.objects.active = bpy.data.objects[name]
+    activate(bpy.data.objects[name])
     assert bpy.ops.digiclay.session_stop() == {"FINISHED"}
     assert seconds(bpy.data.objects[name]) == [SECONDS]
     assert [session.uid for session in running.list_sessions()] == [other.session_uid]
@@ -122,9 +122,9 @@ def test_while_blender_may_save_by_itself_the_bed_has_the_take_and_never_twice(
 
 
 def test_what_undo_has_taken_back_meanwhile_is_not_missed(recording, clock):
-    bpy.ops.ed.undo_push(message="Before")
+    push_step("Before")
     handlers.write_recovery()
-    bpy.ops.ed.undo_push(message="After")
+    push_step("After")
     bpy.ops.ed.undo()
     handlers.clear_recovery()
     assert seconds(only_bed()) == []
@@ -156,13 +156,13 @@ def test_what_cannot_be_left_is_told(recording, tmp_path):
 
 def test_undoing_the_first_gesture_of_a_recording_leaves_it_recording(bed, clock):
     started(bed)
-    bpy.ops.ed.undo_push(message="Start")
+    push_step("Start")
     clock.tick()
     bpy.ops.digiclay.take_record("EXEC_DEFAULT", True)
     recorded_on(bed, clock)
-    bpy.ops.ed.undo_push(message="Gesture")
+    push_step("Gesture")
     undone(clock)
-    assert running.find(only_bed()).recording is not None
+    assert only_session().recording is not None
 
 
 def test_a_stroke_of_another_size_keeps_what_was_recorded_as_a_take_of_the_size_before(
@@ -172,7 +172,7 @@ def test_a_stroke_of_another_size_keeps_what_was_recorded_as_a_take_of_the_size_
     wide = replace(finger, width=1.5 * finger.width)
     for y, tip in ((-9e-3, finger), (9e-3, wide)):
         stroke = let_go(start(0, 0.0, y, 2e-3, finger=tip))
-        running.put(queue_stroke(running.find(recording), stroke)[0])
+        queue(recording, stroke)
     notes = clock.until(lambda: not running.find(recording).strokes)
     assert ["kept as Take 1" in note.message for note in notes] == [True]
     assert running.find(recording).recording is None

@@ -13,7 +13,8 @@ from digiclay.live import handlers
 from digiclay.sessions import running
 from digiclay.settings import properties
 
-from tests.blender.session.live import TICK, exact, move, only_bed, press, started, undone, waits
+from tests.blender.at_hand import push_step
+from tests.blender.session.live import TICK, exact, move, press, started, undone, waits
 
 #: Set point of the force, N, and where it stands.
 DEFAULT, SET_POINT = 0.4, "digiclay.control.virtual_master.force_setpoint"
@@ -115,15 +116,15 @@ def test_a_session_whose_settings_change_in_every_tick_keeps_up_with_time(bed, c
 
 
 def test_a_setting_that_undo_puts_back_is_simulated_with_its_state(bed, clock):
-    bpy.ops.ed.undo_push(message="Add")
+    push_step("Add")
     started(bed)
     bed.digiclay.control.virtual_master.force_setpoint = 0.8
-    bpy.ops.ed.undo_push(message="Set")
+    push_step("Set")
     press(bed, clock)
     assert set_point() == pytest.approx(0.8)
     undone(clock)
     assert set_point() == pytest.approx(DEFAULT)
-    assert (exact(only_bed()) == 40e-3).all()
+    assert (exact() == 40e-3).all()
     bpy.ops.ed.redo()
     clock.tick(handlers.STALE)
     assert set_point() == pytest.approx(0.8)

@@ -18,8 +18,17 @@ from digiclay.settings import properties
 from digiclay.strokes.stroke import make_images, start
 
 from tests.assemble import assert_near
-from tests.blender.at_hand import looked, select
-from tests.blender.session.live import exact, only_bed, shown, started, waits
+from tests.blender.at_hand import looked, push_step, select
+from tests.blender.session.live import (
+    exact,
+    only_bed,
+    only_session,
+    queue,
+    record,
+    shown,
+    started,
+    waits,
+)
 from tests.hand import let_go
 
 #: Where fingertips press, by number: x and y, mm.
@@ -41,7 +50,7 @@ def pair(bed):
     bpy.ops.digiclay.add_fingertip()
     select(bed)
     move(bed, {1: 46.0, 2: 46.0})
-    bpy.ops.ed.undo_push(message="Two")
+    push_step("Two")
     looked()
     return bed
 
@@ -73,7 +82,7 @@ def depth(bed, number):
 
 def test_each_fingertip_forms_and_is_recorded_and_told_with_its_own_force(pair, clock):
     started(pair)
-    running.put(sculpting.set_recording(running.find(pair), True))
+    record(pair)
     move(pair, {1: 46.0, 2: 46.0})
     assert press(pair, clock, 2, lift=False) == []
     session = running.find(pair)
@@ -95,11 +104,11 @@ def test_each_fingertip_forms_and_is_recorded_and_told_with_its_own_force(pair, 
 
 def test_a_fingertip_that_is_added_in_mid_session_forms_too(pair, clock):
     started(pair)
-    running.put(sculpting.set_recording(running.find(pair), True))
+    record(pair)
     assert press(pair, clock, 1, 2) == []
     before = exact(pair)
     bpy.ops.digiclay.add_fingertip()
-    bpy.ops.ed.undo_push(message="Add")
+    push_step("Add")
     looked()
     notes = clock.tick()
     assert ["kept as Take 1" in note.message for note in notes] == [True]
@@ -125,14 +134,14 @@ def test_the_session_goes_on_with_the_fingertips_that_are_left(pair, clock, gone
     press(pair, clock, 1, 2, lift=False)
     left = 3 - gone
     force = running.find(pair).state.finger_forces()[left - 1]
-    bpy.ops.ed.undo_push(message="Pressed")
+    push_step("Pressed")
     pressed = beds.read_snapshot(pair)
     if how == "deleted":
         select(fingertips_of(pair)[gone])
         bpy.ops.object.delete()
     else:
         bpy.data.objects.remove(fingertips_of(pair)[gone])
-    bpy.ops.ed.undo_push(message="Delete")
+    push_step("Delete")
     looked()
     assert [note for note in clock.tick(1) if note.level != "INFO"] == []
     session = running.find(pair)
@@ -239,7 +248,7 @@ def test_fingertips_keep_their_numbers_where_one_between_is_deleted_or_comes_aft
     bpy.data.objects.remove(fingertips_of(pair)[2])
     looked()
     started(pair)
-    running.put(sculpting.set_recording(running.find(pair), True))
+    record(pair)
     press(pair, clock, 3)
     tick.stop(pair.session_uid)
     select(pair)
@@ -295,7 +304,7 @@ def test_a_press_stroke_moves_the_first_fingertip_alone(pair, clock, palm):
     move(pair, {1: 46.0, 2: 45.0})
     clock.tick(5)
     before = bridge.poses(pair)
-    running.put(sculpting.queue_stroke(running.find(pair), start(0, -10e-3, -10e-3, 4e-3))[0])
+    queue(pair, start(0, -10e-3, -10e-3, 4e-3))
     clock.until(lambda: shown(pair).min() < 39e-3)
     now = bridge.poses(pair)
     assert_near(now[1], before[1], 1e-6)  # Blender's 32 bits
@@ -318,7 +327,7 @@ def test_animated_fingertips_are_baked_and_takes_of_several_replayed_and_exporte
     pair, clock, tmp_path
 ):
     started(pair)
-    running.put(sculpting.set_recording(running.find(pair), True))
+    record(pair)
     press(pair, clock, 1, 2)
     formed = exact(pair)
     tick.stop(pair.session_uid)
@@ -350,7 +359,7 @@ def test_animated_fingertips_are_baked_and_takes_of_several_replayed_and_exporte
 @pytest.mark.usefixtures("machine")
 def test_strokes_end_with_the_fingertip_that_goes_along_them_and_say_so(pair, clock):
     started(pair)
-    running.put(sculpting.queue_stroke(running.find(pair), start(0, 0.0, 0.0, 4e-3))[0])
+    queue(pair, start(0, 0.0, 0.0, 4e-3))
     clock.tick(2)
     bpy.data.objects.remove(fingertips_of(pair)[1])
     looked()
@@ -399,22 +408,22 @@ def test_a_symmetric_stroke_survives_saving_undo_and_a_stop_in_its_middle(pair, 
     started(pair)
     move(pair, {1: 46.0, 2: 46.0})
     clock.tick(3)
-    running.put(sculpting.set_recording(running.find(pair), True))
+    record(pair)
     images = make_images("RADIAL", 2)
 
     def press_down():
         session, number = sculpting.queue_stroke(
-            running.find(only_bed()), start(0, 14e-3, 8e-3, 3e-3, images)
+            only_session(), start(0, 14e-3, 8e-3, 3e-3, images)
         )
         running.put(session)
-        clock.until(lambda: (running.find(only_bed()).state.finger_forces() > 0.01).sum() == 2)
+        clock.until(lambda: (only_session().state.finger_forces() > 0.01).sum() == 2)
         return number
 
     number = press_down()
     session = running.find(pair)
     assert (len(session.poses), beds.read_numbers(pair)) == (3, (1, 2))
     assert [number for number, _ in views.read_session(pair, session, COLORS).fingers] == [1, 2]
-    bpy.ops.ed.undo_push(message="In its middle")
+    push_step("In its middle")
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "middle.blend"), copy=True)
     running.put(let_go(running.find(pair), number))
     clock.until(lambda: not running.find(pair).strokes)
@@ -423,7 +432,7 @@ def test_a_symmetric_stroke_survives_saving_undo_and_a_stop_in_its_middle(pair, 
     table = running.find(pair).state.row(0).reshape(13, 13)
     assert_near(table, np.rot90(table, 2), 2e-6)
     assert table.min() < 37.1e-3
-    bpy.ops.ed.undo_push(message="Done")
+    push_step("Done")
     bpy.ops.ed.undo()
     looked()
     clock.tick(handlers.STALE)
@@ -445,4 +454,4 @@ def test_a_symmetric_stroke_survives_saving_undo_and_a_stop_in_its_middle(pair, 
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "middle.blend"))
     looked()
     started(only_bed())
-    assert_near(shown(only_bed()), 40e-3, 1e-6)
+    assert_near(shown(), 40e-3, 1e-6)

@@ -7,19 +7,20 @@ import pytest
 from digiclay.live import beds, handlers, tick
 from digiclay.roles import fingertip_of
 from digiclay.sessions import running
-from digiclay.sessions.sculpting import queue_stroke, withdraw_stroke
+from digiclay.sessions.sculpting import withdraw_stroke
 from digiclay.strokes.stroke import start
 
-from tests.blender.session.live import FLOAT32, goes_on, press, shown, started, waits
+from tests.blender.at_hand import push_step
+from tests.blender.session.live import FLOAT32, goes_on, press, queue, shown, started, waits
 
 
 def test_a_session_waits_for_a_deleted_fingertip_and_goes_on_with_undo(bed, clock):
     started(bed)
     press(bed, clock)
-    bpy.ops.ed.undo_push(message="Formed")
+    push_step("Formed")
     clock.tick()
     bpy.data.objects.remove(fingertip_of(bed))
-    bpy.ops.ed.undo_push(message="Deleted")
+    push_step("Deleted")
     waits(bed, clock, words="fingertip is deleted")
     bpy.ops.ed.undo()
     goes_on(clock)
@@ -80,7 +81,7 @@ def test_a_session_waits_while_it_is_hindered(bed, clock, hinder, words, free):
 @pytest.mark.usefixtures("machine")
 def test_a_stroke_taken_back_in_edit_mode_is_drawn_so_afterwards(bed, clock):
     started(bed)
-    running.put(queue_stroke(running.find(bed), start(0, 0.0, 0.0, 4e-3))[0])
+    queue(bed, start(0, 0.0, 0.0, 4e-3))
     clock.until(lambda: shown(bed).min() < 39e-3)
     edit()
     clock.tick()
