@@ -62,7 +62,7 @@ def test_a_lead_of_the_hybrid_is_taken_back_where_method_one_takes_over():
     found = []
     for lead in (0.0, 0.5):
         measurement = seen(hybrid, target=1.0 + lead)
-        measurement.own[hybrid._at.lead] = lead * 1e-3
+        measurement.own[hybrid.observer.at.lead] = lead * 1e-3
         found.append(hybrid.command(memory, measurement)[1].target)
     np.testing.assert_allclose(found[1], found[0], rtol=1e-14)  # rounding
 

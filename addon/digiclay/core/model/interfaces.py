@@ -157,14 +157,9 @@ class Stepper(Protocol):
         """
 
 
+@dataclass(frozen=True)
 class Alike:
     """Part without parameters: all of a class are equal."""
-
-    def __eq__(self, other: object) -> bool:
-        return type(self) is type(other)
-
-    def __hash__(self) -> int:
-        return hash(type(self))
 
 
 @dataclass(frozen=True, eq=False)

@@ -174,24 +174,9 @@ class Grid:
     def cover(self, discs: Discs | None) -> Flags:
         """Return which cells are in any of f discs, (n,); a disc of negative radius is empty."""
         covered = np.zeros(self.count, np.bool_)
-        if discs is None:
-            return covered
-        plan, (left, bottom) = self.layout, self.corner
-        x, y, radius = (np.asarray(part)[:, None, None] for part in discs)
-        size = max(0.0, float(radius.max()))
-
-        def span(first: Floats, width: float, count: int) -> Cells:
-            """Return the rows, or columns, of each disc, as many as of the widest, (f, 1, k)."""
-            most = min(int(min(width, count)) + 2, count)
-            least = np.clip(np.ceil(first - RELATIVE_TOLERANCE), 0, count - most)
-            return least.astype(np.intp) + np.arange(most)
-
-        row = span((y - size - bottom) / plan.row_spacing, 2.0 * size / plan.row_spacing, plan.rows)
-        first = (x - size - left - plan.shift) / plan.pitch
-        width = (2.0 * size + plan.shift) / plan.pitch
-        cells = row.transpose(0, 2, 1) * plan.columns + span(first, width, plan.columns)
-        square = (self.x.take(cells) - x) ** 2 + (self.y.take(cells) - y) ** 2
-        covered[cells[square <= radius * np.abs(radius) * (1.0 + RELATIVE_TOLERANCE)]] = True
+        for x, y, radius in zip(*discs, strict=True) if discs else ():
+            if radius >= 0.0:
+                covered[self.disc(x, y, radius)] = True
         return covered
 
     def enclose(self, cells: Cells) -> Disc | None:

@@ -299,16 +299,8 @@ class MatrixAddressing:
     def find_common(self, table: Floats, served: Flags) -> Floats:
         """Return the column commands of each set, (k, m): what all its addressed lines command at least."""
         sections = self.parameters.sections
-        sets = -(-self.lines // sections)
-        padded = np.zeros((sets * sections, table.shape[1]))
-        padded[: self.lines] = table
-        addressed = np.zeros(sets * sections, np.bool_)
-        addressed[: self.lines] = served
-        by_set = padded.reshape(sets, sections, -1)
-        where = addressed.reshape(sets, sections, 1)
-        low = by_set.min(axis=0, initial=np.inf, where=where)
-        high = by_set.max(axis=0, initial=-np.inf, where=where)
-        return np.clip(0.0, low, high)
+        own = (table[first::sections][served[first::sections]] for first in range(sections))
+        return np.array([np.clip(0.0, lines.min(axis=0), lines.max(axis=0)) for lines in own])
 
 
 def make_addressing(
