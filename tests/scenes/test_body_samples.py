@@ -1,15 +1,13 @@
-"""Sample scenes with bodies: what they leave is their undersides; their meshes are those of formulas."""
+"""Sample scenes with bodies: what they leave is their undersides."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from digiclay.core.mesh_io import mesh_reader
 from digiclay.core.scene.recorder import Recorder
-from digiclay.core.scene.scene_source import BODY_SAMPLES, find, load
+from digiclay.core.scene.scene_source import find, load
 from digiclay.core.session.run_scene import run
 
-from tests.make_bodies import make_bodies, write_track
 from tests.scenes.test_bodies import find_under
 
 
@@ -36,12 +34,3 @@ def test_a_ball_that_rolls_leaves_a_track_with_its_knobs():
     # The ball is 11 mm deep, its knobs 3.5 mm deeper.
     assert 10e-3 < deep.min() < 11.5e-3
     assert 13e-3 < deep.max() < 14.6e-3
-
-
-def test_the_meshes_of_the_samples_are_those_of_their_formulas():
-    for name, (vertices, triangles) in make_bodies().items():
-        stored = mesh_reader.read(BODY_SAMPLES / f"{name}.ply")
-        assert np.array_equal(stored.faces, triangles)
-        # Both are rounded to 1 µm, which another processor may do the other way.
-        assert np.abs(stored.vertices - vertices).max() < 1.1e-3
-    assert find("ball_track").read_text(encoding="utf-8") == write_track()
