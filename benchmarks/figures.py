@@ -54,9 +54,10 @@ def read_plan() -> Record:
 def read_figures(page: str | None = None) -> list[Row]:
     """Return the figures of a page, or of all, as the text has them; OutputError where one is missing."""
     figures: list[Row] = []
-    for row in (
-        {**USUAL, **given} for given in read_plan()["figure"] if page in (None, given["page"])
-    ):
+    for given in read_plan()["figure"]:
+        if page not in (None, given["page"]):
+            continue
+        row = {**USUAL, **given}
         text = (ROOT / row["page"]).read_text(encoding="utf-8")
         rest = text[text.find(row["head"]) :]
         for label, where in row["rows"] or [[row["after"], {}]]:
@@ -65,17 +66,15 @@ def read_figures(page: str | None = None) -> list[Row]:
             for place, (metric, unit, *conditions) in enumerate(row["metrics"], row["number"]):
                 if len(numbers) < place:
                     raise OutputError(f"{row['page']} has no number {place} behind {label!r}.")
-                figure = {
-                    "of": metric,
-                    "unit": unit,
-                    "behind": " ".join(label.split()),
-                    "text": numbers[place - 1],
-                }
-                figures += (
-                    [{**row, **figure, "where": row["where"] | where | dict(*conditions)}]
-                    if metric
-                    else []
-                )
+                if metric:
+                    figure = {
+                        "of": metric,
+                        "unit": unit,
+                        "behind": " ".join(label.split()),
+                        "text": numbers[place - 1],
+                        "where": row["where"] | where | dict(*conditions),
+                    }
+                    figures.append(row | figure)
     return figures
 
 

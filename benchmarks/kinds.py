@@ -46,14 +46,11 @@ class Benchmark:
     examples: tuple[str, ...] = ("", "--quick --out results")
     """Arguments."""
     options: Options = field(default_factory=dict)
-    """Beside SCENE, --quick, --quiet and --out."""
+    """Beside SCENE and `OPTIONS`."""
     scene: str | None = None
     """Default of --scene; empty: SCENE must be named; None: it takes no scene."""
     needs: str = ""
     """Package without which it cannot run, and whose version is given."""
-    quick: bool = True
-    out: bool = True
-    """Whether it has these options."""
 
 
 def _read_folder(text: str) -> Path:
@@ -65,6 +62,12 @@ def _read_folder(text: str) -> Path:
     return Path(text)
 
 
+#: Options of all.
+OPTIONS: Options = {
+    "--quick": "fewer and shorter runs",
+    "--quiet": "no progress",
+    "--out DIR": (_read_folder, "also write the results into this folder"),
+}
 BENCHMARKS = {
     "session": Benchmark(
         "session_parts.measure",
@@ -79,8 +82,6 @@ BENCHMARKS = {
             "--calls": "count numpy's calls",
         },
         PAPER,
-        quick=False,
-        out=False,
     ),
     "stiff": Benchmark(
         "stiff.measure",
@@ -202,12 +203,8 @@ def parser() -> argparse.ArgumentParser:
         command = add_command(kinds, name, benchmark.help, f"examples:\n{examples}\n")
         if benchmark.scene is not None:
             add_scene(command, benchmark.scene)
-        add_options(command, benchmark.options)
-        add_options(command, {"--quick": "fewer and shorter runs"} if benchmark.quick else {})
-        add_options(command, {"--quiet": "no progress"})
-        out = (_read_folder, "also write the results into this folder")
-        add_options(command, {"--out DIR": out} if benchmark.out else {})
-        command.set_defaults(carry_out=partial(run, name), quick=False, out=None)
+        add_options(command, {**benchmark.options, **OPTIONS})
+        command.set_defaults(carry_out=partial(run, name))
     return top
 
 

@@ -180,27 +180,10 @@ def _serve(seconds: float, rate: int, fingers: int) -> tuple[Record, int]:
     token = secrets.token_urlsafe(18)
     with tempfile.TemporaryDirectory() as folder:
         report = Path(folder) / "report.json"
-        command = [
-            sys.executable,
-            "-m",
-            "digiclay",
-            "serve",
-            SCENE,
-            "--rate",
-            str(rate),
-            "--port",
-            "0",
-        ]
-        command += [
-            "--osc-port",
-            "0",
-            f"--token={token}",
-            "--report",
-            str(report),
-            "--seconds",
-            str(seconds),
-        ]
-        command += ["--out", str(Path(folder) / "recorded"), "--fingers", str(fingers)]
+        ports = "--port 0 --osc-port 0"
+        words = f"serve {SCENE} --rate {rate} {ports} --seconds {seconds} --fingers {fingers}"
+        files = [f"--report={report}", f"--out={Path(folder) / 'recorded'}", f"--token={token}"]
+        command = [sys.executable, "-m", "digiclay", *words.split(), *files]
         with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
             assert process.stdout is not None
             head = "".join(process.stdout.readline() for _ in range(3))

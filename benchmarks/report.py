@@ -1,7 +1,5 @@
 """Common parts of the benchmarks: progress, report with files, tables, style of the plots."""
 
-import csv
-import io
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -14,6 +12,7 @@ import numpy as np
 from digiclay.commands.progress import Line, draw_share, table
 from digiclay.core.base.errors import explain_os_error
 from digiclay.core.files.tables import Table
+from digiclay.core.studies.sweep_plan import format_csv
 from digiclay.plots.figure import LINES, STYLE, empty, save
 
 from digiclay_study.suite_page import describe_machine
@@ -124,18 +123,14 @@ class Report:
 
     def write(self, out: Path, name: str, text: str) -> None:
         """Write ``name.md``, ``name.csv`` and ``name.png``; OutputError if they cannot be."""
-        figures = io.StringIO(newline="")
-        writer = csv.DictWriter(
-            figures, list(self.rows[0]) if self.rows else [], lineterminator="\n"
-        )
-        writer.writeheader()
-        writer.writerows(self.rows)
+        head = list(self.rows[0]) if self.rows else []
+        figures = format_csv([head, *([*row.values()] for row in self.rows)])
         with explain_os_error(f"Cannot write into {out}"):
             out.mkdir(parents=True, exist_ok=True)
             (out / f"{name}.md").write_text(
                 f"# python -m benchmarks {name}\n\n```\n{text}\n```\n", encoding="utf-8"
             )
-            (out / f"{name}.csv").write_text(figures.getvalue(), encoding="utf-8")
+            (out / f"{name}.csv").write_text(figures, encoding="utf-8")
         if self.draw:
             size = self.draw.size if isinstance(self.draw, Curves) else self.size
             with empty(*size, LOOK, layout="constrained") as figure:

@@ -233,6 +233,8 @@ TERMS = {
 }
 #: Physics steps that are longer: they cost less too.
 LONGER = "physics step = control period"
+#: Columns of the tables.
+SPENT = {"part": "part", "": "meaning", "µs a period": "period_s .1f 1e6", "share": "share .0%"}
 EFFECTS = {
     "scene": "scene",
     "calls": "calls g",
@@ -250,32 +252,32 @@ def measure(arguments: Namespace, steps: Steps) -> Report:
     scene, _ = scene_of(arguments)
     check_memory(scene, assemble(scene).rows)
     plain, split = [], []
-    for _ in steps.through(range(arguments.repeats)):
+    for _ in steps.through(range(1 if arguments.quick else arguments.repeats)):
         plain.append(time_session(scene))
         profile = cProfile.Profile(builtins=False)
         split.append(divide_time(profile, time_session(scene, profile)[0]))
-    lines = list(_list_lines(scene, plain, split))
-    return Report([*lines, "", *list_calls(scene)] if arguments.calls else lines)
-
-
-def _list_lines(
-    scene: Scene, plain: list[tuple[float, float]], split: list[dict[str, float]]
-) -> Iterator[str]:
-    """Give the lines of the report."""
     simulated = scene.periods * scene.simulation.control_period
     whole, processor = (statistics.median(times) for times in zip(*plain, strict=True))
-    yield f"{scene.name}: {scene.cells} cells, {scene.periods} control periods, {scene.simulation.stepper}"
+    spent = {part: statistics.median(times[part] for times in split) for part in PARTS}
+    spent |= {"profiled": sum(spent.values()), "all": whole}
+    meanings = PARTS | {"profiled": "all, with the profiler running", "all": "without it"}
+    rows = [
+        {
+            "part": part,
+            "meaning": meanings[part],
+            "period_s": time / scene.periods,
+            "share": time / spent["profiled"],
+        }
+        for part, time in spent.items()
+    ]
     factor = simulated / whole
-    yield f"{simulated:.1f} s simulated in {whole:.3g} s ({factor:.3g} x real time), median of {len(split)}"
-    yield f"processor time {processor:.3g} s ({simulated / processor:.3g} x real time)"
-    yield f"\n  {'part':<10} {'µs a period':>11} {'share':>6}"
-    medians = {part: statistics.median(times[part] for times in split) for part in PARTS}
-    total = sum(medians.values())
-    for part, meaning in PARTS.items():
-        each, share = medians[part] / scene.periods * 1e6, medians[part] / total
-        yield f"  {part:<10} {each:11.1f} {share:6.0%}  {meaning}"
-    yield f"  {'all':<10} {total / scene.periods * 1e6:11.1f}         with the profiler running"
-    yield f"  {'all':<10} {whole / scene.periods * 1e6:11.1f}         without it"
+    lines = [
+        f"{scene.name}: {scene.cells} cells, {scene.periods} control periods, {scene.simulation.stepper}",
+        f"{simulated:.1f} s simulated in {whole:.3g} s ({factor:.3g} x real time), median of {len(plain)}",
+        f"processor time {processor:.3g} s ({simulated / processor:.3g} x real time)\n",
+        *tabulate(rows, SPENT, left=2),
+    ]
+    return Report([*lines, "", *list_calls(scene)] if arguments.calls else lines, rows)
 
 
 def time_session(scene: Scene, profile: cProfile.Profile | None = None) -> tuple[float, float]:

@@ -7,13 +7,10 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
-from digiclay.core.control.blister import Blister
-from digiclay.core.control.methods import find_method
-from digiclay.core.files.tables import Record
 from digiclay.core.metrics.summary import compute_metrics, split_fingers
 from digiclay.core.model.trajectory import Path, Waypoint
 from digiclay.core.scene.assembly import assemble
-from digiclay.core.scene.scene_source import find, load
+from digiclay.core.scene.scene_source import Setting, find, load
 from digiclay.core.scene.schema import Scene
 from digiclay.core.session.run_scene import run, select_rows
 
@@ -104,10 +101,9 @@ def make_scene(method: str, ways: list[Way], size: int = 40, turn: float = TURN)
 
     They go straight between the points of their ways; all of it lasts as long as the longest one.
     """
-    paper = load(find("ridge_mound_valley"))
-    control = find_method(method).import_parameters()() if method else None
-    shape = find_method(method).blister if method else None
-    other: Record = dict(shape or {})
+    control = Setting("control.method", method) if method else Setting("control", "absent")
+    sides = [Setting(f"layout.{side}", str(size)) for side in ("rows", "columns")]
+    scene = load(find("ridge_mound_valley"), [control, *sides])
     half = math.cos(turn / 2), 0.0, 0.0, math.sin(turn / 2)
 
     def lay(time: float, x: float, y: float, z: float) -> Waypoint:
@@ -121,13 +117,9 @@ def make_scene(method: str, ways: list[Way], size: int = 40, turn: float = TURN)
         for way in ways
     ]
     return replace(
-        paper,
-        layout=replace(paper.layout, rows=size, columns=size),
-        control=control,
-        blister=None if shape is None else Blister(**other),
-        method=method or paper.method,
-        simulation=replace(paper.simulation, duration=max(way[-1][0] for way in ways)),
-        fingers=tuple(replace(paper.fingers[0], trajectory=path) for path in paths),
+        scene,
+        simulation=replace(scene.simulation, duration=max(way[-1][0] for way in ways)),
+        fingers=tuple(replace(scene.fingers[0], trajectory=path) for path in paths),
     )
 
 
@@ -183,12 +175,9 @@ def measure(arguments: argparse.Namespace, steps: Steps) -> list[Report]:
     costs: list[Row] = []
     near: list[Row] = []
     for method in METHODS:
-        single, *others = measure_cost(method, count, repeats)
-        ratios = {
-            f"times_{count}": several / single
-            for count, several in zip(COUNTS[1:], others, strict=True)
-        }
-        costs.append({"method": method or "no control", "one_s": single, **ratios})
+        spent = dict(zip(COUNTS, measure_cost(method, count, repeats), strict=True))
+        ratios = {f"times_{fingers}": spent[fingers] / spent[1] for fingers in COUNTS[1:]}
+        costs.append({"method": method or "no control", "one_s": spent[1], **ratios})
         steps(method or "no control")
     for name in cases:
         for method in METHODS[1:]:

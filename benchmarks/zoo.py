@@ -48,18 +48,19 @@ MEASURES: dict[str, Callable[[Result], float]] = {
 }
 
 
-def judge(row: Row) -> Row:
-    """Return a row of the table for a figure of zoo.toml."""
-    result = run(change_scene(row["scene"], row.get("set", {})))
-    simulated, published = MEASURES[row["measure"]](result), row["published"]
+def judge(figure: Row) -> Row:
+    """Return the row of the table for a figure of zoo.toml."""
+    result = run(change_scene(figure["scene"], figure.get("set", {})))
+    simulated, published = MEASURES[figure["measure"]](result), figure["published"]
     exact = isinstance(published, float)
     low, high = (published * (1 - OFF), published * (1 + OFF)) if exact else published
     return {
-        **row,
+        **{key: figure[key] for key in ("scene", "figure", "unit")},
+        "published": f"{published:g}" if exact else f"{low:g} to {high:g}",
         "simulated": simulated,
-        "published": f"{published:g}" if exact else f"{published[0]:g} to {published[1]:g}",
-        "kind": "input" if row.get("input") else "prediction",
+        "kind": "input" if figure.get("input") else "prediction",
         "verdict": "yes" if low <= simulated <= high else "no",
+        "source": figure["source"],
     }
 
 
@@ -70,9 +71,5 @@ def measure(arguments: argparse.Namespace, steps: Steps) -> Report:
     ]
     chosen = [row for row in figures if not (arguments.quick and row.get("slow"))]
     rows = [judge(row) for row in steps.through(chosen, lambda row: row["scene"])]
-    lacks = [f"  {row['scene']} lacks {row['lacks']}" for row in rows if "lacks" in row]
-    kept = [
-        {key: row[key] for key in (column.split()[0] for column in COLUMNS.values())}
-        for row in rows
-    ]
-    return Report([*tabulate(rows, COLUMNS, left=2), *lacks], kept)
+    lacks = [f"  {row['scene']} lacks {row['lacks']}" for row in chosen if "lacks" in row]
+    return Report([*tabulate(rows, COLUMNS, left=2), *lacks], rows)

@@ -16,17 +16,6 @@ from .method_trials import LIMITS, RANDOM
 #: Of the intervals, and how they are named.
 CONFIDENCE = 0.95
 KIND = f"{CONFIDENCE:.0%} interval of the mean, Student's t over the seeds"
-#: Measures of a league, which are means over the trajectories.
-MEANS = (
-    "rfd",
-    "rfd_jnd_least",
-    "rfd_jnd_most",
-    "lag_mean",
-    "ridge_unevenness",
-    "ridge_unevenness_touch",
-    "relief_rms",
-    "contact_loss_share",
-)
 #: Measures of a league, in the order of its columns; those of `LIMITS` are speeds.
 MEASURES: dict[str, Metric] = {
     name: {**METRICS, **METHOD, **ERRORS}.get(name)
@@ -48,7 +37,7 @@ MEASURES: dict[str, Metric] = {
         *ERRORS,
     )
 }
-#: Other measures over the trajectories: the largest, the number, and the usual one.
+#: Measures that are no means over the trajectories: the largest, the number, and the usual one.
 REDUCED: dict[str, Callable[[list[float]], float]] = {
     "max_total_force": max,
     "losses": sum,
@@ -75,8 +64,7 @@ class Row(NamedTuple):
     """Row of the league."""
 
     method: str
-    #: `MEANS`, ``max_total_force``, ``losses``, ``period_cost``, ``cost_ratio`` and a limit a
-    #: motion.
+    #: By name in `MEASURES`.
     measures: Mapping[str, Interval | None]
     #: On how many trajectories the mean RFD is above that of the first method; None of that one.
     worse: int | None
@@ -104,6 +92,11 @@ def show_digits(value: float, digits: int = 3) -> str:
     return f"{float(f'{value:.{digits}g}'):g}"
 
 
+def find_trajectories(table: Table) -> list[str]:
+    """Return the trajectories of all trials."""
+    return list(dict.fromkeys(name for _, name, _ in table))
+
+
 def list_values(table: Table, method: str, trajectory: str, measure: str) -> list[float]:
     """Return a measure of a method on a trajectory, one value per seed that has one."""
     trials = (
@@ -117,12 +110,11 @@ def list_values(table: Table, method: str, trajectory: str, measure: str) -> lis
 def find_league(table: Table, methods: Sequence[str]) -> list[Row]:
     """Return one row per method, the smallest mean RFD first; all are compared with the first method."""
     seeds = sorted({seed for _, _, seed in table})
-    worse = count_worse(table, methods)
     rows = []
     for method in methods:
         measures = {
             name: find_interval([_reduce(table, method, name, seed) for seed in seeds])
-            for name in (*MEANS, *REDUCED)
+            for name in MEASURES
         }
         costs = [
             [_reduce(table, each, "period_cost", seed) for each in (method, methods[0])]
@@ -132,29 +124,25 @@ def find_league(table: Table, methods: Sequence[str]) -> list[Row]:
             [cost / first for cost, first in costs if cost and first]
         )
         for limit in LIMITS:
-            speeds = [table.get((method, limit, seed), {}).get("speed_limit") for seed in seeds]
-            measures[limit] = find_interval(speeds)
+            measures[limit] = find_interval(list_values(table, method, limit, "speed_limit"))
         searched = frozenset(name for other, name, _ in table if other == method and name in LIMITS)
-        rows.append(Row(method, measures, *worse[method], searched))
+        worse, compared = count_worse(table, method, methods[0])
+        rows.append(
+            Row(method, measures, None if method == methods[0] else worse, compared, searched)
+        )
     return sorted(
         rows, key=lambda row: math.inf if row.measures["rfd"] is None else row.measures["rfd"].mean
     )
 
 
-def count_worse(table: Table, methods: Sequence[str]) -> dict[str, tuple[int | None, int]]:
+def count_worse(table: Table, method: str, first: str) -> tuple[int, int]:
     """Return on how many trajectories, of how many, a method has a greater mean RFD than the first one."""
-    values: dict[str, dict[str, list[float]]] = {method: {} for method in methods}
-    for (method, name, _), figures in table.items():
-        if (rfd := figures.get("rfd")) is not None:
-            values[method].setdefault(name, []).append(rfd)
-    first, *others = (
-        {name: fmean(rfd) for name, rfd in values[method].items()} for method in methods
-    )
-    counted: dict[str, tuple[int | None, int]] = {methods[0]: (None, len(first))}
-    for method, means in zip(methods[1:], others, strict=True):
-        both = means.keys() & first.keys()
-        counted[method] = (sum(means[name] > first[name] for name in both), len(both))
-    return counted
+    pairs = [
+        [list_values(table, each, name, "rfd") for each in (method, first)]
+        for name in find_trajectories(table)
+    ]
+    both = [pair for pair in pairs if all(pair)]
+    return sum(fmean(values) > fmean(others) for values, others in both), len(both)
 
 
 def _reduce(table: Table, method: str, name: str, seed: int) -> float | None:

@@ -15,7 +15,7 @@ from digiclay.plots.figure import DASHES, INK, LINES, SHADE, STYLE, empty
 from digiclay.plots.sweep import read_unit
 
 from .indices import CONFIDENCE, Indices
-from .league import MEASURES, find_interval, list_values, show_digits
+from .league import MEASURES, find_interval, find_trajectories, list_values, show_digits
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -204,11 +204,11 @@ def draw_rfd(table: Table, methods: Sequence[str]) -> Figure:
     """
     from matplotlib.ticker import LogFormatter
 
-    names = list(
-        dict.fromkeys(
-            name for (_, name, _), figures in table.items() if figures.get("rfd") is not None
-        )
-    )
+    names = [
+        name
+        for name in find_trajectories(table)
+        if any(list_values(table, method, name, "rfd") for method in methods)
+    ]
     size = 11.0, 0.27 * max(len(names), 1) + 1.7
     with panels("Reference force deviation by trajectory", *size, 1, 1) as (figure, (axes,)):
         for number, method in enumerate(methods):

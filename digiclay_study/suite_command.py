@@ -20,10 +20,11 @@ from digiclay.core.studies.axes import Point
 from digiclay.core.studies.sweep_plan import hash_points, open_points
 from digiclay.plots.figure import save
 
+from . import suite_page
 from .league import Table, find_league
 from .method_trials import GROUPS, QUICK, list_trajectories, place_trial, read_groups
 from .study_plots import draw_measures, draw_rfd
-from .suite_page import Plan, Provenance, describe_machine, format_files, print_league
+from .suite_page import Plan, Provenance, describe_machine, print_league
 
 #: Scene of a suite where none is given: the paper's session.
 SCENE = "ridge_mound_valley"
@@ -155,7 +156,13 @@ def _write(out: Path, plan: Plan, records: dict[int, tables.Record], command: st
     figures = draw_rfd(table, plan.methods), draw_measures(league, plan.methods)
     for figure, name in zip(figures, PICTURES, strict=True):
         save(figure, out / name)
-    for name, text in format_files(source, records, table, league, failed, PICTURES).items():
+    files = {
+        "results.csv": suite_page.format_results(source, records),
+        "trajectories.csv": suite_page.format_trajectories(source, table),
+        "league.csv": suite_page.format_league(source, league),
+        "index.html": suite_page.format_page(source, league, table, failed, PICTURES),
+    }
+    for name, text in files.items():
         write_whole(out / name, text.encode())
     lines = print_league(league)
     if failed:

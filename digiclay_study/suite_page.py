@@ -18,7 +18,17 @@ from digiclay.core.studies.axes import Point
 from digiclay.core.studies.speed_limits import describe_end
 from digiclay.core.studies.sweep_plan import format_csv
 
-from .league import KIND, MEASURES, Interval, Row, Table, find_interval, list_values, show_digits
+from .league import (
+    KIND,
+    MEASURES,
+    Interval,
+    Row,
+    Table,
+    find_interval,
+    find_trajectories,
+    list_values,
+    show_digits,
+)
 from .method_trials import HIGH, LIMITS, LOW, OUTCOMES
 
 
@@ -115,23 +125,6 @@ class Provenance(NamedTuple):
         ]
 
 
-def format_files(
-    source: Provenance,
-    records: Mapping[int, Record],
-    table: Table,
-    league: Sequence[Row],
-    failed: Sequence[str],
-    pictures: Sequence[str],
-) -> dict[str, str]:
-    """Return the texts of all files by name. `records`: by the index of their point."""
-    return {
-        "results.csv": format_results(source, records),
-        "trajectories.csv": format_trajectories(source, table),
-        "league.csv": format_league(source, league),
-        "index.html": format_page(source, league, table, failed, pictures),
-    }
-
-
 def format_results(source: Provenance, records: Mapping[int, Record]) -> str:
     """Return all trials as CSV in SI units. `records`: by the index of their point."""
     units = [
@@ -150,7 +143,7 @@ def format_trajectories(source: Provenance, table: Table) -> str:
     """Return means and intervals of every trajectory as CSV in SI units."""
     head = ["trajectory", "method", "measure", "unit", "mean", "half width", "seeds"]
     rows = []
-    for name in _list_trajectories(table):
+    for name in find_trajectories(table):
         for method in source.plan.methods:
             for measure, metric in OUTCOMES.items():
                 interval = find_interval(list_values(table, method, name, measure))
@@ -211,7 +204,7 @@ def format_page(
     ]
     for name in SHOWN:
         body, factor = [], MEASURES[name].factor
-        for trajectory in _list_trajectories(table):
+        for trajectory in find_trajectories(table):
             intervals = [
                 find_interval(list_values(table, method, trajectory, name)) for method in methods
             ]
@@ -244,10 +237,6 @@ def _format(interval: Interval | None, factor: float) -> str:
         return "–"
     half = "" if interval.half is None else f" ± {show_digits(interval.half * factor, 2)}"
     return f"{show_digits(interval.mean * factor)}{half}"
-
-
-def _list_trajectories(table: Table) -> list[str]:
-    return list(dict.fromkeys(name for _, name, _ in table))
 
 
 def _format_csv(source: Provenance, head: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:
