@@ -5,10 +5,10 @@ from typing import Any
 
 import numpy as np
 from digiclay.plots.bed import draw_map, draw_path, draw_relief
-from digiclay.plots.figure import DASHES, LINES, MM, canvas
+from digiclay.plots.figure import LINES, MM, canvas
 from digiclay.plots.run import LETTERS, draw_force, session_cells, shade_contact
 
-from .paper_figures import list_methods
+from .paper_figures import DASHED, add_legend, list_methods, sheet
 from .relief_sections import sections
 from .results import Results, Session
 from .scenes import METHODS, NAMES, THIRD
@@ -32,76 +32,45 @@ def draw_heights(sessions: Mapping[str, Session], title: str) -> Any:
     cells = session_cells(sessions[METHODS[0]].history)
     spots = sessions[METHODS[0]].history["position"][cells] * MM
     names = [f"{name} ({x:.0f}, {y:.0f})" for name, (x, y) in zip(LETTERS, spots, strict=False)]
-    lowest = (
-        min(float(one.history["height"][:, cells].min()) for one in sessions.values()) * MM - 2.0
-    )
-    highest = (
-        max(float(one.history["height"][:, cells].max()) for one in sessions.values()) * MM + 2.0
-    )
-    strongest = 1.1 * max(float(one.history["total_force"].max()) for one in sessions.values())
+    strongest = 1.1 * max(float(each.history["total_force"].max()) for each in sessions.values())
     methods = list_methods(sessions)
-    across = 0.5 + 6.5 * len(methods)
-    with canvas(across, 7.4, title) as (figure, place):
-        for column, method in enumerate(methods):
+    with sheet(0.5 + 6.5 * len(methods), 7.4, title) as figure:
+        panels = figure.subplots(2, len(methods), sharex="col", sharey="row", height_ratios=(4, 3))
+        for method, (heights, force) in zip(methods, panels.T, strict=True):
             history = sessions[method].history
-            left = 0.85 + 6.5 * column
-            heights = place(f"{method} heights", left, 3.5, 5.75, 2.7)
-            force = place(f"{method} force", left, 0.7, 5.75, 2.0)
             for name, color, cell in zip(names, LINES, cells, strict=False):
-                heights.plot(
-                    history["time"], history["height"][:, cell] * MM, color=color, label=name
-                )
+                height = history["height"][:, cell] * MM
+                heights.plot(history["time"], height, color=color, label=name)
             shade_contact(heights, history)
             draw_force(force, history, history["set_point"], "set point")
-            ends = history["time"][0], history["time"][-1]
-            heights.set(ylim=(lowest, highest), ylabel="height (mm)", title=NAMES[method])
-            heights.tick_params(labelbottom=False)
-            force.set(ylim=(0.0, strongest), ylabel="force (N)", title="Total force")
-            for axes in (heights, force):
-                axes.set(xlim=ends, xlabel="time (s)")
-                axes.yaxis.label.set_visible(column == 0)
-            heights.xaxis.label.set_visible(False)
-        figure.text(0.85 / across, 1.0 - 0.78 / 7.4, "Cells at x, y (mm):")
-        beside: dict[str, Any] = {
-            "loc": "upper left",
-            "bbox_to_anchor": (2.77 / across, 1.0 - 0.5 / 7.4),
-        }
-        figure.legend(*heights.get_legend_handles_labels(), ncols=6, **beside)
+            heights.set(title=NAMES[method], xlabel="time (s)", ylabel="height (mm)")
+            force.set(
+                title="Total force", xlabel="time (s)", ylabel="force (N)", ylim=(0.0, strongest)
+            )
+        add_legend(figure, heights, title="Cells at x, y (mm)")
     return figure
 
 
 def details(results: Results) -> Any:
     """Draw a detail of the heights in the session: the first press, and what swings during the lift."""
-    shown, title = _detailed(results), "Details of the heights in the paper's session"
-    with canvas(4.5 * max(len(shown), 3), 7.6, title) as (
-        figure,
-        place,
-    ):
-        wide = 4.5 * max(len(shown), 3) / len(shown)
-        for column, (name, session) in enumerate(shown):
-            left, across = 0.95 + (wide - 0.08) * column, wide - 1.05
-            cells = _under(session)
-            time, height = session.detail["time"], session.detail["height"][:, cells] * MM
-            heights = place(f"{column} heights", left, 4.25, across, 2.35)
-            swing = place(f"{column} swing", left, 0.7, across, 2.35)
-            press, lift = (_within(time, ends) for ends in (PRESSING, LIFTING))
-            for number, cell in enumerate(cells):
-                away = f"{session.history['position'][cell, 0] * MM:.0f} mm"
-                style: dict[str, Any] = {
-                    "color": LINES[number],
-                    "linewidth": 1.5,
-                    "label": f"x = {away}",
-                }
-                heights.plot(time[press], height[press, number], **style)
-                swing.plot(time[lift], _swinging(time[lift], height[lift, number]) * 1e3, **style)
+    shown = _detailed(results)
+    with sheet(4.5 * len(shown), 7.6, "Details of the heights in the paper's session") as figure:
+        panels = figure.subplots(2, len(shown), sharey="row")
+        for (name, session), (heights, swing) in zip(shown, panels.T, strict=True):
+            press, lift = (_within(session.detail["time"], ends) for ends in (PRESSING, LIFTING))
+            time = session.detail["time"]
+            for color, cell in zip(LINES, _under(session), strict=False):
+                height = session.detail["height"][:, cell]
+                away = f"x = {session.history['position'][cell, 0] * MM:.0f} mm"
+                style: dict[str, Any] = {"color": color, "linewidth": 1.5, "label": away}
+                heights.plot(time[press], height[press] * MM, **style)
+                swing.plot(time[lift], _swinging(time[lift], height[lift]) * 1e6, **style)
             heights.set(title=name, xlim=PRESSING, ylim=(36.5, 40.5), ylabel="height (mm)")
             swing.set(title="the same cells, lifted", xlim=LIFTING, ylim=(-20, 20))
             swing.set_ylabel("height less its course (µm)")
-            for axes in (heights, swing):
-                axes.set_xlabel("time (s)")
-                axes.yaxis.label.set_visible(column == 0)
-        legend = figure.axes[0].get_legend_handles_labels()
-        figure.legend(*legend, loc="upper right", ncols=len(cells), bbox_to_anchor=(0.99, 0.955))
+            heights.set_xlabel("time (s)")
+            swing.set_xlabel("time (s)")
+        add_legend(figure, heights)
     return figure
 
 
@@ -178,29 +147,17 @@ def surface_rows(sessions: Mapping[str, Session]) -> Iterator[tuple[str, float, 
 
 def profiles(results: Results) -> Any:
     """Draw sections through the final surfaces, formed and asked for."""
-    drawn = {
-        method: list(sections(results.session[method])) for method in list_methods(results.session)
-    }
-    count = len(drawn[METHODS[0]])
-    with canvas(13.5, 8.6, f"Sections. The paper's session{results.slowness}") as (figure, place):
-        for number in range(count):
-            row, column = divmod(number, 3)
-            axes = place(f"section {number}", 0.85 + 4.38 * column, 4.55 - 3.85 * row, 3.5, 2.7)
-            for method, color, marker in zip(drawn, LINES, "os^", strict=False):
-                one = drawn[method][number]
+    methods = list_methods(results.session)
+    drawn = zip(*(sections(results.session[method]) for method in methods), strict=True)
+    with sheet(13.5, 8.6, f"Sections. The paper's session{results.slowness}") as figure:
+        for axes, lines in zip(figure.subplots(2, 3).flat, drawn, strict=True):
+            for method, section, color, marker in zip(methods, lines, LINES, "os^", strict=False):
                 name = NAMES[method].split(",")[0]
-                asked: dict[str, Any] = {"color": color, "linewidth": 1.1, "linestyle": DASHES}
-                axes.plot(one.along * MM, one.asked * MM, label=f"{name}, asked for", **asked)
-                axes.plot(
-                    one.along * MM,
-                    one.formed * MM,
-                    color=color,
-                    marker=marker,
-                    markersize=4.5,
-                    label=name,
-                )
-            axes.set(title=one.name, xlabel="y (mm)" if one.name.startswith("across") else "x (mm)")
-            axes.set_ylabel("height over rest (mm)")
-        legend = axes.get_legend_handles_labels()
-        figure.legend(*legend, loc="upper right", ncols=6, bbox_to_anchor=(0.99, 0.955))
+                along, look = section.along * MM, {"color": color, "markersize": 4.5}
+                asked = {**DASHED, "color": color, "label": f"{name}, asked for"}
+                axes.plot(along, section.asked * MM, **asked)
+                axes.plot(along, section.formed * MM, marker=marker, label=name, **look)
+            across = "y (mm)" if section.name.startswith("across") else "x (mm)"
+            axes.set(title=section.name, xlabel=across, ylabel="height over rest (mm)")
+        add_legend(figure, axes)
     return figure

@@ -1,14 +1,15 @@
 """Figures of blisters, limits and variants; lettered panels, and curves as a table."""
 
-import csv
-import io
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from itertools import product
 from typing import Any
 
 import numpy as np
 from digiclay.core.base.modes import Mode
 from digiclay.core.session.run_scene import Result
-from digiclay.plots.figure import DASHES, INK, LINES, MM, canvas, legend_above
+from digiclay.core.studies.sweep_plan import format_csv
+from digiclay.plots.figure import DASHES, INK, LINES, MM, empty, legend_above
 
 from .results import AHEAD, AS_IT_IS, PAPER_SPEED, SUSTAINED, Results
 from .scenes import COMPARED, METHODS, NAMES, PRESSED, THIRD
@@ -54,15 +55,13 @@ def _plain(text: str) -> str:
     return text.replace("$", "").replace("\n", " ")
 
 
-def table(rows: Iterable[Iterable[Any]], columns: Iterable[str] = COLUMNS) -> str:
+def table(rows: Iterable[Iterable[Any]], columns: Sequence[str] = COLUMNS) -> str:
     """Return rows as CSV, numbers with six digits."""
-    out = io.StringIO()
-    writer = csv.writer(out, lineterminator="\n")
-    writer.writerow(columns)
-    for row in rows:
-        # A 0 is added so that none is written as -0.
-        writer.writerow([f"{one + 0.0:.6g}" if isinstance(one, float) else one for one in row])
-    return out.getvalue()
+    # A 0 is added so that none is written as -0.
+    written = (
+        [f"{cell + 0.0:.6g}" if isinstance(cell, float) else cell for cell in row] for row in rows
+    )
+    return format_csv([columns, *written])
 
 
 def list_methods(results: Mapping[Any, Any]) -> list[str]:
@@ -82,37 +81,41 @@ DASHED: dict[str, Any] = {"color": INK, "linewidth": 1.0, "linestyle": DASHES}
 DOTTED = {**DASHED, "linestyle": (0, (1, 2))}
 
 
+@contextmanager
+def sheet(width: float, height: float, title: str) -> Iterator[Any]:
+    """Give a figure, inches, whose panels and legends find their places by themselves."""
+    with empty(width, height, layout="constrained") as figure:
+        figure.get_layout_engine().set(w_pad=0.1, h_pad=0.1)
+        figure.suptitle(title, x=0.01, ha="left", fontsize=14, fontweight="bold")
+        yield figure
+
+
+def add_legend(figure: Any, axes: Any, **looks: Any) -> None:
+    """Put the legend of a panel below all of them."""
+    handles = axes.get_legend_handles_labels()
+    figure.legend(*handles, loc="outside lower left", ncols=7, **looks)
+
+
 def blisters(results: Results) -> Any:
     """Draw sections through raised and sunken blisters, both profiles, all methods."""
     methods = list_methods(results.blisters)
-    height = 0.8 + 3.4 * len(methods)
-    with canvas(12.5, height, "Blisters in section, the fingertip in place") as (figure, place):
-        for row, method in enumerate(methods):
-            for column, shape in enumerate(HEIGHTS):
-                axes = place(
-                    f"{method} {shape}", 0.85 + 6.15 * column, height - 3.5 - 3.4 * row, 5.25, 2.55
-                )
-                for profile, look in PROFILES.items():
-                    done = results.blisters[method, shape, profile]
-                    _section(axes, done, look, profile)
-                _finger(axes, done, -1)
-                rest = done.scene.actuator.rest_height * MM
-                axes.axhline(rest, **DASHED)
-                axes.set(xlim=(-25, 25), title=f"{NAMES[method]}, {shape}", ylabel="height (mm)")
-                axes.set(ylim=HEIGHTS[shape], xlabel="distance from the middle (mm)")
-                axes.xaxis.label.set_visible(row == len(methods) - 1)
+    with sheet(
+        12.5, 0.8 + 3.4 * len(methods), "Blisters in section, the fingertip in place"
+    ) as figure:
+        panels = figure.subplots(len(methods), len(HEIGHTS))
+        for axes, (method, shape) in zip(panels.flat, product(methods, HEIGHTS), strict=True):
+            for profile, look in PROFILES.items():
+                done = results.blisters[method, shape, profile]
+                _section(axes, done, look, profile)
+            _finger(axes, done)
+            axes.axhline(done.scene.actuator.rest_height * MM, **DASHED)
+            axes.set(xlim=(-25, 25), title=f"{NAMES[method]}, {shape}", ylabel="height (mm)")
+            axes.set(ylim=HEIGHTS[shape], xlabel="distance from the middle (mm)")
         first = figure.axes[0]
         first.plot([], [], **DASHED, label="bed at rest")
         first.plot([], [], color=INK, linewidth=1.2, label="fingertip")
         first.plot([], [], "o", color=INK, label="cell that feels it")
-        figure.legend(
-            *first.get_legend_handles_labels(),
-            loc="upper right",
-            ncols=5,
-            bbox_to_anchor=(0.99, 0.998),
-            handlelength=1.6,
-            columnspacing=1.2,
-        )
+        add_legend(figure, first)
     return figure
 
 
@@ -134,9 +137,9 @@ def _section(axes: Any, done: Result, look: tuple[str, str, float], name: str) -
     axes.plot(across[felt], top[felt], marker, color=color, markersize=size)
 
 
-def _finger(axes: Any, done: Result, row: int) -> None:
+def _finger(axes: Any, done: Result) -> None:
     """Draw the fingertip's outline in the section."""
-    tip, x, z = done.scene.section("fingertip"), *(done.history["fingertip"][row, [0, 2]] * MM)
+    tip, x, z = done.scene.section("fingertip"), *(done.history["fingertip"][-1, [0, 2]] * MM)
     if tip is None:
         return
     turn = np.linspace(np.pi, 2.0 * np.pi, 91)
@@ -147,16 +150,12 @@ def _finger(axes: Any, done: Result, row: int) -> None:
 def freezing(results: Results) -> Any:
     """Draw sections along a drag at several times; frozen cells are marked."""
     methods = list_methods(results.drags)
-    height = 0.8 + 3.7 * len(methods)
-    with canvas(12.5, height, "Freezing: what the fingertip has left keeps its height") as (
-        figure,
-        place,
-    ):
+    title = "Freezing: what the fingertip has left keeps its height"
+    with sheet(12.5, 0.8 + 3.7 * len(methods), title) as figure:
         from matplotlib import colormaps
 
-        for panel, method in enumerate(methods):
+        for axes, method in zip(figure.subplots(len(methods)), methods, strict=True):
             done, start, end = results.drags[method]
-            axes = place(method, 0.85, height - 3.85 - 3.7 * panel, 11.3, 2.8)
             moments = done.history["time"]
             ridge = np.abs(done.history["position"][:, 1]) < 1e-6
             across = done.history["position"][ridge, 0] * MM
@@ -178,11 +177,9 @@ def freezing(results: Results) -> Any:
                 axes.plot(x, z + 6.0, "v", color=color, markersize=9)
             axes.set(xlim=(-38, 38), ylim=(38, 65), ylabel="height (mm)", title=NAMES[method])
             axes.set_xlabel("along the drag (mm)")
-            axes.xaxis.label.set_visible(panel == len(methods) - 1)
-            if panel == 0:
-                axes.plot([], [], "s", color=INK, label="frozen cell")
-                axes.plot([], [], "v", color=INK, label="finger")
-                legend_above(axes, 8)
+        axes.plot([], [], "s", color=INK, label="frozen cell")
+        axes.plot([], [], "v", color=INK, label="finger")
+        add_legend(figure, axes)
     return figure
 
 
@@ -195,13 +192,10 @@ def oscillation(results: Results) -> Any:
     """Draw the force after a quick press at three gains, and what the sweep of the gains came to."""
     gains = list(results.sweeps)
     middle = gains[len(gains) // 2]
-    with canvas(
-        13.0, 7.6, f"Method I holding still after a quick press of {PRESSED * MM:g} mm"
-    ) as (
-        figure,
-        place,
-    ):
-        detail = place("detail", 0.85, 4.4, 11.7, 2.25)
+    title = f"Method I holding still after a quick press of {PRESSED * MM:g} mm"
+    with sheet(13.0, 7.6, title) as figure:
+        panels = figure.subplot_mosaic([["detail", "detail"], ["swing", "settle"]])
+        detail, swing, settle = panels.values()
         _details(detail, results, middle)
         set_point = results.printed[METHODS[0]].scene.set_point
         assert set_point is not None  # Method I has one
@@ -210,19 +204,14 @@ def oscillation(results: Results) -> Any:
         detail.set_ylim(0.0, 2.5 * set_point.force)
         detail.set_title(f"$K_p$ = {middle:g} 1/m (beyond the frame: the press itself)")
         legend_above(detail)
-        swing = place("amplitude", 0.85, 0.75, 5.4, 2.6)
-        settle = place("settling", 7.15, 0.75, 5.4, 2.6)
         sweeps = {f"$K_p$ = {gain:g} 1/m": row for gain, row in results.sweeps.items()}
         sweeps[f"{gains[0]:g} 1/m, quicker device"] = sorted(results.quicker)
         for number, (label, row) in enumerate(sweeps.items()):
             style: dict[str, Any] = {"color": LINES[number], "marker": MARKERS[number]}
-            swing.plot(
-                [one.gain for one in row], [one.amplitude for one in row], label=label, **style
-            )
-            calm = [one for one in row if one.settling is not None]
-            settle.plot(
-                [one.gain for one in calm], [one.settling for one in calm], label=label, **style
-            )
+            amplitudes = [(each.gain, each.amplitude) for each in row]
+            times = [(each.gain, each.settling) for each in row if each.settling is not None]
+            for axes, points in ((swing, amplitudes), (settle, times)):
+                axes.plot(*np.reshape(points, (-1, 2)).T, label=label, **style)
         swing.axhline(SUSTAINED, **DASHED)
         swing.set(ylabel="amplitude in the last second (N)", title="Oscillation that goes on")
         settle.set(ylabel="time to settle within 10 % (s)", title="Response (no point: it goes on)")
@@ -256,12 +245,13 @@ def _details(axes: Any, results: Results, position_gain: float) -> None:
 def tracking(results: Results) -> Any:
     """Draw RFD and lag against the speed of a level drag, all methods."""
     limits = results.criterion
-    with canvas(12.5, 5.2, "A ridge 15 mm high, drawn straight and level") as (figure, place):
-        panels = (
-            ("rfd", "RFD (N)", 1.0, limits.deviation, place("rfd", 0.85, 0.75, 5.1, 3.5)),
-            ("lag", "largest lag (mm)", MM, limits.lag, place("lag", 7.0, 0.75, 5.1, 3.5)),
-        )
-        for name, label, factor, limit, axes in panels:
+    measured = (
+        ("rfd", "RFD (N)", 1.0, limits.deviation),
+        ("lag", "largest lag (mm)", MM, limits.lag),
+    )
+    with sheet(12.5, 5.2, "A ridge 15 mm high, drawn straight and level") as figure:
+        panels = figure.subplots(1, 2)
+        for axes, (name, label, factor, limit) in zip(panels, measured, strict=True):
             for marker, method in zip(MARKERS, COMPARED, strict=False):
                 row, color = results.tracks.get(method, []), METHOD_COLORS[method]
                 speed = np.array([one.speed * MM for one in row])
@@ -275,31 +265,21 @@ def tracking(results: Results) -> Any:
             axes.axvline(PAPER_SPEED * MM, **DOTTED)
             axes.set(xlabel="finger's speed (mm/s)", ylabel=label, xlim=(0, None), ylim=(0, None))
             axes.set_title(label.split(" (")[0])
-        first = panels[0][-1]
-        first.plot(
-            [], [], "o", color=INK, markerfacecolor="white", label="without contact, or lost"
-        )
-        first.plot([], [], **DASHED, label="criterion")
-        first.plot([], [], **DOTTED, label="the paper's 15 mm/s")
-        figure.legend(
-            *first.get_legend_handles_labels(),
-            loc="upper left",
-            ncols=6,
-            fontsize=10,
-            bbox_to_anchor=(0.005, 0.93),
-            handlelength=1.2,
-            columnspacing=0.8,
-        )
+        hollow = {"color": INK, "markerfacecolor": "white"}
+        axes.plot([], [], "o", label="without contact, or lost", **hollow)
+        axes.plot([], [], **DASHED, label="criterion")
+        axes.plot([], [], **DOTTED, label="the paper's 15 mm/s")
+        add_legend(figure, axes)
     return figure
 
 
 def variants(results: Results) -> Any:
     """Draw what the claims on the variants rest on."""
-    with canvas(13.0, 8.4, "One thing changed") as (figure, place):
-        _rise(place("rise", 1.9, 4.75, 4.4, 2.6), results)
-        _ahead(place("ahead", 8.2, 4.75, 4.4, 2.6), results)
-        _gains(place("gains", 0.95, 0.75, 5.35, 2.7), results)
-        _radius(place("radius", 7.25, 0.75, 5.35, 2.7), results)
+    with sheet(13.0, 8.4, "One thing changed") as figure:
+        for draw, axes in zip(
+            (_rise, _ahead, _gains, _radius), figure.subplots(2, 2).flat, strict=True
+        ):
+            draw(axes, results)
     return figure
 
 
@@ -309,8 +289,8 @@ def _rise(axes: Any, results: Results) -> None:
         values = [results.dragged[variant, METHODS[1], name] for name in names]
         _across(axes, names, [one.force for one in values], number, called)
     axes.set(xlabel="mean total force (N)", title=f"Method II, drags at {PAPER_SPEED * MM:g} mm/s")
-    axes.set_xlim(0.0, 1.55 * max(line.get_xdata().max() for line in axes.get_lines()))
-    axes.legend(loc="center right", borderaxespad=0.0)
+    axes.set_xlim(left=0.0)
+    axes.legend()
 
 
 def _ahead(axes: Any, results: Results) -> None:
@@ -325,9 +305,7 @@ def _ahead(axes: Any, results: Results) -> None:
     near, far = (f"{one * MM:g}" for one in AHEAD)
     axes.axvline(0.0, **DASHED)
     axes.set(xlabel="height over the bed at rest (mm)", title=f"Cells {near} to {far} mm ahead")
-    lowest, highest = min(values.values()), max(values.values())
-    axes.set_xlim(1.15 * lowest, max(-0.1 * lowest, 1.5 * highest))
-    axes.legend(loc="upper left", borderaxespad=0.0)
+    axes.legend()
 
 
 def _across(axes: Any, names: list[str], values: list[float], number: int, called: str) -> None:
