@@ -85,7 +85,6 @@ DOTTED = {**DASHED, "linestyle": (0, (1, 2))}
 def sheet(width: float, height: float, title: str) -> Iterator[Any]:
     """Give a figure, inches, whose panels and legends find their places by themselves."""
     with empty(width, height, layout="constrained") as figure:
-        figure.get_layout_engine().set(w_pad=0.1, h_pad=0.1)
         figure.suptitle(title, x=0.01, ha="left", fontsize=14, fontweight="bold")
         yield figure
 

@@ -30,7 +30,7 @@ VIEW = (0, 28, 910, 646)
 AREAS = {"relief_install": (207, 89, 894, 431), "relief_export": (0, 0, 910, 646)}
 FILM_AREA, FILM_SIZE, LASTS = (50, 84, 770, 564), (640, 427), 20_000
 #: Size of the picture of a series' page, pixels.
-SERIES = (1300, 1080)
+SERIES = "1300,1080"
 #: Series of which a frame of a film is shown, and the frame: the ridge under way.
 FILMED = """\
 scenes = ["ridge_mound_valley"]
@@ -88,18 +88,17 @@ def carry_out(*words: str | Path) -> None:
         sys.exit(code)
 
 
-def save_jpeg(picture: Path, name: str, quality: int = 88, area: Area | None = None) -> None:
-    """Write a picture, or an area of it, into the docs as a JPEG. `name`: its name there."""
+def save_jpeg(picture: Path, out: Path, quality: int = 88, area: Area | None = None) -> None:
+    """Write a picture, or an area of it, as a JPEG."""
     with Image.open(picture) as opened:
-        opened.convert("RGB").crop(area).save(PICTURES / name, quality=quality, optimize=True)
+        opened.convert("RGB").crop(area).save(out, quality=quality, optimize=True)
 
 
-def save_film(frames: list[Image.Image], name: str, shown_for: int) -> None:
+def save_film(frames: list[Image.Image], out: Path, shown_for: int) -> None:
     """Write frames, each shown for a time, ms, as an animated WebP, which pages show everywhere."""
-    timing = {"duration": shown_for, "loop": 0}
-    frames[0].save(
-        PICTURES / name, save_all=True, append_images=frames[1:], quality=60, method=6, **timing
-    )
+    first, *others = frames
+    looks = {"save_all": True, "quality": 60, "method": 6, "duration": shown_for, "loop": 0}
+    first.save(out, append_images=others, **looks)
 
 
 def cut_guide(folder: Path) -> None:
@@ -110,25 +109,19 @@ def cut_guide(folder: Path) -> None:
         rule = "must have screenshots guide_*.png, relief_*.png and film_*.png"
         sys.exit(f"{folder} {rule} (got {len(shots)} and {len(frames)}): run tests/window first")
     for shot in shots:
-        save_jpeg(shot, f"{shot.stem}.jpg", 85, AREAS.get(shot.stem, VIEW))
+        save_jpeg(shot, PICTURES / f"{shot.stem}.jpg", 85, AREAS.get(shot.stem, VIEW))
     size = Image.Resampling.LANCZOS
     film = [
         Image.open(frame).convert("RGB").crop(FILM_AREA).resize(FILM_SIZE, size) for frame in frames
     ]
-    save_film(film, "relief.webp", round(LASTS / len(film)))
+    save_film(film, PICTURES / "relief.webp", round(LASTS / len(film)))
 
 
-def draw_pins(folder: Path) -> None:
-    """Draw the bed at the last touch of the paper's session."""
-    save_jpeg(draw_instant(folder, "ridge_mound_valley", "1600x1000", "mode"), "pins.jpg")
-
-
-def draw_session(folder: Path) -> None:
-    """Plot heights and force of the paper's session."""
-    carry_out(
-        "run", "ridge_mound_valley", "--out", folder / "run", "--plots", "--no-errors", "--quiet"
-    )
-    shutil.copyfile(folder / "run" / "session.png", PICTURES / "session.png")
+def plot_session(folder: Path, out: Path, scene: str, shrunk: int = 1) -> None:
+    """Plot heights and force of a scene, of each finger; so many pixels become one."""
+    carry_out("run", scene, "--out", folder / "run", "--plots", "--no-errors", "--quiet")
+    with Image.open(folder / "run" / "session.png") as opened:
+        opened.convert("RGB").reduce(shrunk).save(out, optimize=True)
 
 
 def make_film(folder: Path, series: str, frames: str) -> Path:
@@ -142,83 +135,58 @@ def make_film(folder: Path, series: str, frames: str) -> Path:
     return out / "runs"
 
 
-def draw_film(folder: Path) -> None:
+def draw_film(folder: Path, out: Path) -> None:
     """Draw a frame of a film of the paper's session."""
     (frame,) = make_film(folder, FILMED, f"{FRAME}-{FRAME}").rglob(f"*{FRAME}.png")
-    save_jpeg(frame, "film.jpg")
+    save_jpeg(frame, out)
 
 
-def draw_instant(folder: Path, name: str, size: str, color: str = "neutral") -> Path:
-    """Draw a scene at its instant of `INSTANTS`, or at its last touch; return the picture."""
+def draw_scene(
+    folder: Path, out: Path, scene: str, size: str, quality: int = 85, color: str = "neutral"
+) -> None:
+    """Draw a scene at its instant of `INSTANTS`, or at its last touch."""
     run, drawn = folder / "run", folder / "drawn.png"
-    carry_out("run", name, "--out", run, "--no-errors", "--quiet")
-    instant = ("--time", str(INSTANTS[name])) if name in INSTANTS else ()
+    carry_out("run", scene, "--out", run, "--no-errors", "--quiet")
+    instant = ("--time", str(INSTANTS[scene])) if scene in INSTANTS else ()
     looks = ("--size", size, "--color", color, "--quiet")
     carry_out("render", run, *instant, *looks, "--out", drawn)
-    return drawn
+    save_jpeg(drawn, out, quality)
 
 
-def draw_closing_hand(folder: Path) -> None:
+def draw_closing_hand(folder: Path, out: Path) -> None:
     """Draw a hand that has closed in the pins."""
     from closing_hand import main as close_hand
 
-    save_jpeg(close_hand(folder), "closing_hand.jpg", 85)
+    save_jpeg(close_hand(folder), out, 85)
 
 
-def draw_hands(folder: Path, name: str) -> None:
-    """Draw an instant of a scene of several fingers or of bodies."""
-    save_jpeg(draw_instant(folder, name, "900x563"), f"{name}.jpg", 85)
-
-
-def draw_sample(folder: Path, name: str) -> None:
-    """Draw a sample scene for the table of all."""
-    save_jpeg(draw_instant(folder, name, "520x390"), f"samples/{name}.jpg", 70)
-
-
-def draw_scene_film(folder: Path, scene: str, speed: float, frames: int, name: str) -> None:
+def draw_scene_film(folder: Path, out: Path, scene: str, speed: float, frames: int) -> None:
     """Draw a film of a scene, or its first frames."""
     runs = make_film(folder, SCENE_FILM.format(scene, speed), f"0+{frames}")
     film = [Image.open(path).convert("RGB") for path in sorted(runs.rglob("0*.png"))]
-    save_film(film, name, SHOWN_FOR)
+    save_film(film, out, SHOWN_FOR)
 
 
-def draw_by_program(folder: Path, page: str, program: str, name: str) -> None:
+def draw_by_program(folder: Path, out: Path, page: str, program: str) -> None:
     """Carry out in a folder the program that a tutorial shows; take the picture that it writes."""
     text = (PICTURES.parent / "tutorials" / page).read_text(encoding="utf-8")
     shown = text.partition(f'title="{program}"\n')[2].partition("```")[0]
     (folder / program).write_text(shown, encoding="utf-8")
     subprocess.run([sys.executable, program], cwd=folder, check=True, timeout=1200)
-    shutil.copyfile(folder / name, PICTURES / name)
+    shutil.copyfile(folder / out.name, out)
 
 
-def draw_hand_forces(folder: Path) -> None:
-    """Plot heights and force of each finger of a hand."""
-    carry_out(
-        "run", "five_fingers_mound", "--out", folder / "run", "--plots", "--no-errors", "--quiet"
-    )
-    with Image.open(folder / "run" / "session.png") as opened:
-        size = opened.width // 2, opened.height // 2
-        opened.convert("RGB").resize(size, Image.Resampling.LANCZOS).save(
-            PICTURES / "hand_forces.png", optimize=True
-        )
-
-
-def draw_series(folder: Path) -> None:
+def draw_series(folder: Path, out: Path) -> None:
     """Show the page of the sample series in Chromium; its jobs take minutes."""
     carry_out("batch", "first", "--out", folder / "first", "--quiet")
     shown, page = folder / "page.png", (folder / "first" / "index.html").as_uri()
-    options = (
-        "--headless",
-        "--no-sandbox",
-        "--hide-scrollbars",
-        "--window-size={},{}".format(*SERIES),
-    )
+    options = f"--headless --no-sandbox --hide-scrollbars --window-size={SERIES}".split()
     command = ["chromium", *options, f"--screenshot={shown}", page]
     subprocess.run(command, check=True, capture_output=True, timeout=300)
-    save_jpeg(shown, "batch.jpg")
+    save_jpeg(shown, out)
 
 
-def draw_shapes(folder: Path) -> None:
+def draw_shapes(folder: Path, out: Path) -> None:
     """Draw every sample shape as a bed of 49 x 49 pins shows it."""
     import matplotlib.pyplot as plt
     from digiclay.core.model.actuator import Actuator
@@ -238,7 +206,7 @@ def draw_shapes(folder: Path) -> None:
         figure.text(left + 0.1, below + 0.28, name, ha="center", fontsize=15)
     drawn = folder / "drawn.png"
     figure.savefig(drawn, dpi=80)
-    save_jpeg(drawn, "shapes.jpg", 85)
+    save_jpeg(drawn, out, 85)
 
 
 def set_up_scene() -> None:
@@ -286,42 +254,42 @@ def render(meshes: list[Path], out: Path) -> Image.Image:
     return Image.alpha_composite(white, drawn).convert("RGB")
 
 
-def draw_export(folder: Path) -> None:
+def draw_export(folder: Path, out: Path) -> None:
     """Draw by Workbench what `digiclay export` writes of the paper's session, four views in one."""
     whole = Image.new("RGB", (2 * SIZE[0], 2 * SIZE[1]), "white")
     carry_out("run", "ridge_mound_valley", "--out", folder / "run", "--quiet")
     for index, options in enumerate(VIEWS):
-        out = folder / str(index)
-        carry_out("export", folder / "run", "--format", "stl", "--out", out, *options)
-        view = render(list(out.glob("*.stl")), folder / f"{index}.png")
+        meshes = folder / str(index)
+        carry_out("export", folder / "run", "--format", "stl", "--out", meshes, *options)
+        view = render(list(meshes.glob("*.stl")), folder / f"{index}.png")
         whole.paste(view, (index % 2 * SIZE[0], index // 2 * SIZE[1]))
-    whole.save(PICTURES / "export.jpg", quality=88)
+    whole.save(out, quality=88)
 
 
-DRAWN: dict[str, Callable[[Path], None]] = {
-    "pins.jpg": draw_pins,
-    "session.png": draw_session,
+#: By name of the picture what draws it, given a folder for other files and its path.
+DRAWN: dict[str, Callable[[Path, Path], None]] = {
+    "pins.jpg": partial(
+        draw_scene, scene="ridge_mound_valley", size="1600x1000", quality=88, color="mode"
+    ),
+    "session.png": partial(plot_session, scene="ridge_mound_valley"),
     "film.jpg": draw_film,
     "batch.jpg": draw_series,
     "export.jpg": draw_export,
     "shapes.jpg": draw_shapes,
-    **{f"{name}.jpg": partial(draw_hands, name=name) for name in (*HANDS, *BODIES)},
+    **{
+        f"{name}.jpg": partial(draw_scene, scene=name, size="900x563") for name in (*HANDS, *BODIES)
+    },
     "closing_hand.jpg": draw_closing_hand,
-    **{f"samples/{name}.jpg": partial(draw_sample, name=name) for name in list_samples()},
-    "two_hands.webp": partial(
-        draw_scene_film, scene="two_hands_bowl", speed=3.0, frames=53, name="two_hands.webp"
-    ),
-    "hand_print.webp": partial(
-        draw_scene_film, scene="hand_print", speed=0.8, frames=38, name="hand_print.webp"
-    ),
-    "hand_forces.png": draw_hand_forces,
-    "noise.svg": partial(
-        draw_by_program, page="figure.md", program="question.py", name="noise.svg"
-    ),
-    "animation.png": partial(
-        draw_by_program, page="animation.md", program="animate.py", name="animation.png"
-    ),
-    "laws.svg": lambda folder: draw_laws(PICTURES / "laws.svg"),
+    **{
+        f"samples/{name}.jpg": partial(draw_scene, scene=name, size="520x390", quality=70)
+        for name in list_samples()
+    },
+    "two_hands.webp": partial(draw_scene_film, scene="two_hands_bowl", speed=3.0, frames=53),
+    "hand_print.webp": partial(draw_scene_film, scene="hand_print", speed=0.8, frames=38),
+    "hand_forces.png": partial(plot_session, scene="five_fingers_mound", shrunk=2),
+    "noise.svg": partial(draw_by_program, page="figure.md", program="question.py"),
+    "animation.png": partial(draw_by_program, page="animation.md", program="animate.py"),
+    "laws.svg": lambda folder, out: draw_laws(out),
 }
 
 
@@ -335,7 +303,7 @@ def main(names: list[str]) -> None:
         )
     for name in names:
         with tempfile.TemporaryDirectory() as folder:
-            DRAWN[name](Path(folder))
+            DRAWN[name](Path(folder), PICTURES / name)
 
 
 if __name__ == "__main__":

@@ -70,16 +70,9 @@ def wheels() -> list[Path]:
     FETCHED.mkdir(parents=True, exist_ok=True)
     if any(not (FETCHED / name).is_file() for name in names):
         with tempfile.TemporaryDirectory(dir=FETCHED.parent) as folder:
-            pip = [
-                sys.executable,
-                "-m",
-                "pip",
-                "--disable-pip-version-check",
-                "download",
-                "--quiet",
-            ]
-            what = ["--no-deps", "--only-binary=:all:", "--dest", folder, "-r", PINS]
-            carry_out([*pip, "--retries", "5", *what], "Fetching the wheels")
+            pip = "-m pip --disable-pip-version-check download --quiet --retries 5 --no-deps"
+            what = ["--only-binary=:all:", "--dest", folder, "-r", PINS]
+            carry_out([sys.executable, *pip.split(), *what], "Fetching the wheels")
             for wheel in Path(folder).glob("*.whl"):
                 wheel.replace(FETCHED / wheel.name)
     missing = sorted(name for name in names if not (FETCHED / name).is_file())

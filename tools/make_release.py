@@ -136,15 +136,8 @@ def build_twice(scratch: Path, commit: str, instant: int) -> Path:
     extension.wheels()  # fetched once
     for name, umask, touched, added in BUILDS:
         source, out = scratch / name, scratch / f"files of {name}"
-        clone: list[str | Path] = [
-            *extension.GIT,
-            "clone",
-            "-q",
-            "--no-tags",
-            "--no-checkout",
-            "--shared",
-        ]
-        carry_out([*clone, ROOT, source], scratch, {}, umask)
+        clone = ["clone", "-q", "--no-tags", "--no-checkout", "--shared"]
+        carry_out([*extension.GIT, *clone, ROOT, source], scratch, {}, umask)
         carry_out(["git", "checkout", "-q", "--detach", commit], source, {}, umask)
         for path in source.rglob("*"):
             if ".git" not in path.parts:
@@ -180,11 +173,8 @@ def check_files(folder: Path, version: str) -> None:
         metadata_too = inner.read().decode() if inner else ""
     if any(f"\nVersion: {version}\n" not in text for text in (metadata, metadata_too)):
         raise ReleaseError(f"wheel or source archive have another version than {version}.")
-    carry_out(
-        [sys.executable, "-m", "twine", "check", "--strict", folder / wheel, folder / source],
-        folder,
-        {},
-    )
+    twine = [sys.executable, "-m", "twine", "check", "--strict"]
+    carry_out([*twine, folder / wheel, folder / source], folder, {})
 
 
 def write_texts(folder: Path, version: str) -> None:
