@@ -27,25 +27,17 @@ examples:
   digiclay describe my.toml --set relaxation=absent
   digiclay describe my.toml --parameters
 """
-#: The places on the line from finger to pins, and the sections of the scene that fill them.
+#: Sections of the scene along the line from finger to pins, and names of places that are others.
 PLACES = (
-    ("hand", "hand"),
-    ("finger", "fingertip"),
-    ("contact", "contact"),
-    ("relaxation", "relaxation"),
-    ("actuator", "actuator"),
-    ("supply", "supply"),
-    ("fluid", "fluid"),
-    ("valve", "valve"),
-    ("conduit", "conduit"),
-    ("valve lag", "valve_lag"),
-    ("dead time", "delay"),
-    ("drive", "drive"),
-    ("sensors", "sensors"),
-    ("controller", "control"),
-    ("blister", "blister"),
-    ("recorder", "recorder"),
+    *("hand", "fingertip", "contact", "relaxation", "actuator", "supply", "fluid", "valve"),
+    *("conduit", "valve_lag", "delay", "drive", "sensors", "control", "blister", "recorder"),
 )
+NAMES = {
+    "fingertip": "finger",
+    "valve_lag": "valve lag",
+    "delay": "dead time",
+    "control": "controller",
+}
 #: Force on a pin at which the stiffness felt is told, N.
 FELT = 0.05
 #: Units people read: factor and name.
@@ -120,13 +112,14 @@ def description(scene: Scene, system: System) -> Iterator[str]:
     """Give the lines that describe a scene. `system`: assembled from it."""
     yield scene.name + (f": {scene.description.strip()}" if scene.description else "")
     yield f"\nThe line from finger to pins (preset {scene.preset})"
-    for place, section in PLACES:
+    for section in PLACES:
         for fingers, part in _list_parts(scene, section):
             if part is None and section in LATER:
                 continue
             method = f"{scene.method}: " if section == "control" else ""
             parameters = "left out" if part is None else method + _parameters(part)
-            yield _filled(place, f"of {fingers}: {parameters}" if fingers else parameters)
+            text = f"of {fingers}: {parameters}" if fingers else parameters
+            yield _filled(NAMES.get(section, section), text)
     if scene.shape:
         yield _filled("shape", fit_shape(scene.shape, system.grid, scene.actuator).describe())
     simulation = scene.simulation

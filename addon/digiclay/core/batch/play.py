@@ -121,10 +121,10 @@ class Play:
 
 def begin_play(scenes: Mapping[int, Scene], systems: Mapping[int, System]) -> Play:
     """Return a batch before its first control period; `scenes`: by the numbers of the runs."""
-    if any(scene.bodies for scene in scenes.values()):
-        raise ParameterError("Batch", "scenes", "must have no bodies: run them alone", "some")
-    if any(scene.drive for scene in scenes.values()):
-        raise ParameterError("Batch", "scenes", "must have no drive: run them alone", "some")
+    for part in ("bodies", "drive"):
+        if any(getattr(scene, part) for scene in scenes.values()):
+            rule = f"must have no {part}: run them alone"
+            raise ParameterError("Batch", "scenes", rule, "some")
     batch = make_batch([systems[run] for run in scenes])
     trajectories = {run: require_one(scene.trajectories()) for run, scene in scenes.items()}
     return Play(trajectories, tuple(scenes), batch, begin(batch))

@@ -41,15 +41,12 @@ def describe_structure(scene: Scene, system: System | None = None) -> Any:
 
     For the closed-form and the Richardson stepper it has the kinds of the parts, not their numbers.
     Other steppers have no axis of runs: all cells must be alike. Raises ParameterError if parts of
-    the scene are not compatible.
+    the scene are not compatible, or for several fingers.
     """
-    if len(scene.fingers) != 1 or scene.bodies or scene.drive:
-        return "one by one", len(scene.fingers), len(scene.bodies), scene.drive is None
     physics = tuple(scene.section(name) for name in PHYSICS)
-    fingertips = tuple(finger.fingertip for finger in scene.fingers)
     sensors = scene.sensors and replace(scene.sensors, seed=0)
     rounds = sensors and bool(sensors.force_step or sensors.height_step)
-    parts = fingertips, scene.control, scene.blister, sensors
+    parts = scene.section("fingertip"), scene.control, scene.blister, sensors
     common = (
         scene.layout,
         scene.method if scene.control else None,

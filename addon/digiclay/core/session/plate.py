@@ -24,17 +24,6 @@ JUDGED = 0.25
 PLACES, COARSE, LOST = (8, 16), 0.01, 0.5
 
 
-def integrate_law(tip: Fingertip, law: ExponentialLaw, indentation: Floats) -> Floats:
-    """Return the law summed over the footprint of a level fingertip on a plate, N m²; see `plate_force`."""
-    stiffening, height = law.exponent, tip.height
-    depth = np.maximum(indentation - law.offset, 0.0)
-    turn = stiffening * depth
-    first = np.expm1(turn) - turn
-    second = (first - 0.5 * turn * turn) / (stiffening * height)
-    size = 2.0 * math.pi * tip.length * tip.width / height
-    return size * law.stiffness / stiffening**2 * (first - second)
-
-
 def plate_force(scene: Scene, indentation: Floats | float) -> Floats:
     """Return the elastic force of the whole finger, level on a flat plate or on pins that are held.
 
@@ -69,7 +58,12 @@ def plate_force(scene: Scene, indentation: Floats | float) -> Floats:
         rule = f"must be finite and at most {DEEPEST * tip.height + law.offset:g} m"
         raise ParameterError("plate_force", "indentation", rule, f"{depth.max():g} m")
     plan = scene.layout
-    return law.share / (plan.pitch * plan.row_spacing) * integrate_law(tip, law, depth)
+    turn = law.exponent * np.maximum(depth - law.offset, 0.0)
+    first = np.expm1(turn) - turn
+    second = (first - 0.5 * turn * turn) / (law.exponent * tip.height)
+    size = 2.0 * math.pi * tip.length * tip.width / tip.height
+    summed = size * law.stiffness / law.exponent**2 * (first - second)
+    return law.share / (plan.pitch * plan.row_spacing) * summed
 
 
 def measure_lattice(plan: Layout, tip: Fingertip, law: ExponentialLaw) -> float:

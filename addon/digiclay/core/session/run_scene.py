@@ -37,10 +37,9 @@ from ..metrics.summary import (
     take_worst,
 )
 from ..model.control_interface import count_losses
-from ..model.physics import find_speeds
 from ..model.touch import describe_excess, find_indentations, is_beyond
 from ..model.trajectory import sample_poses
-from ..scene.assembly import assemble, make_motion
+from ..scene.assembly import assemble
 from ..scene.recorder import RunRecording, write
 from ..scene.schema import Scene
 from ..scene.toml_table import ABSENT, format_scene
@@ -48,6 +47,7 @@ from ..version import __version__
 from .accuracy import Errors, describe_bends, estimate_errors, explain_absence
 from .memory_limit import check_memory
 from .plate import list_cautions
+from .probes import free_speed
 
 History = dict[str, Array]
 
@@ -115,13 +115,17 @@ class Result(Described):
         """Contact of each finger: its time, losses, and the time these lasted."""
         self.require_history("fingers")
         time, weights = self.history["time"], compute_weights(self.history["time"])
-        felt = [(own["total_force"], own["fingertip"][:, 2]) for own in split_fingers(self.history)]
-        alone = replace(self.scene, fingers=self.scene.fingers[:1])
-        fastest = float(find_speeds(make_motion(alone).cell).rise)
+        felt = [
+            (finger["total_force"], finger["fingertip"][:, 2])
+            for finger in split_fingers(self.history)
+        ]
+        fastest = float(free_speed(self.scene).rise)
         lost = measure_losses(self.scene, fastest, time, felt).get("lost", [NEVER] * len(felt))
         return tuple(
-            Contact(float(weights[find_contact_rows(force)].sum()), int(one["losses"]), one["time"])
-            for (force, _), one in zip(felt, lost, strict=True)
+            Contact(
+                float(weights[find_contact_rows(force)].sum()), int(loss["losses"]), loss["time"]
+            )
+            for (force, _), loss in zip(felt, lost, strict=True)
         )
 
     def require_history(self, name: str) -> None:

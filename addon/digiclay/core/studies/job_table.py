@@ -79,26 +79,30 @@ class Outputs:
 def make_outputs(table: Table) -> Outputs:
     """Read the outputs of each run from a table of `KEYS`."""
     refuse_unknown("", table, KEYS)
-    export = table.get("export", [])
-    if not isinstance(export, list) or not all(isinstance(kind, str) for kind in export):
-        raise ParameterError(
-            "export", "", 'must be a list of formats such as ["stl"]', show_value(export)
-        )
-    if len(set(export)) < len(export):
-        raise ParameterError("export", "", "must not name a format twice", show_value(export))
-    errors = table.get("errors", True)
-    if not isinstance(errors, bool):
-        raise ParameterError("errors", "", "must be true or false", show_value(errors))
+    export, errors = table.get("export", []), table.get("errors", True)
+    _require(_is_texts(export), "export", 'must be a list of formats such as ["stl"]', export)
+    _require(len(set(export)) == len(export), "export", "must not name a format twice", export)
+    _require(isinstance(errors, bool), "errors", "must be true or false", errors)
     parts: Record = {}
     for section, kind in SECTIONS.items():
         if section not in table:
             continue
         given = table[section]
-        if not isinstance(given, dict):
-            raise ParameterError(section, "", f"must be a section, [{section}]", show_value(given))
+        _require(isinstance(given, dict), section, f"must be a section, [{section}]", given)
         named = {key if FORMER.get(key, key) in given else FORMER[key]: given[key] for key in given}
         parts[section] = read_part(section, kind, {}, named)
     return Outputs(tuple(export), errors, **parts)
+
+
+def _require(holds: object, owner: str, rule: str, value: object) -> None:
+    """Refuse a value that breaks a rule."""
+    if not holds:
+        raise ParameterError(owner, "", rule, "none" if value is None else show_value(value))
+
+
+def _is_texts(value: Any) -> bool:
+    """Return whether a value is a list of texts."""
+    return isinstance(value, list) and all(isinstance(text, str) for text in value)
 
 
 #: The files of a job.
@@ -176,17 +180,10 @@ def read_outputs(path: Path) -> Outputs:
 
 def _read_scenes(table: Table) -> list[str]:
     """Return the scenes of the file."""
-    words = table.get("scenes")
-    if (
-        not isinstance(words, list)
-        or not words
-        or not all(isinstance(word, str) and word for word in words)
-    ):
-        value = "none" if words is None else show_value(words)
-        raise ParameterError(
-            "scenes", "", 'must be a list of scenes such as ["tap", "my.toml"]', value
-        )
-    return words
+    words: Any = table.get("scenes")
+    rule = 'must be a list of scenes such as ["tap", "my.toml"]'
+    _require(words and _is_texts(words) and all(words), "scenes", rule, words)
+    return list(words)
 
 
 def _read_methods(table: Table, more: Sequence[str]) -> list[str]:
@@ -194,10 +191,8 @@ def _read_methods(table: Table, more: Sequence[str]) -> list[str]:
     if "methods" not in table:
         return list(more) or [""]
     methods = table["methods"]
-    if not isinstance(methods, list) or not methods:
-        raise ParameterError(
-            "methods", "", 'must be a list such as ["virtual_master"]', show_value(methods)
-        )
+    rule = 'must be a list such as ["virtual_master"]'
+    _require(methods and isinstance(methods, list), "methods", rule, methods)
     for method in methods:
         find_method(method, "methods")
     return [*methods, *(name for name in more if name not in methods)]
@@ -208,19 +203,14 @@ def _read_settings(table: Table) -> dict[str, list[Setting]]:
     if "settings" not in table:
         return {"": []}
     given = table["settings"]
-    if not isinstance(given, dict) or not given:
-        rule = "must be a section of labels such as soft = { control.force_gain = 2 }"
-        raise ParameterError("settings", "", rule, show_value(given))
+    rule = "must be a section of labels such as soft = { control.force_gain = 2 }"
+    _require(given and isinstance(given, dict), "settings", rule, given)
     settings = {}
     for label, changes in given.items():
-        if not isinstance(changes, dict):
-            rule = "must be a table such as { control.force_gain = 2 }"
-            raise ParameterError("settings", label, rule, show_value(changes))
-        if not re.fullmatch(r"\w[\w.+-]*", label):
-            raise ParameterError(
-                "settings", "", "must have labels of letters, digits and . + -", repr(label)
-            )
-        option = f"settings.{label}"
+        option, rule = f"settings.{label}", "must be a table such as { control.force_gain = 2 }"
+        _require(isinstance(changes, dict), option, rule, changes)
+        rule = "must have labels of letters, digits and . + -"
+        _require(re.fullmatch(r"\w[\w.+-]*", label), "settings", rule, label)
         settings[label] = [
             Setting(key, format_value(value), option) for key, value in _flatten(changes)
         ]
