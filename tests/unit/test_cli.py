@@ -111,14 +111,12 @@ def test_a_mistake_is_one_line_exit_code_2_and_no_folder(line, said, here, refus
     assert left(here) == ["d.png"]
 
 
-def test_a_run_can_have_meshes_and_plots_and_is_replaced_only_when_asked(here):
-    call("run my.toml --quiet --export stl,obj --plots")
-    added = {path.name for path in (here / "my").iterdir()}
-    assert {"surface.stl", "surface.obj", "session.png", "surface.png"} <= added
+def test_a_run_is_replaced_only_when_asked(here):
+    call("run my.toml --quiet --export stl")
     before = (here / "my" / "metrics.json").read_bytes()
     assert (call("run my.toml --quiet"), (here / "my" / "metrics.json").read_bytes()) == (2, before)
     call("run my.toml --quiet --overwrite")
-    assert [*left(here), (here / "my" / "session.png").exists()] == ["my", False]
+    assert [*left(here), (here / "my" / "surface.stl").exists()] == ["my", False]
 
 
 def test_export_writes_the_surface_of_a_run_in_a_unit_at_an_instant_and_refuses_what_is_damaged(
@@ -240,10 +238,12 @@ def test_the_list_of_commands_has_a_line_for_each_but_for_plumbing(monkeypatch, 
     assert (said[0].isupper(), said[-1]) == (True, ".")
 
 
-def test_a_terminal_that_does_not_know_a_letter_gets_another():
-    process = start(PROGRAM, "run", "my.toml", env={"PYTHONIOENCODING": "ascii"})
-    code, out, err = finish(process)
+def test_a_terminal_that_does_not_know_a_letter_gets_another_and_a_notebook_hinders_no_plot(here):
+    backend = "module://matplotlib_inline.backend_inline"
+    known = {"PYTHONIOENCODING": "ascii", "MPLBACKEND": backend}
+    code, out, err = finish(start(PROGRAM, "run", "my.toml", "--plots", env=known))
     assert (code, err, "height error about " in out) == (0, "", True)
+    assert (here / "my" / "session.png").is_file()
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no signals to send")
@@ -296,16 +296,6 @@ def test_the_program_works_on_one_core_unless_told_otherwise(said, cores):
     )
     # Numpy reads it when it is imported, so that must not have happened before.
     assert finish(start(script))[1].split() == [cores, "False"]
-
-
-def test_the_backend_of_a_notebook_does_not_hinder_plots(here):
-    script = (
-        "import os\n"
-        "os.environ['MPLBACKEND'] = 'module://matplotlib_inline.backend_inline'\n"
-        "from digiclay.cli import console; console()\n"
-    )
-    assert finish(start(script, "run", "my.toml", "--plots", "--no-errors"))[0] == 0
-    assert (here / "my" / "session.png").is_file()
 
 
 def test_a_run_is_kept_whatever_goes_wrong_with_what_is_made_of_it(here, monkeypatch):

@@ -18,13 +18,13 @@ pytestmark = pytest.mark.usefixtures("here", "no_methods")
 
 def test_a_sweep_is_a_table_with_errors_that_numpy_and_pandas_read(tap):
     counts = []
-    varied = {"control.force_gain": np.array([1.0, 2.0]), "layout.pitch": ["3 mm", "4 mm"]}
+    varied = {"control.force_gain": np.array([1.0, 2.0]), "valve.stroke": ["20 um", "30 um"]}
     table = digiclay.sweep(
         tap, varied, ["max_total_force", "lag", "height_error"], lambda *n: counts.append(n)
     )
-    assert counts[-1] == (4, 4)
+    assert counts == [(4, 4)]  # points of one bed run in one batch
     np.testing.assert_array_equal(table["control.force_gain"], [1.0, 1.0, 2.0, 2.0])
-    np.testing.assert_allclose(table["layout.pitch"], [3e-3, 4e-3, 3e-3, 4e-3])
+    np.testing.assert_allclose(table["valve.stroke"], [2e-5, 3e-5, 2e-5, 3e-5])
     names = "max_total_force lag_mean height_error run_time force_error lost error"
     assert list(pandas.DataFrame(table).columns) == [*varied, *names.split()]
     # As of a run of its own, up to the rounding of a batch.
@@ -44,14 +44,6 @@ def test_a_sweep_over_methods_has_their_names_also_of_ones_own(tap):
     assert list(table["control.method"]) == ["plastic", "soft_pad", "mine"]
     alone = simulate(digiclay.scene(tap, {"control.method": Mine}))
     assert table["max_total_force"][2] == pytest.approx(alone.metrics["max_total_force"], rel=1e-9)
-
-
-def test_points_of_one_bed_run_in_one_batch(tap):
-    counts = []
-    digiclay.sweep(
-        tap, {"control.force_gain": [1, 2, 3, 4]}, "rfd", lambda *both: counts.append(both)
-    )
-    assert counts == [(4, 4)]
 
 
 def test_points_that_fail_have_their_reason_and_no_number(tap):

@@ -259,15 +259,9 @@ def test_bands_are_quantiles_of_runs_of_the_members_one_by_one(measured):
     assert content["notes"][1:] == ["40 points run in 1 batch"]
 
 
-def test_a_repeat_has_the_same_file_and_another_seed_another_one(measured, here):
-    for seed, alike in ((1, True), (2, False)):
-        line = f"run my.toml --uncertain '{measured}/fitted.toml' --members 40 --seed {seed}"
-        assert call(f"{line} --out {seed} --quiet") == 0
-        again = (here / f"{seed}/uncertainty.json").read_bytes()
-        assert (again == (measured / "o/uncertainty.json").read_bytes()) == alike
-
-
-def test_the_table_has_value_band_its_width_and_the_error_of_integration(measured, here, capsys):
+def test_the_table_has_value_band_its_width_and_the_error_of_integration_and_a_seed_its_members(
+    measured, here, capsys
+):
     line = f"run my.toml --uncertain '{measured}/fitted.toml' --members 40 --out o"
     assert call(line) == 0
     lines = capsys.readouterr().out.splitlines()
@@ -277,7 +271,9 @@ def test_the_table_has_value_band_its_width_and_the_error_of_integration(measure
     numbers = [float(row[number]) for number in (3, 4, 6, 8, 11)]
     wanted = [band["value"], low, high, 50.0 * (high - low) / band["value"], band["integration"]]
     np.testing.assert_allclose(numbers, wanted, rtol=0.05)  # two digits
-    assert call(f"{line} --overwrite --no-errors") == 0
+    assert call(f"{line} --overwrite --no-errors --seed 2") == 0
+    others = read_json(here / "o/uncertainty.json")["members"]
+    assert others != read_json(measured / "o/uncertainty.json")["members"]
     (row,) = [line for line in capsys.readouterr().out.splitlines() if "largest force" in line]
     assert row.split()[-1] == "–"
 

@@ -9,7 +9,7 @@ from digiclay.core.base.errors import ParameterError
 from digiclay.core.batch.run_together import measure_together, run_together
 from digiclay.core.control.methods import METHODS
 from digiclay.core.engine.hand_steps import lower_reach, solve_force
-from digiclay.core.engine.simulation import begin, periods
+from digiclay.core.engine.simulation import begin
 from digiclay.core.files.tables import parse_tables
 from digiclay.core.model.trajectory import sample_poses
 from digiclay.core.scene.assembly import assemble
@@ -23,6 +23,7 @@ from tests.assemble import over_middle, refused_in_a_line, table
 
 BED = {"layout": {"rows": 11, "columns": 11}}
 WAY = {"waypoints": over_middle((0, 42e-3), (0.1, 37e-3), (0.25, 37e-3), (0.35, 44e-3))}
+PRESS = {"trajectory": {"waypoints": WAY["waypoints"][:2]}}
 
 
 def scene(hand=None, **tables):
@@ -72,7 +73,8 @@ def test_a_stiff_hand_has_the_results_of_a_prescribed_path():
 
 
 def test_runs_of_a_batch_have_the_hands_and_results_they_have_alone():
-    scenes = [scene({}), scene({"stiffness": 800.0, "mass": 1e-3}), scene({"damping": 0.0})]
+    hands = {}, {"stiffness": 800.0, "mass": 1e-3}, {"damping": 0.0}
+    scenes = [scene(hand, **PRESS) for hand in hands]
     alone = [run(each).estimate_errors() for each in scenes]
     for number, result in run_together(scenes):
         # Rounding, as of every batch.
@@ -94,17 +96,8 @@ def test_the_error_estimate_covers_that_of_the_hand():
     assert coarse.estimate_errors().metrics["total_force_error"] > 0.8 * apart
 
 
-def test_a_session_goes_on_from_a_kept_state_bit_for_bit():
-    made = scene({}, simulation={"physics_step": 2e-3})
-    system, paths = assemble(made), made.trajectories()
-    *_, half = periods(system, paths, begin(system), 30)
-    assert half.deflection.rise[0] > 1e-4
-    data = snapshot.dump(system, half)
-    *_, end = periods(system, paths, half, 30)
-    *_, again = periods(system, paths, snapshot.load(system, data), 30)
-    assert snapshot.dump(system, again) == snapshot.dump(system, end)
-    # What is stored without a hand goes on with one at rest.
-    bare = assemble(scene())
+def test_a_state_that_is_stored_without_a_hand_goes_on_with_one_at_rest():
+    system, bare = assemble(scene({})), assemble(scene())
     assert not snapshot.load(system, snapshot.dump(bare, begin(bare))).deflection.rise.any()
 
 
@@ -159,7 +152,7 @@ def test_pins_are_looked_for_where_a_hand_is_below_its_path(count):
 
 @pytest.mark.parametrize("method", METHODS)
 def test_every_method_meets_a_hand(method):
-    history = run(scene({}, control={"method": method})).history
+    history = run(scene({}, control={"method": method}, **PRESS)).history
     assert np.abs(rise(history)).max() > 20e-6
 
 
@@ -172,9 +165,8 @@ def test_every_method_meets_a_hand(method):
     },
 )
 def test_every_stepper_moves_a_hand_alike(stepper, step):
-    press = {"trajectory": {"waypoints": WAY["waypoints"][:2]}}
-    found = run(scene({}, **press, simulation={"stepper": stepper, "physics_step": step}))
-    wanted = run(scene({}, **press, simulation={"physics_step": 0.5e-3})).history["total_force"]
+    found = run(scene({}, **PRESS, simulation={"stepper": stepper, "physics_step": step}))
+    wanted = run(scene({}, **PRESS, simulation={"physics_step": 0.5e-3})).history["total_force"]
     # The hand's own error with a step of 2.5 ms, where the force is 0.5 N.
     assert np.abs(found.history["total_force"] - wanted).max() < 0.01
     assert wanted.max() > 0.4
@@ -191,14 +183,10 @@ def test_a_file_has_the_hand_or_says_nothing_of_it():
     "hand, words",
     {
         "no mass": ({"mass": 0}, "mass must be above 0 kg"),
-        "a negative mass": ({"mass": -1.0}, "mass must be above 0 kg"),
-        "a mass that is no number": ({"mass": float("nan")}, "mass must be a finite number"),
         "the mass of a man": ({"mass": 80.0}, "mass must be at most 10 kg"),
         "negative damping": ({"damping": -1.0}, "damping must be at least 0 N s/m"),
         "no stiffness": ({"stiffness": 0}, "stiffness must be at least 1 N/m"),
         "the stiffness of a machine": ({"stiffness": 1e9}, "stiffness must be at most 1e\\+06 N/m"),
-        "an unknown key": ({"weight": 1.0}, "weight"),
-        "text": ({"mass": "heavy"}, "mass"),
         "no table": ("soft", "hand must be a section"),
     },
 )
