@@ -45,7 +45,6 @@ class Histories:
         self._stretches: dict[int, list[Stretch]] = {run: [] for run in play.runs}
         self._rises: dict[int, list[Floats]] = {run: [np.zeros(1)] for run in play.runs}
         self._recording = Recording(recorder, play.batch.rows, self._store) if recorder else None
-        self._history: HistoryWriter | None = None
 
     def _store(self, stretch: Stretch) -> None:
         """Store a stretch of the present runs."""
@@ -66,10 +65,7 @@ class Histories:
                 self._rises[run].append(rise)
 
     def finish(self, now: Instant, index: int) -> Result:
-        """Return the result of a run at its end; its history is valid until the next result.
-
-        To allocate memory for each run would take longer than to write it.
-        """
+        """Return the result of a run at its end."""
         run, state = now.play.runs[index], now.play.state
         rows = self._write(self._recording, run, state.period) if self._recording else {}
         if state.deflection and rows:
@@ -81,12 +77,11 @@ class Histories:
         """Write the history of a run up to a period; return its rows."""
         recording.flush()
         count, column = 1 - (-period // recording.every), self._runs.index(run)
-        if self._history is None or self._history.count < count:
-            self._history = HistoryWriter(count, len(self._first))
-        self._history.begin(self._first[:, column], self._mode[:, column])
+        history = HistoryWriter(count, len(self._first))
+        history.begin(self._first[:, column], self._mode[:, column])
         for stretch in self._stretches.pop(run):
-            self._history.write(stretch)
-        return self._history.finish(period, recording.every)
+            history.write(stretch)
+        return history.finish(period, recording.every)
 
 
 class Sums:
@@ -254,8 +249,8 @@ def run_together(
 
     Each scene has one finger, and all have one structure, see `structure.describe_structure`.
     `stopped` is called after each control period; if it returns True, unfinished runs are dropped.
-    Yields the number of a scene at its end, and the result or error of `run_scene.run`. The history
-    is valid until the next result, and the run time is a share, see `play.Instant`.
+    Yields the number of a scene at its end, and the result or error of `run_scene.run`, whose run
+    time is a share, see `play.Instant`.
     """
     return _run(scenes, Histories, stopped)
 

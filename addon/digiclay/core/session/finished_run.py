@@ -145,7 +145,9 @@ def _refuse(path: Path, scene: Scene, heads: Mapping[str, Head]) -> None:
     for name, head in heads.items():
         axes = HISTORY_ARRAYS[name].axes.split(", ")
         several = len(scene.fingers) > 1
-        shape = tuple(sizes.get(axis) or int(axis) for axis in axes if axis != "f" or several)
+        shape = tuple(
+            sizes[axis] if axis in sizes else int(axis) for axis in axes if axis != "f" or several
+        )
         if head.shape != shape:
             raise OutputError(
                 f"{path}: {name} must have the shape {shape} of its scene (got {head.shape})."

@@ -21,9 +21,9 @@ from ..metrics.summary import (
 )
 from ..model.control_interface import find_set_point
 from ..model.trajectory import Path, Waypoint
-from ..scene.assembly import assemble
 from ..scene.recorder import Recorder
 from ..scene.schema import Scene
+from ..session.probes import free_speed
 from ..session.run_scene import Result, run, select_rows
 
 #: Rest of the fingertip at the ends of a phase, s.
@@ -244,7 +244,7 @@ def describe_end(speed: float | None, low: float = LOW, high: float = HIGH) -> s
 
 def find_free_speed(scene: Scene) -> float:
     """Return the speed of a pin without load that rises behind an open valve, m/s."""
-    return float(assemble(scene).fastest)
+    return float(free_speed(scene).rise)
 
 
 def find_unintended_losses(done: Result) -> list[float]:
