@@ -18,6 +18,7 @@ from digiclay_study.case_study import (
     find_least,
     read_study,
 )
+from tests.assemble import assert_near, table
 from tests.scene_files import SMALL_BLISTER, interrupt_after, read_text, rows, write_text
 
 BED = f"[layout]\nrows = 5\ncolumns = 7\n{SMALL_BLISTER}"
@@ -60,23 +61,23 @@ def square(history, start, end):
     return np.sum(part**2) - 0.5 * (part[0] ** 2 + part[-1] ** 2)
 
 
-@pytest.mark.parametrize(
-    "direction, middle, first, last",
-    [
-        (0.0, (0.0, 0.0), (-0.021, 0.0), (0.021, 0.0)),
-        (90.0, (0.0, 0.0015), (0.0, -0.0195), (0.0, 0.0225)),
-        (30.0, (0.001, 0.0), (0.001 - 0.021 * 3**0.5 / 2, -0.0105), (0.001 + 0.021 * 3**0.5 / 2, 0.0105)),
-    ],
-)  # fmt: skip
-def test_a_stroke_is_a_straight_drag_in_its_direction_through_its_middle(
-    direction, middle, first, last
+@table(
+    "direction, height, x, y",
+    {
+        "along a row, on a ridge": (0.0, 13.5e-3, (-0.021, 0.021), (0.0, 0.0)),
+        "along a column, as deep as pressed": (90.0, -4.5e-3, (0.0, 0.0), (-0.0195, 0.0225)),
+        "aslant": (30.0, 0.0, 0.001 + 0.021 * 3**0.5 / 2 * np.array([-1, 1]), (-0.0105, 0.0105)),
+    },
+)
+def test_a_stroke_is_a_straight_level_drag_in_its_direction_through_its_middle_at_its_speed(
+    direction, height, x, y
 ):
-    stroke = Stroke(direction=direction, x=middle[0], y=middle[1])
+    stroke = Stroke(direction=direction, height=height, x=np.mean(x), y=np.mean(y))
     path, start, end = stroke.path(0.01, 0.04)
-    x, y, z = path.trajectory().poses(np.linspace(start, end, 5))[:, :3].T
-    np.testing.assert_allclose(x, np.linspace(first[0], last[0], 5), atol=1e-12)
-    np.testing.assert_allclose(y, np.linspace(first[1], last[1], 5), atol=1e-12)
-    np.testing.assert_allclose(z, 0.04 + 0.0135, rtol=1e-12)
+    assert end - start == pytest.approx(0.042 / 0.01)
+    places = path.trajectory().poses(np.linspace(start, end, 5))[:, :3]
+    ends = np.column_stack([x, y, [0.04 + height] * 2])
+    assert_near(places, np.linspace(*ends, 5), 1e-12)
 
 
 def test_the_values_of_a_study_are_those_of_its_runs_and_a_finished_folder_has_other_limits_at_once():

@@ -26,7 +26,6 @@ from tests.assemble import assert_near
 from tests.own_methods import (
     COPY,
     PAD,
-    forgotten,
     refused,
     small,
     write_method,
@@ -34,13 +33,7 @@ from tests.own_methods import (
 from tests.scene_files import command, read_text, write_text
 from tests.timeouts import TIMEOUT
 
-
-@pytest.fixture(autouse=True)
-def here(tmp_path, monkeypatch):
-    """Work in an empty folder; methods that a test loads are unknown after it."""
-    monkeypatch.chdir(tmp_path)
-    with forgotten():
-        yield tmp_path
+pytestmark = pytest.mark.usefixtures("folder", "no_methods")
 
 
 def test_a_method_runs_by_its_file_and_its_parameters_are_in_the_scene_file():
@@ -55,8 +48,8 @@ def test_a_method_runs_by_its_file_and_its_parameters_are_in_the_scene_file():
     assert run(scene).history["height"].min() < softer < 0.04
 
 
-def test_the_code_is_shipped_to_processes_that_have_no_file(here):
-    path = write_method(here)
+def test_the_code_is_shipped_to_processes_that_have_no_file(folder):
+    path = write_method(folder)
     scene = small(load_method("pad.py:SoftPad"), "control.step=70 um")
     packed = pickle.dumps(scene)
     path.unlink()
@@ -77,10 +70,10 @@ def test_the_code_is_shipped_to_processes_that_have_no_file(here):
     assert pickle.loads(packed).control.step == 70e-6
 
 
-def test_an_installed_package_offers_a_method_by_its_name(here, monkeypatch):
-    write_method(here, name="padpackage.py")
-    monkeypatch.syspath_prepend(here)
-    info = here / "pads-1.2.dist-info"
+def test_an_installed_package_offers_a_method_by_its_name(folder, monkeypatch):
+    write_method(folder, name="padpackage.py")
+    monkeypatch.syspath_prepend(folder)
+    info = folder / "pads-1.2.dist-info"
     info.mkdir()
     write_text(info / "METADATA", "Metadata-Version: 2.1\nName: pads\nVersion: 1.2\n")
     write_text(info / "entry_points.txt", "[digiclay.methods]\npad = padpackage:SoftPad\n")
@@ -94,7 +87,7 @@ def test_an_installed_package_offers_a_method_by_its_name(here, monkeypatch):
     remove_method("pad")
     assert run(pickle.loads(packed)).metrics["method"] == "pad"
     remove_method("pad")
-    write_text(here / "padpackage.py", PAD + "\n# another\n")
+    write_text(folder / "padpackage.py", PAD + "\n# another\n")
     with pytest.raises(MethodError, match=r"The method pad must be that of pads 1.2 here too"):
         pickle.loads(packed)
     monkeypatch.setattr(
@@ -108,8 +101,8 @@ def test_an_installed_package_offers_a_method_by_its_name(here, monkeypatch):
         load_method("pad")
 
 
-def test_a_copy_of_method_one_gives_its_run_bit_for_bit(here):
-    write_method(here, COPY, "one.py")
+def test_a_copy_of_method_one_gives_its_run_bit_for_bit(folder):
+    write_method(folder, COPY, "one.py")
     name = load_method("one.py:MethodOne")
     own, built_in = run(small(name)), run(small("virtual_master"))
     assert built_in.history["mode"].max() > 1
@@ -131,9 +124,9 @@ CHEAT = f"""{OPEN.replace("SoftPad", "Cheat")}
 """
 
 
-def test_nothing_shown_leads_to_the_bed_and_openings_are_limited_to_those_of_a_valve(here):
-    write_method(here, f"{OPEN}        return memory, orders\n")
-    write_method(here, CHEAT, "cheat.py")
+def test_nothing_shown_leads_to_the_bed_and_openings_are_limited_to_those_of_a_valve(folder):
+    write_method(folder, f"{OPEN}        return memory, orders\n")
+    write_method(folder, CHEAT, "cheat.py")
     honest, cheat = (run(small(load_method(word))) for word in ("pad.py:SoftPad", "cheat.py:Cheat"))
     for key, values in honest.history.items():
         assert_array_equal(cheat.history[key], values, key)
@@ -143,18 +136,18 @@ def test_nothing_shown_leads_to_the_bed_and_openings_are_limited_to_those_of_a_v
         text = f"{PAD.partition('        down')[0]}        {orders}\n".replace(
             "SoftPad", f"Pad{number}"
         )
-        write_method(here, text, "open.py")
+        write_method(folder, text, "open.py")
         heights.append(run(small(load_method(f"open.py:Pad{number}"))).history["height"].sum())
     assert heights[0] == heights[1] < heights[2] < heights[3] == heights[4]
 
 
-def test_a_batch_gives_what_the_runs_give_alone_and_a_shape_is_displayed_before(here):
-    write_method(here)
+def test_a_batch_gives_what_the_runs_give_alone_and_a_shape_is_displayed_before(folder):
+    write_method(folder)
     name = load_method("pad.py:SoftPad")
     scenes = [
         small(name, f"control.step={step} um", "sensors.force_noise=1 mN") for step in (20, 40, 80)
     ]
-    found = {number: result.history["height"].copy() for number, result in run_together(scenes)}
+    found = {number: result.history["height"] for number, result in run_together(scenes)}
     for number, scene in enumerate(scenes):
         assert_near(found[number], run(scene).history["height"], 1e-12)
     assert np.abs(found[0] - found[2]).max() > 1e-5
@@ -177,10 +170,10 @@ RUN = Path("jobs", "runs", "tap-soft_pad-small")
 
 
 @pytest.fixture
-def jobs(here):
-    write_text(here / "jobs.toml", JOBS)
-    write_method(here)
-    return here
+def jobs(folder):
+    write_text(folder / "jobs.toml", JOBS)
+    write_method(folder)
+    return folder
 
 
 def prepare():
@@ -216,7 +209,7 @@ PAGE = Path(__file__).parents[2] / "docs" / "own-methods.md"
 CODE = re.findall(r"```python[^\n]*\n(.*?)```", read_text(PAGE), re.DOTALL)
 
 
-def test_the_template_runs_as_it_is_and_its_run_needs_no_code_any_more(here, capsys):
+def test_the_template_runs_as_it_is_and_its_run_needs_no_code_any_more(folder, capsys):
     assert main(command("new-method soft_pad --out own")) == 0
     assert "--method own/soft_pad.py:SoftPad" in capsys.readouterr().out
     assert main(command("describe tap --set control.method=own/soft_pad.py:SoftPad")) == 0
@@ -224,18 +217,18 @@ def test_the_template_runs_as_it_is_and_its_run_needs_no_code_any_more(here, cap
     size = command("--set layout.rows=11 --set layout.columns=11 --set simulation.duration=0.25")
     own = command("--method own/soft_pad.py:SoftPad --quiet --no-errors")
     assert main(["run", "tap", *own, *size, "--out", "r"]) == 0
-    text = read_text(here / "own" / "soft_pad.py")
-    assert read_text(here / "r" / "method.py") == text
-    pressed = read_run(here / "r", "height")
+    text = read_text(folder / "own" / "soft_pad.py")
+    assert read_text(folder / "r" / "method.py") == text
+    pressed = read_run(folder / "r", "height")
     assert pressed.history["height"].min() < 39.9e-3  # it gives way
     assert pressed.scene.method == "soft_pad"
     remove_method("soft_pad")
-    assert read_run(here / "r", "height").scene.control is None
+    assert read_run(folder / "r", "height").scene.control is None
     assert main(command("export r --format stl --quiet")) == 0
     assert main(command("run r --out again")) == 2
     assert "--method path/to/mine.py:Mine" in capsys.readouterr().err
     assert main(command("run r --method r/method.py:SoftPad --out again --quiet")) == 0
-    again = read_run(here / "again", "height").history["height"]
+    again = read_run(folder / "again", "height").history["height"]
     assert again.tobytes() == pressed.history["height"].tobytes()
 
 
@@ -249,28 +242,28 @@ def test_the_template_runs_as_it_is_and_its_run_needs_no_code_any_more(here, cap
         (command("pad --out mine.py"), "mine.py is a file"),
     ],
 )
-def test_a_name_that_cannot_be_is_refused_in_a_line(here, arguments, said, capsys):
-    write_text(here / "mine.py", "")
+def test_a_name_that_cannot_be_is_refused_in_a_line(folder, arguments, said, capsys):
+    write_text(folder / "mine.py", "")
     assert said in refused(capsys, "new-method", *arguments)
-    assert [(path.name, path.stat().st_size) for path in here.iterdir()] == [("mine.py", 0)]
+    assert [(path.name, path.stat().st_size) for path in folder.iterdir()] == [("mine.py", 0)]
 
 
-def test_a_sweep_varies_methods_and_goes_on_with_the_same_code_only(here, capsys):
+def test_a_sweep_varies_methods_and_goes_on_with_the_same_code_only(folder, capsys):
     assert main(command("new-method mine --quiet")) == 0
     size = command("--set layout.rows=11 --set layout.columns=11 --set simulation.duration=0.05")
     varied = command("--vary control.method=elastic,mine.py:Mine --workers 1 --out s --quiet")
     assert main(["sweep", "tap", *varied, *size]) == 0
-    assert read_text(here / "s" / "sweep.csv").split()[-2:][0].startswith("elastic,")
+    assert read_text(folder / "s" / "sweep.csv").split()[-2:][0].startswith("elastic,")
     assert main(["sweep", "tap", *varied, *size]) == 0
-    (here / "mine.py").write_text(read_text(here / "mine.py") + "\n", encoding="utf-8")
+    (folder / "mine.py").write_text(read_text(folder / "mine.py") + "\n", encoding="utf-8")
     remove_method("mine")
     assert main(["sweep", "tap", *varied, *size]) == 2
     assert "s holds another sweep" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("code", CODE)
-def test_the_code_of_the_page_runs(here, code):
-    write_text(here / "page.py", code)
+def test_the_code_of_the_page_runs(folder, code):
+    write_text(folder / "page.py", code)
     name = re.findall(r"class (\w+)", code)[-1]
     assert load_method(f"page.py:{name}") in list_added()
     assert run(small(load_method(f"page.py:{name}"))).history["height"].min() < 0.04

@@ -67,6 +67,13 @@ def test_the_arrays_of_a_history_are_the_declared_ones_and_are_read_again(finger
     assert all(np.array_equal(again[name], array) for name, array in done.history.items())
 
 
+def test_bodies_in_the_history_of_a_scene_without_any_are_refused_by_their_shape(result, tmp_path):
+    history = result.history | {"body": np.zeros((41, 1, 7))}
+    save(replace(result, history=history), tmp_path)
+    with pytest.raises(OutputError, match=r"body must have the shape \(41, 0, 7\) of its scene"):
+        read_run(tmp_path, "body")
+
+
 def test_a_history_follows_the_path_and_gives_the_metrics(result):
     assert result.history["mode"].dtype == np.int8
     wanted = scene().section("trajectory").trajectory().poses(result.history["time"])

@@ -18,7 +18,6 @@ from digiclay.core.studies.speed_limits import (
     judge,
     track,
 )
-from numpy.testing import assert_allclose
 
 
 def device(method="virtual_master", **layout):
@@ -52,20 +51,6 @@ GOOD = Follows(speed=0.015, losses=0, loss_share=0.0, lag=1e-3, rfd=0.1)
 def test_each_part_of_the_criterion_can_fail_a_finger(bad):
     assert GOOD.meets(Criterion())
     assert not replace(GOOD, **bad).meets(Criterion())
-
-
-@pytest.mark.parametrize(
-    "drag, height",
-    [(Drag(), None), (Drag(press=4e-3, height=-4e-3), 36e-3)],
-    ids=["ridge", "as deep"],
-)
-def test_a_drag_goes_straight_and_level_at_its_speed(drag, height):
-    path, start, end = drag.path(12e-3, 40e-3)
-    times = np.linspace(start, end, 11)
-    x, y, z = path.trajectory().poses(times)[:, :3].T
-    assert_allclose(np.diff(x) / np.diff(times), 12e-3, rtol=1e-9)
-    assert_allclose(y, 0.0, atol=1e-12)
-    assert_allclose(z, height or z[0], rtol=1e-12)
 
 
 def test_a_lift_is_as_fast_as_it_says_at_its_fastest_and_a_bed_narrower_than_the_drag_is_refused():
