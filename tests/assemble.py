@@ -30,7 +30,7 @@ from digiclay.core.scene.scene_source import Setting, find, load
 from digiclay.core.scene.schema import Finger, Scene, Simulation
 from digiclay.core.scene.toml_table import resolve
 from digiclay.core.session import snapshot
-from digiclay.core.session.take import replay
+from digiclay.core.session.take import play
 from numpy.typing import NDArray
 
 
@@ -206,8 +206,8 @@ def record(
 
 def replayed(take):
     """Tell whether a take played again ends in the very same state, bit for bit."""
-    *_, last = replay(take)
-    return snapshot.dump(assemble(take.scene), last) == take.end
+    *_, (system, last) = play(take)
+    return snapshot.dump(system, last) == take.end
 
 
 def make_basis(x, y):

@@ -1,58 +1,70 @@
 """Press strokes of every brush in sessions without Blender, and the shape that they leave."""
 
+from dataclasses import replace
+
 import numpy as np
 from digiclay.core.model.fingertip import LEVEL
 from digiclay.core.model.layout import Layout
 from digiclay.sessions import sculpting
-from digiclay.sessions.sculpting import change_stroke, queue_stroke
+from digiclay.sessions.running import find_device
 from digiclay.settings.devices import BEDS, make_scene
-from digiclay.strokes.stroke import draw, start
+from digiclay.strokes.queue_ghosts import find_ghosts
+from digiclay.strokes.stroke import lay_path, start
 
 from tests import hand
-from tests.hand import heights, let_go
+from tests.hand import heights
 
 #: Control periods that are simulated at a time: a stroke leaves the same bits in any number of
 #: them, and each time its state is packed.
 CHUNK = 64
 
 
-def begin_bed(name, rows, columns):
-    """Return a session on a part of a bed that Add offers."""
-    scene = make_scene(
-        "paper", Layout(rows, columns, BEDS[name].pitch), "virtual_master", BEDS[name].share
-    )
+def begin(scene):
+    """Return a session of a scene, the fingertip above the middle of the bed."""
     above = np.array([0.0, 0.0, 46e-3, *LEVEL])
-    session, _ = sculpting.begin_session(7, "Bed", scene, above)
-    return sculpting.advance(session, above, 0.0, 100)
+    return sculpting.begin_session(7, "Bed", scene, above)[0]
 
 
-def queue(session, ends, brush, depth=15.0, share=1.0):
-    """Queue a quick stroke straight from place to place, mm."""
-    places = np.array(ends) * 1e-3
-    way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(places, axis=0).T))])
-    session, number = queue_stroke(
-        session, start(0, *places[0].tolist(), depth * 1e-3, brush=brush, share=share)
-    )
-    for part in np.arange(1, 31) / 30:
-        at = tuple(np.interp(part * way[-1], way, places[:, axis]) for axis in (0, 1))
-        session = change_stroke(
-            session, number, lambda stroke, at=at: draw(stroke, *at, depth * 1e-3, share)
-        )
-    return let_go(session, number)
+def begin_bed(name, rows, columns, method="virtual_master", arrangement="aligned", preset="paper"):
+    """Return a session on a part of a bed that Add offers."""
+    layout = Layout(rows, columns, BEDS[name].pitch, arrangement)
+    return begin(make_scene(preset, layout, method, BEDS[name].share))
 
 
-def finish(session, most=60.0):
-    """Let the session go on until its strokes are finished and the pins at rest, at most so long, s."""
-    last = session.state.period + round(most / hand.PERIOD)
-    while session.strokes and session.state.period < last:
-        session = sculpting.follow_finger(session, session.pose, CHUNK)
-    assert not session.strokes
+def lay(path, brush, amount=4.0, **more):
+    """Return a stroke along a path, mm, that the hand has let go; `amount`: depth or height, mm."""
+    places = 1e-3 * np.asarray(path, float)
+    return lay_path(start(1, *places[0], 1e-3 * amount, brush=brush, **more), places)
+
+
+def queue(session, *strokes):
+    """Queue strokes."""
+    for stroke in strokes:
+        session, _ = sculpting.queue_stroke(session, stroke)
+    return session
+
+
+def find_ghost(session):
+    """Return the nominal surface that is shown of a session's queue."""
+    return find_ghosts(session.strokes, find_device(session), heights(session))[-1].nominal
+
+
+def copy(session):
+    """Return a session to go on with, while the first one stays."""
+    return replace(session, state=session.state.copy())
+
+
+def form(session, *strokes, periods=CHUNK):
+    """Form strokes on a copy of a session, so many control periods at a time."""
+    session = queue(copy(session), *strokes)
+    while session.strokes:
+        session = sculpting.follow_finger(session, session.pose, periods)
+    return session
+
+
+def settle(session):
+    """Let the pins come to rest."""
     return hand.go_on(session, 15)
-
-
-def form(session, ends, brush, depth=15.0, share=1.0):
-    """Queue a stroke and finish it."""
-    return finish(queue(session, ends, brush, depth, share))
 
 
 def relief(session):
@@ -65,19 +77,11 @@ def relief(session):
 def measure_spikes(formed):
     """Return how far the worst pin is above or below all 8 pins about it, or the 16 about those, mm."""
     worst = 0.0
-    rows, columns = formed.shape
     for reach in (1, 2):
         padded = np.pad(formed, reach, mode="edge")
-        steps = range(-reach, reach + 1)
-        around = np.array(
-            [
-                padded[reach + i : reach + i + rows, reach + j : reach + j + columns]
-                for i in steps
-                for j in steps
-                if max(abs(i), abs(j)) == reach
-            ]
-        )
-        worst = max(
-            worst, float((formed - around.max(0)).max()), float((around.min(0) - formed).max())
-        )
+        windows = np.lib.stride_tricks.sliding_window_view(padded, (2 * reach + 1,) * 2)
+        ring = np.pad(np.zeros((2 * reach - 1,) * 2, bool), 1, constant_values=True)
+        around = windows[..., ring]
+        over, under = formed - around.max(axis=-1), around.min(axis=-1) - formed
+        worst = max(worst, float(over.max()), float(under.max()))
     return worst

@@ -3,17 +3,16 @@
 import numpy as np
 import pytest
 from digiclay.recorded.pointer_strokes import play_strokes, read_strokes
-from digiclay.sessions.running import find_device
 from digiclay.strokes import drawn
-from digiclay.strokes.queue_ghosts import find_ghosts
 from digiclay.strokes.stroke import make_images
 
 from tests.assemble import assert_near
 from tests.drawings import AS_DRAWN, TURNED, put
 from tests.hand import heights
 from tests.renew import SAMPLES
+from tests.strokes import find_ghost, form, queue
 from tests.unit.test_drawings import DRAWN, LOWERED, RAISED, assert_formed
-from tests.unit.test_meeting import begin, finish, queue
+from tests.unit.test_meeting import begin
 
 #: As `FORMED` of tests/unit/test_drawings.py has the smaller ones.
 FORMED = {
@@ -46,9 +45,7 @@ def test_strokes_of_older_files_form_what_they_formed():
     )
     strokes = [drawn.load(line) for line in lines]
     assert [drawn.dump(stroke) for stroke in strokes] == lines
-    session = queue(begin(), *strokes)
-    ghost = find_ghosts(session.strokes, find_device(session), heights(session))[-1]
-    assert_near(ghost.nominal.height, stood["ghost"], ROUNDING)
-    assert_near(heights(finish(session)[0]), stood["queue"], ROUNDING)
+    assert_near(find_ghost(queue(begin(), *strokes)).height, stood["ghost"], ROUNDING)
+    assert_near(heights(form(begin(), *strokes)), stood["queue"], ROUNDING)
     *_, played = play_strokes(begin(), read_strokes(folder / "file.toml").strokes)
     assert_near(heights(played), stood["played"], ROUNDING)

@@ -1,17 +1,16 @@
 """Drawings of several strokes by a hand, judged by their paths alone: as a ghost, and formed in a session."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache, partial
 
 import numpy as np
 import pytest
-from digiclay.sessions import sculpting
 from digiclay.sessions.running import find_device
-from digiclay.sessions.sculpting import change_stroke, queue_stroke
+from digiclay.sessions.sculpting import change_stroke, follow_finger, queue_stroke
 from digiclay.strokes.queue_ghosts import find_ghosts
 from digiclay.strokes.stroke import ALONE, Brush, Combine, draw, lay_path, start
 
-from tests.assemble import assert_near
+from tests.assemble import assert_near, table
 from tests.drawings import AS_DRAWN, TURNED, draw_by_hand, find_wanted, judge, put, read_drawings
 from tests.hand import heights, let_go
 from tests.strokes import CHUNK
@@ -43,10 +42,16 @@ def begin_stroke(brush, combine, amount, place):
     return start(0, *(1e-3 * place), 1e-3 * abs(amount), brush=brush, combine=combine)
 
 
-@pytest.mark.parametrize(
-    "kind, pose", [(RAISED, AS_DRAWN), (LOWERED, TURNED)], ids=["raised", "lowered, turned"]
+@table(
+    "name, kind, pose",
+    {
+        "R raised": ("R", RAISED, AS_DRAWN),
+        "X lowered, turned": ("X", LOWERED, TURNED),
+        "logo raised, turned": ("logo", RAISED, TURNED),
+        "face lowered": ("face", LOWERED, AS_DRAWN),
+        "map raised": ("map", RAISED, AS_DRAWN),
+    },
 )
-@pytest.mark.parametrize("name", DRAWN)
 def test_the_ghost_of_a_drawing_has_its_height_on_each_path_and_flanks_of_one_stroke(
     name, kind, pose
 ):
@@ -90,32 +95,9 @@ def test_strokes_that_count_from_the_surface_add_where_they_meet_as_in_older_fil
     assert "stroke 1 has 8.00 to 16.00 mm" in judge(DRAWN["X"], 8.0, measure(formed), x, y)
 
 
-@dataclass(frozen=True, eq=False)
-class Formed:
-    """What a hand's strokes have left."""
-
-    relief: np.ndarray
-    """(rows, columns): Heights above rest, mm."""
-    force: float
-    """Largest force on the fingertips, N."""
-    counts: tuple[int, int]
-    """Control periods, and calls that simulated some."""
-
-
-def form(paths, kind, images=ALONE):
-    """Return what a hand leaves that draws along paths, mm, 100 moves per second, when all is formed."""
+def draw_all(paths, kind, images):
+    """Yield the session of a hand that draws along paths, mm, 100 moves per second, after each tick."""
     session, rng = begin(make_bed("design")), np.random.default_rng(41)
-    force, calls = 0.0, 0
-
-    def simulate(session, periods):
-        nonlocal force, calls
-        after = sculpting.follow_finger(session, session.pose, periods)
-        # A trace has the sum of several fingertips.
-        felt = after.trace.force if images is ALONE else after.state.finger_forces()
-        force = max(force, float(felt.max(initial=0.0)))
-        calls += after.state.period > session.state.period
-        return after
-
     for path in paths:
         hand = draw_by_hand(path, rng)
         stroke = replace(begin_stroke(*kind, hand[0]), images=images)
@@ -124,11 +106,12 @@ def form(paths, kind, images=ALONE):
             for x, y in (1e-3 * hand[first : first + MOVES]).tolist():
                 add = partial(draw, x=x, y=y, depth=1e-3 * abs(kind[-1]))
                 session = change_stroke(session, number, add)
-            session = simulate(session, PERIODS)
+            session = follow_finger(session, session.pose, PERIODS)
+            yield session
         session = let_go(session, number)
     while session.strokes:
-        session = simulate(session, CHUNK)
-    return Formed(measure(heights(session)), force, (session.state.period, calls))
+        session = follow_finger(session, session.pose, CHUNK)
+        yield session
 
 
 #: Brush and pose of each drawing, and most control periods and calls that form it, an eighth more
@@ -140,19 +123,21 @@ FORMED = {
 }
 
 
-def assert_formed(paths, kind, most, *images):
+def assert_formed(paths, kind, most, images=ALONE):
     """Assert that paths, mm, are formed in so many periods and calls, and no finger is pressed hard."""
-    formed = form(paths, kind, *images)
-    drawn = [path for turn in find_turns(*images) for path in put(paths, turn, (0.0, 0.0))]
-    assert judge(drawn, kind[-1], formed.relief, *at_rest()[2:]) == ""
+    force, periods = 0.0, {0}
+    for session in draw_all(paths, kind, images):
+        # A trace has the sum of several fingertips.
+        felt = session.trace.force if images is ALONE else session.state.finger_forces()
+        force = max(force, float(felt.max(initial=0.0)))
+        periods.add(session.state.period)
+    turns = np.linspace(0.0, 360.0, len(images), endpoint=False)
+    drawn = [path for turn in turns for path in put(paths, turn, (0.0, 0.0))]
+    assert judge(drawn, kind[-1], measure(heights(session)), *at_rest()[2:]) == ""
     # As things of the gallery: a hand presses with 1 N.
-    assert formed.force < 1.0
-    assert np.less_equal(formed.counts, most).all(), formed.counts
-
-
-def find_turns(images=ALONE):
-    """Return the turn, degrees, of each image of a radial symmetry."""
-    return [360.0 * number / len(images) for number in range(len(images))]
+    assert force < 1.0
+    counts = session.state.period, len(periods) - 1
+    assert np.less_equal(counts, most).all(), counts
 
 
 @pytest.mark.parametrize("name", FORMED)

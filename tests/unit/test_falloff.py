@@ -7,23 +7,21 @@ import numpy as np
 import pytest
 from digiclay.core.base.errors import ParameterError
 from digiclay.core.control.blister import Blister
-from digiclay.core.model.fingertip import LEVEL as LEVEL_FINGER
 from digiclay.core.model.fingertip import Fingertip
 from digiclay.core.model.layout import Layout, make_grid
 from digiclay.core.scene.toml_table import resolve
 from digiclay.recorded.takes import read_recording
 from digiclay.sessions import sculpting
 from digiclay.sessions.running import find_device
-from digiclay.sessions.sculpting import queue_stroke
 from digiclay.strokes import drawn
 from digiclay.strokes.falloff import Falloff, evaluate
 from digiclay.strokes.nominal import Device, extend, find_nominal
 from digiclay.strokes.queue_ghosts import find_ghosts
-from digiclay.strokes.stroke import Brush, lay_path, make_images, start
+from digiclay.strokes.stroke import Brush, make_images
 
+from tests import strokes
 from tests.assemble import assert_near, refused_in_a_line, replayed, table
 from tests.hand import heights
-from tests.strokes import finish
 
 ARRANGEMENTS = ("aligned", "staggered", "hexagonal")
 SHAPES = list(Falloff)[1:]
@@ -40,11 +38,8 @@ def make_device(arrangement="aligned", locked=None):
     return Device(lay_bed(arrangement), FINGER, BLISTER, 60e-3, locked, REST)
 
 
-def lay(path, brush=Brush.SMOOTH, falloff=Falloff.SMOOTH, amount=4e-3, share=1.0, **more):
-    """Return a stroke along a path, mm."""
-    places = 1e-3 * np.array(path, float)
-    stroke = start(1, *places[0].tolist(), amount, brush=brush, share=share, **more)
-    return lay_path(replace(stroke, falloff=falloff), places)
+def lay(path, brush=Brush.SMOOTH, falloff=Falloff.SMOOTH, amount=4.0, **more):
+    return strokes.lay(path, brush, amount, falloff=falloff, **more)
 
 
 def form(stroke, before, device=None):
@@ -97,8 +92,7 @@ def draw_surface(kind, grid, random):
     return 4e-3 * np.sin(x / 3e-3) * np.sin(y / 3e-3)
 
 
-@pytest.mark.parametrize("falloff", SHAPES)
-@pytest.mark.parametrize("arrangement", ARRANGEMENTS)
+@pytest.mark.parametrize("arrangement, falloff", [*zip(2 * ARRANGEMENTS, SHAPES, strict=True)])
 @pytest.mark.parametrize("kind", ["cone", "noise", "ridge", "waves"])
 def test_smooth_makes_no_slope_steeper_than_those_about_it_and_leaves_other_pins(
     kind, arrangement, falloff
@@ -188,7 +182,7 @@ def test_a_crease_is_sharp_and_narrow_and_a_crest_is_its_inverse(arrangement, br
     along /= np.hypot(*along)
     x, y = grid.x - middle[0], grid.y - middle[1]
     aside, ahead = np.abs(x * along[1] - y * along[0]), np.abs(x * along[0] + y * along[1])
-    found = sign * (form(lay(LINE, brush, falloff, 3e-3), np.full(grid.count, REST), device) - REST)
+    found = sign * (form(lay(LINE, brush, falloff, 3.0), np.full(grid.count, REST), device) - REST)
     wanted = 3e-3 * (1.0 - aside / RADIUS).clip(0.0) ** (1 if falloff is Falloff.LINEAR else 2)
     beside = ahead < 14e-3
     assert_near(found[beside], wanted[beside], 1e-12)
@@ -198,7 +192,7 @@ def test_a_crease_is_sharp_and_narrow_and_a_crest_is_its_inverse(arrangement, br
 @pytest.mark.parametrize("brush", [Brush.CREASE, Brush.CREST, Brush.FLATTEN, Brush.SMOOTH])
 def test_no_brush_in_the_ring_takes_a_pin_beyond_the_limits_unless_it_was_there(brush):
     rough = REST + np.random.default_rng(5).uniform(-2e-3, 2e-3, 1296)
-    limited = form(replace(lay(LINE, brush, amount=9e-3), limits=(-0.5e-3, 0.5e-3)), rough)
+    limited = form(replace(lay(LINE, brush, amount=9.0), limits=(-0.5e-3, 0.5e-3)), rough)
     assert (limited >= np.minimum(rough, REST - 0.5e-3) - 1e-12).all()
     assert (limited <= np.maximum(rough, REST + 0.5e-3) + 1e-12).all()
     assert np.abs(limited - rough).max() > 1e-3
@@ -211,15 +205,15 @@ def test_flatten_leaves_a_plane_or_moves_no_pin_farther_than_its_depth(arrangeme
     plane = REST + 0.1 * grid.x - 0.05 * grid.y
     rough = plane + np.random.default_rng(2).uniform(-2e-3, 2e-3, grid.count)
     path = [(-8, -8), (8, -4), (8, 8)]
-    flat = form(lay(path, Brush.FLATTEN, Falloff.CONSTANT, 9e-3), rough, device)
+    flat = form(lay(path, Brush.FLATTEN, Falloff.CONSTANT, 9.0), rough, device)
     near = find_nominal(lay(path, Brush.FLATTEN, Falloff.CONSTANT), device, rough).near
     basis = np.column_stack([np.ones(near.sum()), grid.positions[near]])
     fitted = basis @ np.linalg.lstsq(basis, rough[near], rcond=None)[0]
     assert_near(flat[near], fitted, 1e-12)
     np.testing.assert_array_equal(flat[~near], rough[~near])
-    limited = form(lay(path, Brush.FLATTEN, Falloff.CONSTANT, 0.5e-3), rough, device)
+    limited = form(lay(path, Brush.FLATTEN, Falloff.CONSTANT, 0.5), rough, device)
     assert np.abs(limited - rough).max() == pytest.approx(0.5e-3, abs=1e-12)
-    again = form(lay(path, Brush.FLATTEN, amount=9e-3), plane, device)
+    again = form(lay(path, Brush.FLATTEN, amount=9.0), plane, device)
     assert_near(again, plane, 1e-12)
 
 
@@ -303,15 +297,12 @@ def test_the_valves_form_the_nominal_surface_in_a_session_that_replays_and_is_un
     brush, tables, off
 ):
     layout = {"rows": 21, "columns": 21} | tables.get("layout", {})
-    above = np.array([0.0, 0.0, 60e-3, *LEVEL_FINGER])
-    session, _ = sculpting.begin_session(7, "Bed", resolve({**tables, "layout": layout}), above)
+    session = strokes.begin(resolve({**tables, "layout": layout}))
     session = sculpting.set_recording(session, on=True)
-    session, _ = queue_stroke(session, lay([(-6, 0), (6, 2)], Brush.CREST, amount=3e-3))
-    session = finish(session)
-    before = heights(session).copy()
-    session, _ = queue_stroke(session, lay([(-6, 3), (6, -2)], brush, Falloff.SMOOTH, 2e-3))
-    wanted = form(session.strokes[0], before, find_device(session))
-    session = finish(session)
+    session = strokes.form(session, lay([(-6, 0), (6, 2)], Brush.CREST, amount=3.0))
+    before, stroke = heights(session), lay([(-6, 3), (6, -2)], brush, Falloff.SMOOTH, 2.0)
+    wanted = form(stroke, before, find_device(session))
+    session = strokes.form(session, stroke)
     assert_near(heights(session), wanted, off)
     assert np.abs(wanted - before).max() > 0.2e-3
     assert session.trace.force.max() == 0.0

@@ -12,14 +12,14 @@ from digiclay.recorded.pointer_strokes import PointerStroke, play_strokes, read_
 from digiclay.recorded.takes import read_recording
 from digiclay.sessions import sculpting
 from digiclay.sessions.running import find_device
-from digiclay.sessions.sculpting import change_scene, change_stroke
+from digiclay.sessions.sculpting import change_scene
 from digiclay.strokes import drawn
 from digiclay.strokes.nominal import find_nominal
 from digiclay.strokes.stroke import FINISHING, Brush, start
 
 from tests.assemble import assert_near, replayed
 from tests.hand import go_on, heights
-from tests.strokes import begin_bed, finish, queue
+from tests.strokes import begin_bed, copy, form, lay, queue
 
 pytestmark = pytest.mark.usefixtures("quick_machine")
 
@@ -32,32 +32,26 @@ ROUNDING = 1e-12
 
 @cache
 def begin():
-    """Return a session on a bed of 21 x 25 pins that records."""
-    return sculpting.set_recording(begin_bed("paper", 21, 25), on=True)
+    """Return a session on a bed of 13 x 17 pins that records."""
+    return sculpting.set_recording(begin_bed("paper", 13, 17), on=True)
 
 
 @cache
 def formed(brush, as_left):
-    """Return a session whose only stroke waits for nothing any more, and the stroke as it was queued."""
-    session = begin()
-    session = replace(session, state=session.state.copy())
-    queued = queue(session, ENDS, brush, PRESSED[brush])
-    number = queued.strokes[0].number
-    queued = change_stroke(queued, number, lambda stroke: replace(stroke, as_left=as_left))
-    session = queued
-    last = heights(queued)
+    """Return a session when its stroke is formed, and how far pins are then from its nominal surface.
+
+    (m,), m, about the path alone: of a stroke that valves finish, when the fingertip has left.
+    """
+    stroke = lay(ENDS, brush, PRESSED[brush], as_left=as_left)
+    session = queue(copy(begin()), stroke)
+    last = heights(session)
     while session.strokes:
         stroke = session.strokes[0]
         if as_left or (stroke.phase == FINISHING and not stroke.waited):
             last = heights(session).copy()
         session = sculpting.follow_finger(session, session.pose, 1)
-    return session, queued, last
-
-
-def find_error(queued, height):
-    """Return how far pins at heights (n,), m, are from the nominal surface, about the path alone."""
-    nominal = find_nominal(queued.strokes[0], find_device(queued), heights(begin()))
-    return (height - nominal.height)[nominal.near]
+    nominal = find_nominal(stroke, find_device(begin()), heights(begin()))
+    return session, (last - nominal.height)[nominal.near]
 
 
 @pytest.mark.parametrize("as_left", [False, True])
@@ -65,8 +59,8 @@ def find_error(queued, height):
 def test_the_correction_is_how_far_pins_are_from_the_nominal_surface_when_the_finger_has_left(
     brush, as_left
 ):
-    session, queued, last = formed(brush, as_left)
-    found, error = session.correction, find_error(queued, last)
+    session, error = formed(brush, as_left)
+    found = session.correction
     assert found.made is not as_left
     assert found.rms == pytest.approx(np.sqrt(np.mean(error**2)), abs=ROUNDING)
     assert found.largest == pytest.approx(np.abs(error).max(), abs=ROUNDING)
@@ -74,29 +68,22 @@ def test_the_correction_is_how_far_pins_are_from_the_nominal_surface_when_the_fi
     assert found.rms > 0.1e-3
 
 
-@pytest.mark.parametrize("brush", PRESSED)
-def test_as_left_no_valve_is_told_anything_and_the_pins_stand_until_the_next_stroke(brush):
-    session, queued, _ = formed(brush, as_left=True)
-    later = go_on(replace(session, state=session.state.copy()), 5)
+def test_as_left_no_valve_is_told_anything_and_the_pins_stand_until_the_next_stroke():
+    session, _ = formed(Brush.LOWER, as_left=True)
     # Pins stand that move less than 10 µm within a look of 20 ms; they go on for 8 of these.
-    assert_near(heights(later), heights(session), 8e-5)
+    assert_near(heights(go_on(copy(session), 5)), heights(session), 8e-5)
     take = read_recording(session)
     assert take.orders is None or not take.orders.given
     assert replayed(take)
-    nominal, _, _ = formed(brush, as_left=False)
-    assert_near(find_error(queued, heights(nominal)), 0.0, 1e-6)
+    nominal, _ = formed(Brush.LOWER, as_left=False)
     assert read_recording(nominal).orders.given
 
 
 def test_a_stamp_is_formed_by_the_valves_whatever_the_finish_and_has_no_correction():
-    stamp = make_height_map("dot", np.ones((2, 2)))
-    ends = []
+    stamp, ends = make_height_map("dot", np.ones((2, 2))), []
     for as_left in (False, True):
-        session = begin()
-        session = replace(session, state=session.state.copy())
-        stroke = start(0, 0.0, 0.0, 5e-3, brush=Brush.STAMP, stamp=stamp, as_left=as_left)
-        session, _ = sculpting.queue_stroke(session, replace(stroke, held=False))
-        session = finish(session)
+        stroke = lay([(0.0, 0.0)], Brush.STAMP, 5.0, stamp=stamp, as_left=as_left)
+        session = form(begin(), stroke)
         assert session.correction is None
         ends.append(heights(session))
     np.testing.assert_array_equal(*ends)
@@ -104,13 +91,11 @@ def test_a_stamp_is_formed_by_the_valves_whatever_the_finish_and_has_no_correcti
 
 
 def test_the_correction_is_of_the_last_stroke_until_that_is_undone():
-    session, _, _ = formed(Brush.RAISE, as_left=True)
-    session = replace(session, state=session.state.copy())
+    session, _ = formed(Brush.RAISE, as_left=True)
     other = replace(session.scene, control=replace(session.scene.control, force_setpoint=0.5))
-    assert change_scene(session, other)[0].correction == session.correction
-    assert sculpting.rewind(session).correction is None
-    smoothed = finish(queue(session, ENDS, Brush.SMOOTH))
-    assert smoothed.correction is None
+    assert change_scene(copy(session), other)[0].correction == session.correction
+    assert sculpting.rewind(copy(session)).correction is None
+    assert form(session, lay(ENDS, Brush.SMOOTH)).correction is None
 
 
 STROKE = start(0, 1e-3, 2e-3, 4e-3, brush=Brush.RAISE)
@@ -149,11 +134,9 @@ def test_a_file_of_strokes_says_their_finish_and_an_older_one_means_nominal(tmp_
     assert (nominal.finish, left.finish) == ("nominal", "as_left")
     # An older file without a height meant 15 mm.
     assert nominal.height == 15e-3
-    made = []
     for stroke in (nominal, left):
-        *_, session = play_strokes(replace(begin(), state=begin().state.copy()), (stroke,))
-        made.append(session.correction.made)
-    assert made == [True, False]
+        *_, session = play_strokes(copy(begin()), (stroke,))
+        assert session.correction.made is (stroke is nominal)
     path.write_text(f'{table}finish = "left"\n', encoding="utf-8")
     with pytest.raises(
         SceneError, match=r"stroke #1\.finish must be one of nominal, as_left \(got 'left'\)"

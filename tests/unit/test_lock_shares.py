@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from digiclay.core.base.modes import Mode
 from digiclay.core.control.orders import share
-from digiclay.core.model.fingertip import LEVEL
 from digiclay.core.model.layout import Layout, make_grid
 from digiclay.core.scene.toml_table import resolve
 from digiclay.core.session.live_session import follow_path
@@ -17,40 +16,33 @@ from digiclay.device.instant import find_ellipsoid
 from digiclay.recorded.takes import read_recording
 from digiclay.sessions import sculpting
 from digiclay.sessions.running import find_device
-from digiclay.sessions.sculpting import queue_stroke
 from digiclay.strokes import drawn
 from digiclay.strokes.falloff import Falloff, evaluate
 from digiclay.strokes.locks import find_inside, find_locks, place_images
 from digiclay.strokes.nominal import Device, find_nominal, find_radius
 from digiclay.strokes.queue_ghosts import find_ghosts
 from digiclay.strokes.stamps import load_stamp
-from digiclay.strokes.stroke import Brush, Combine, lay_path, make_images, start
+from digiclay.strokes.stroke import Brush, Combine, make_images
 from numpy.testing import assert_array_equal
 
+from tests import strokes
 from tests.assemble import assert_near, replayed
 from tests.hand import heights
-from tests.strokes import finish
+from tests.strokes import copy, form
 
 REST, SIZE = 40e-3, 21
-LINE = ((-18e-3, 0.0), (18e-3, 0.0))
+LINE = ((-18.0, 0.0), (18.0, 0.0))
 #: Shares of pins by their columns: locked at the right, not at the left.
 SHARES = np.tile(np.linspace(0.0, 1.0, SIZE).round(2), SIZE)
 
 
-def lay(brush, places=LINE, amount=6e-3, **more):
-    return replace(lay_path(start(0, *places[0], amount, brush=brush), places), **more)
+def lay(brush, path=LINE, amount=6.0, **more):
+    return strokes.lay(path, brush, amount, **more)
 
 
-def begin(method="hybrid"):
-    tables = {"layout": {"rows": SIZE, "columns": SIZE}, "control": {"method": method}}
-    above = np.array([0.0, 0.0, 46e-3, *LEVEL])
-    return sculpting.begin_session(1, "Bed", resolve(tables), above)[0]
-
-
-def form(session, *strokes):
-    for stroke in strokes:
-        session, _ = queue_stroke(session, stroke)
-    return finish(session)
+def begin():
+    tables = {"layout": {"rows": SIZE, "columns": SIZE}, "control": {"method": "hybrid"}}
+    return strokes.begin(resolve(tables))
 
 
 def shares(session):
@@ -166,12 +158,10 @@ def test_an_area_locks_the_pins_that_come_into_it_by_the_symmetry(symmetry, coun
 
 @pytest.mark.parametrize("falloff", list(Falloff)[1:])
 def test_lock_has_the_falloff_of_its_ring_and_unlock_leaves_what_that_does_not_take(falloff):
-    path, images = ((3e-3, 0.0), (12e-3, 0.0)), make_images("Y", 2, (0.0, 9e-3))
+    path, images = ((3.0, 0.0), (12.0, 0.0)), make_images("Y", 2, (0.0, 9e-3))
     weak = {"falloff": falloff, "images": images}
-    stroke = lay(Brush.LOCK, path, **weak)
     # A strength that the header does not show counts for nothing.
-    stroke = replace(stroke, samples=tuple(replace(at, share=0.3) for at in stroke.samples))
-    session = form(begin(), stroke)
+    session = form(begin(), lay(Brush.LOCK, path, share=0.3, **weak))
     x, y = session.system.grid.x, session.system.grid.y
     distance = np.min([np.hypot(x - x.clip(3e-3, 12e-3), y - at) for at in (0.0, 18e-3)], axis=0)
     radius = find_radius(find_ellipsoid(session.scene), session.scene.layout)
@@ -190,7 +180,7 @@ def hollow():
 
 def begin_hollow(locks=SHARES):
     """Return that session with pins locked by shares, to go on with."""
-    session = replace(hollow(), state=hollow().state.copy())
+    session = copy(hollow())
     path = np.tile(session.poses, (2, 1, 1))
     session = follow_path(session, path, share(locks), session.tick)
     return replace(session, snapshot=dump(session.system, session.state))
@@ -204,12 +194,12 @@ def test_another_method_keeps_all_locks():
     assert_array_equal(heights(other), heights(session))
 
 
-CROSS = ((-12e-3, -9e-3), (12e-3, 9e-3))
+CROSS = ((-12.0, -9.0), (12.0, 9.0))
 CASES = {
     "lower": lay(Brush.LOWER, CROSS),
     "lower, sphere": lay(Brush.LOWER, CROSS, falloff=Falloff.SPHERE),
     "lower to a limit": lay(Brush.LOWER, CROSS, limits=(-7e-3, 0.0)),
-    "raise": lay(Brush.RAISE, CROSS, amount=9e-3),
+    "raise": lay(Brush.RAISE, CROSS, amount=9.0),
     "raise to the higher one": lay(Brush.RAISE, CROSS, combine=Combine.HIGHEST),
     "raise, back and forth": lay(Brush.RAISE, (*CROSS, CROSS[0]), accumulate=True),
     "level": lay(Brush.LEVEL, CROSS),
@@ -224,7 +214,6 @@ CASES = {
 @pytest.mark.parametrize("stroke", CASES.values(), ids=CASES)
 def test_what_a_brush_is_to_leave_of_a_pin_is_the_share_that_its_lock_leaves(stroke):
     before, device = heights(hollow()), find_device(begin_hollow())
-    stroke = replace(stroke, number=1)
     bare = find_nominal(stroke, replace(device, locks=1.0 * (SHARES == 1.0)), before)
     held = find_nominal(stroke, device, before)
     assert np.abs(bare.height - before)[SHARES > 0.5].max() > 0.2e-3
@@ -241,7 +230,7 @@ def test_what_a_brush_is_to_leave_of_a_pin_is_the_share_that_its_lock_leaves(str
 
 HALF = 0.5 * (SHARES > 0.5)
 FORMED = [
-    pytest.param(lay(Brush.RAISE, CROSS, amount=5e-3), SHARES, id="a finger, to the nominal form"),
+    pytest.param(lay(Brush.RAISE, CROSS, amount=5.0), SHARES, id="a finger, to the nominal form"),
     pytest.param(lay(Brush.LOWER, CROSS, as_left=True), HALF, id="a finger, as it leaves them"),
     pytest.param(lay(Brush.ERASE, CROSS), HALF, id="valves that erase"),
     pytest.param(lay(Brush.SMOOTH, CROSS), HALF, id="valves that smooth"),

@@ -7,13 +7,12 @@ from functools import cache
 import numpy as np
 import pytest
 from digiclay.core.base.errors import SceneError
-from digiclay.core.model.fingertip import LEVEL, Fingertip
+from digiclay.core.model.fingertip import Fingertip
 from digiclay.core.model.layout import Layout, make_grid
 from digiclay.core.shapes.heightmap import make_height_map
 from digiclay.recorded.pointer_strokes import PointerStroke, play_strokes, read_strokes
 from digiclay.sessions import sculpting
-from digiclay.sessions.running import find_device
-from digiclay.sessions.sculpting import queue_stroke, reset, rewind
+from digiclay.sessions.sculpting import reset, rewind
 from digiclay.settings.devices import BEDS, make_scene
 from digiclay.strokes import drawn
 from digiclay.strokes.falloff import Falloff
@@ -21,32 +20,27 @@ from digiclay.strokes.nominal import Device, extend, find_nominal
 from digiclay.strokes.queue_ghosts import find_ghosts
 from digiclay.strokes.stroke import (
     DRAGGING,
-    SHALLOWEST,
     STAMPS,
     UNLIMITED,
     Brush,
     Combine,
-    lay_path,
-    let_go,
     make_images,
-    start,
 )
 
+from tests import strokes
 from tests.assemble import assert_near, refused_in_a_line, table
 from tests.hand import heights
+from tests.strokes import find_ghost, queue
 
 PITCH, REST = BEDS["design"].pitch, 40e-3
 #: As wide as drawings need it, with the blister of the bed "design".
 GRID = make_grid(Layout(70, 70, PITCH))
 FLAT = np.full(GRID.count, REST)
-ABOVE = np.array([0.0, 0.0, 46e-3, *LEVEL])
 
 
 @cache
 def scene(count=31):
-    return make_scene(
-        BEDS["design"].preset, Layout(count, count, PITCH), BEDS["design"].method, 0.5
-    )
+    return make_scene("design", Layout(count, count, PITCH), "hybrid", 0.5)
 
 
 def device(base=FLAT):
@@ -61,19 +55,18 @@ EXTREME = {Brush.RAISE: Combine.HIGHEST, Brush.LOWER: Combine.LOWEST}
 
 def lay(path, brush=Brush.RAISE, amount=8.0, **more):
     """Return a stroke along a path, mm, on the base unless told."""
-    places = 1e-3 * np.asarray(path, float)
     more = {"combine": EXTREME.get(brush, Combine.USUAL)} | more
-    return lay_path(start(0, *places[0], 1e-3 * amount, brush=brush, **more), places)
+    return strokes.lay(path, brush, amount, **more)
 
 
-def form(strokes, surface=FLAT, base=FLAT):
+def form(laid, surface=FLAT, base=FLAT):
     """Return the heights (n,), m, that strokes leave one after the other."""
-    for stroke in strokes:
+    for stroke in laid:
         surface = find_nominal(stroke, device(base), surface).height
     return surface
 
 
-def bow(x, y, radius, first, last, count=40):
+def bow(x, y, radius, first, last, count=20):
     """Return places on a circle, mm, between two angles, degrees."""
     turn = np.radians(np.linspace(first, last, count))
     return np.column_stack([x + radius * np.cos(turn), y + radius * np.sin(turn)])
@@ -229,31 +222,30 @@ def test_nothing_that_a_stroke_forms_is_beyond_its_limits(brush, limits, surface
     assert (1e3 * left.min(), 1e3 * left.max()) == pytest.approx((lowest, highest), abs=1e-9)
 
 
-def set_base():
-    return let_go(start(0, 0.0, 0.0, SHALLOWEST, brush=Brush.SET_BASE))
+SET_BASE = lay([(0, 0)], Brush.SET_BASE)
 
 
 def test_the_ghost_of_a_queue_counts_from_the_base_that_the_queue_sets():
     first, second = lay(LINE), lay([(0, -20), (0, 20)])
-    strokes = tuple(
-        replace(each, number=n) for n, each in enumerate([first, second, set_base(), second])
+    laid = tuple(
+        replace(each, number=n) for n, each in enumerate([first, second, SET_BASE, second])
     )
-    ghosts = find_ghosts(strokes, device(), FLAT)
+    ghosts = find_ghosts(laid, device(), FLAT)
     met = form([first, second])
     np.testing.assert_array_equal(ghosts[1].nominal.height, met)
     np.testing.assert_array_equal(ghosts[-1].nominal.height, form([second], met, met))
     # The same path on another base is found anew; on the same one it stays.
-    kept = find_ghosts(strokes[:1], device(), FLAT)
-    assert find_ghosts(strokes[:1], device(OTHER), FLAT, kept)[0].nominal is not kept[0].nominal
-    same = replace(device(), base=kept[0].device.base)
-    assert find_ghosts(strokes[:1], same, FLAT, kept)[0].nominal is kept[0].nominal
+    (former,) = find_ghosts(laid[:1], device(), FLAT)
+    for base, same in ((OTHER, False), (former.device.base, True)):
+        (ghost,) = find_ghosts(laid[:1], device(base), FLAT, (former,))
+        assert (ghost.nominal is former.nominal) == same
 
 
 @pytest.mark.parametrize(
     "look",
     [
         pytest.param(
-            lambda crept: ((set_base(), lay(LINE)), device(OTHER), FLAT + crept), id="queued"
+            lambda crept: ((SET_BASE, lay(LINE)), device(OTHER), FLAT + crept), id="queued"
         ),
         pytest.param(lambda crept: ((lay(LINE),), device(OTHER + crept), FLAT), id="set"),
     ],
@@ -266,7 +258,7 @@ def test_a_ghost_on_a_new_base_stays_while_pins_creep_but_not_in_small_steps_for
 
 
 def begin(count=31):
-    return sculpting.begin_session(7, "Bed", scene(count), ABOVE)[0]
+    return strokes.begin(scene(count))
 
 
 @pytest.mark.parametrize(
@@ -283,71 +275,50 @@ def begin(count=31):
 )  # fmt: skip
 def test_a_session_takes_up_a_base_unless_its_snapshot_is_refused(store, lost, has_base):
     base, session = np.full(81, REST + 1e-3), begin(9)
-    again, words = sculpting.begin_session(7, "Bed", scene(9), ABOVE, store(session), base=base)
+    again, words = sculpting.begin_session(
+        7, "Bed", session.scene, session.pose, store(session), base=base
+    )
     assert words.startswith(lost)
     assert (words == "") == (lost == "")
     np.testing.assert_array_equal(again.base, base if has_base else heights(again))
 
 
-def queue(session, *strokes):
-    for stroke in strokes:
-        session, _ = queue_stroke(session, stroke)
-    return session
-
-
-def finish(session):
-    """Return the session when its strokes are formed, and the largest force, N, of the fingertip."""
-    force = 0.0
-    while session.strokes:
-        session = sculpting.follow_finger(session, session.pose, 16)
-        force = max(force, float(session.trace.force.max(initial=0.0)))
-    return session, force
-
-
 SMALL_R = [
     [(-8, -14), (-8, 14)],
-    np.vstack([[(-8, 13)], bow(0, 7, 6, 90, -90, 20), [(-8, 1)]]),
+    np.vstack([[(-8, 13)], bow(0, 7, 6, 90, -90), [(-8, 1)]]),
     [(0, 1), (9, -14)],
 ]
+#: A valley across a ridge.
+ACROSS_A_RIDGE = [lay([(-14, 0), (14, 0)]), lay([(0, -14), (0, 14)], Brush.LOWER, 4.0)]
 
 
-@pytest.mark.parametrize("brush, amount", [(Brush.RAISE, 8.0), (Brush.LOWER, 4.0)])
-def test_an_r_of_three_strokes_is_formed_as_its_ghost_shows_and_no_finger_is_pressed_hard(
-    brush, amount
-):
-    session = queue(begin(), *(lay(path, brush, amount) for path in SMALL_R))
-    ghost = find_ghosts(session.strokes, find_device(session), heights(session))[-1].nominal
-    done, force = finish(session)
+@table(
+    "laid",
+    {
+        "an R of three ridges": [lay(path) for path in SMALL_R],
+        "a valley with flanks across a ridge": ACROSS_A_RIDGE,
+    },
+)
+def test_strokes_that_meet_are_formed_as_their_ghost_shows_and_no_finger_is_pressed_hard(laid):
+    session = begin()
+    ghost = find_ghost(queue(session, *laid))
+    assert (ghost.stepped is not None) == (laid is ACROSS_A_RIDGE)
+    done = strokes.form(session, *laid)
     # A pin has arrived within half a micrometer, and its valve still lets as much through.
     assert_near(heights(done), ghost.height, 1.5e-6)
-    off = 1e3 * np.abs(heights(done) - REST)
-    assert off.max() == pytest.approx(amount, abs=0.01)
+    assert 1e3 * (heights(done).max() - REST) == pytest.approx(8.0, abs=0.01)
     # As elsewhere on a formed bed: a hand presses with 1 N.
-    assert force < 2.0
-
-
-def test_the_valves_form_the_flanks_across_a_ridge():
-    session, _ = finish(queue(begin(21), lay([(-14, 0), (14, 0)])))
-    session = queue(session, lay([(0, -14), (0, 14)], Brush.LOWER, 4.0))
-    ghost = find_ghosts(session.strokes, find_device(session), heights(session))[-1].nominal
-    assert ghost.stepped is not None
-    assert_near(heights(finish(session)[0]), ghost.height, 1.5e-6)
-
-
-def test_what_erase_leaves_keeps_to_its_limits():
-    session, _ = finish(queue(begin(21), lay([(-9, 0), (9, 0)])))
-    done, _ = finish(queue(session, lay([(-9, 0), (9, 0)], Brush.ERASE, limits=(3e-3, 1.0))))
-    ring = done.system.grid.disc(0.0, 0.0, 3.9e-3)
-    assert_near(1e3 * (heights(done)[ring] - REST), 3.0, 0.01)
+    assert done.trace.force.max() < 2.0
 
 
 def test_set_base_is_a_gesture_and_a_reset_brings_the_base_to_rest():
-    session, _ = finish(queue(begin(), lay([(-9, 0), (9, 0)])))
+    ridge = lay([(-9, 0), (9, 0)])
+    session = strokes.form(begin(25), ridge)
     assert (session.base == REST).all()
-    based, _ = finish(queue(session, set_base()))
+    based = strokes.form(session, SET_BASE)
     np.testing.assert_array_equal(based.base, heights(based))
     assert len(based.gestures) == len(session.gestures) + 1
-    twice, _ = finish(queue(based, lay([(-9, 0), (9, 0)])))
+    twice = strokes.form(based, ridge)
     assert 1e3 * (heights(twice).max() - REST) == pytest.approx(16.0, abs=0.1)
     back = rewind(rewind(twice))
     assert (back.base == REST).all()
@@ -411,14 +382,12 @@ def test_a_file_of_strokes_that_cannot_combine_so_is_refused(tmp_path, text, sai
 def test_a_file_of_strokes_sets_a_base_and_limits():
     line = {"brush": "raise", "combine": "highest", "height": 6e-3, "path": "line"}
     moves = ((0.0, -9e-3, 0.0), (0.2, 9e-3, 0.0))
-    strokes = [PointerStroke(**line, moves=moves), PointerStroke(**line, moves=moves)]
-    assert strokes[0].limits == UNLIMITED
-    *_, once = play_strokes(begin(21), tuple(strokes))
-    assert 1e3 * (heights(once).max() - REST) == pytest.approx(6.0, abs=0.01)
-    strokes.insert(1, PointerStroke(brush="set_base"))
-    strokes[-1] = replace(strokes[-1], limit_high=9e-3)
-    *_, twice = play_strokes(begin(21), tuple(strokes))
-    assert 1e3 * (heights(twice).max() - REST) == pytest.approx(9.0, abs=0.01)
+    ridge = PointerStroke(**line, moves=moves)
+    assert ridge.limits == UNLIMITED
+    based = ridge, PointerStroke(brush="set_base"), replace(ridge, limit_high=9e-3)
+    for played, height in (((ridge, ridge), 6.0), (based, 9.0)):
+        *_, session = play_strokes(begin(21), played)
+        assert 1e3 * (heights(session).max() - REST) == pytest.approx(height, abs=0.01)
 
 
 LIMITS = {"limits": (7e-3, 1.0)}
@@ -435,7 +404,7 @@ LIMITS = {"limits": (7e-3, 1.0)}
 def test_the_fingertip_goes_along_what_is_beyond_that_which_its_stroke_forms(
     first, combine, limits
 ):
-    session, _ = finish(queue(begin(), lay([(0, -14), (0, 14)], first)))
+    session = strokes.form(begin(), lay([(0, -14), (0, 14)], first))
     session = queue(session, lay([(-14, 0), (14, 0)], Brush.LEVEL, combine=combine, **limits))
     places = []
     while session.strokes:

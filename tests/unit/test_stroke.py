@@ -17,18 +17,20 @@ from digiclay.press.pointer import (
 )
 from digiclay.sessions import sculpting
 from digiclay.sessions.running import find_stroke
-from digiclay.sessions.sculpting import drop_strokes, queue_stroke
+from digiclay.sessions.sculpting import drop_strokes
 from digiclay.strokes import motion
 from digiclay.strokes.nominal import Device
 from digiclay.strokes.pose import lean_finger, turn_image, turn_toward
 from digiclay.strokes.stroke import (
     ALONE,
     DEEPEST,
+    Brush,
     deepen,
     draw,
     lay_line,
     lay_path,
     lay_ring,
+    let_go,
     make_images,
     pull,
     start,
@@ -36,7 +38,8 @@ from digiclay.strokes.stroke import (
 from numpy.testing import assert_allclose, assert_array_equal
 
 from tests.assemble import table
-from tests.hand import TICK, finish, let_go, risen, started
+from tests.hand import TICK, risen, started
+from tests.strokes import form, lay, queue
 
 pytestmark = pytest.mark.usefixtures("quick_machine")
 
@@ -51,12 +54,9 @@ AT = np.array([0.0, 0.0, 0.046, *LEVEL])
 DEVICE = Device(CELLS, Fingertip(), None, 0.08)
 
 
-def line(end=0.02, moves=20, images=ALONE, lean=(0.0, 0.0)):
-    """Return a stroke drawn evenly along x from (0, 5) mm on, 4 mm deep, that the hand still holds."""
-    stroke = start(1, 0.0, 0.005, 4e-3, images, lean=lean)
-    for part in np.arange(1, moves + 1) / moves:
-        stroke = draw(stroke, part * end, 0.005, 4e-3, lean=lean)
-    return stroke
+def line(moves=20, **more):
+    """Return a stroke along x from (0, 5) mm to (20, 5) mm, 4 mm deep, in so many moves."""
+    return lay(np.linspace((0.0, 5.0), (20.0, 5.0), moves + 1), Brush.LOWER, **more)
 
 
 def begin(stroke, bed=HEIGHT, at=AT):
@@ -91,11 +91,6 @@ def lead(stroke, at, chunk=4000, bed=HEIGHT, creep=0.0):
     return stroke, np.array(poses)
 
 
-def release(stroke):
-    """Return a stroke that the hand has let go."""
-    return replace(stroke, held=False)
-
-
 def pressed(poses):
     """Return the poses at full depth."""
     return poses[np.abs(poses[:, 2] - 0.036) < 1e-9]
@@ -103,7 +98,7 @@ def pressed(poses):
 
 @pytest.mark.parametrize("moves", [1, 20, 1000])
 def test_the_finger_goes_along_the_whole_path_however_quick_the_hand(moves):
-    stroke, poses = path(release(line(moves=moves)))
+    stroke, poses = path(line(moves=moves))
     assert stroke.done
     assert poses[np.argmax(poses[:, 2] <= 0.036 + 1e-9), 0] == 0.0  # first to its depth
     down = pressed(poses)
@@ -120,7 +115,7 @@ def test_the_finger_goes_along_the_whole_path_however_quick_the_hand(moves):
 def test_the_way_follows_from_the_path_alone_and_is_never_ahead_of_the_hand(
     away, fingers, chunk, shown
 ):
-    whole = release(line(images=make_images("X", center=(-away, 0.0))))
+    whole = line(images=make_images("X", center=(-away, 0.0)))
     at = waiting(fingers)
     part = begin(replace(whole, samples=whole.samples[:shown], held=True))
     part, first = lead(part, at, chunk)
@@ -150,10 +145,9 @@ def test_the_way_follows_from_the_path_alone_and_is_never_ahead_of_the_hand(
     },
 )
 def test_of_images_that_are_near_one_gives_way(drawn, images, pressing, longer, nearest):
-    places = 1e-3 * np.linspace(*np.array(drawn, float), 57)
-    stroke = begin(lay_path(start(1, 0.0, 0.0, 4e-3, images), places))
-    alone = len(path(lay_path(start(1, 0.0, 0.0, 4e-3), places))[1])
-    done, poses = lead(stroke, waiting(len(images)))
+    places = np.linspace(*np.array(drawn, float), 57)
+    alone = len(path(lay(places, Brush.LOWER))[1])
+    done, poses = lead(begin(lay(places, Brush.LOWER, images=images)), waiting(len(images)))
     assert done.done
     assert len(poses) - alone <= longer
     down = poses[..., 2] < 40e-3
@@ -165,22 +159,21 @@ def test_of_images_that_are_near_one_gives_way(drawn, images, pressing, longer, 
     assert apart.min() >= 1e-3 * nearest - 1e-9
     pressed_at = poses[..., :2][poses[..., 2] < 36e-3 + 1e-9]
     for image in images:
-        for place in places[[0, 20, -1]]:
+        for place in 1e-3 * places[[0, 20, -1]]:
             assert np.linalg.norm(pressed_at - image.place(*place), axis=1).min() < 1.5e-3
 
 
 def test_one_that_waits_comes_down_although_pins_creep_up():
-    places = 1e-3 * np.linspace([4.0, -28.0], [4.0, 28.0], 57)
-    stroke = lay_path(start(1, 0.0, 0.0, 4e-3, make_images("X")), places)
-    stroke = begin(stroke)
-    assert lead(stroke, waiting(2), 1, creep=5e-9)[0].done
+    places = np.linspace([4.0, -28.0], [4.0, 28.0], 57)
+    stroke = lay(places, Brush.LOWER, images=make_images("X"))
+    assert lead(begin(stroke), waiting(2), 1, creep=5e-9)[0].done
 
 
 @pytest.mark.parametrize(
     "bed, lowest, end", [(HEIGHT, 36e-3, 59e-3), (HEIGHT * 0 + 1e-3, 0.0, None)]
 )
 def test_a_click_presses_no_deeper_than_the_floor_and_ends_above_all_pins(bed, lowest, end):
-    stroke, poses = path(release(start(1, 0.01, 0.005, 4e-3)), bed=bed)
+    stroke, poses = path(lay([(10.0, 5.0)], Brush.LOWER), bed=bed)
     assert stroke.done
     z = poses[:, 2]
     assert z.min() == pytest.approx(lowest, abs=1e-9)
@@ -220,7 +213,7 @@ IMAGES = {
 @pytest.mark.parametrize("name", IMAGES)
 def test_the_finger_goes_along_the_path_and_along_each_of_its_images(name):
     images, turn = IMAGES[name]
-    stroke, poses = path(release(line(images=images)))
+    stroke, poses = path(line(images=images))
     assert stroke.done
     down = pressed(poses)
     for end in (0.005j, 0.02 + 0.005j):
@@ -234,7 +227,7 @@ def test_the_finger_goes_along_the_path_and_along_each_of_its_images(name):
 def test_a_finger_slows_down_above_the_highest_pin_below_it():
     # 1 mm beyond where the surface below the finger counts.
     beside = np.where(CELLS.x > 5e-3, 0.050, 0.040)
-    _, poses = path(release(start(1, 0.0, 0.0, 4e-3)), bed=beside)
+    _, poses = path(lay([(0.0, 0.0)], Brush.LOWER), bed=beside)
     z = poses[:, 2]
     cells = np.hypot(CELLS.x, CELLS.y) < 8e-3
     gap = 8e-3 - np.sqrt(64e-6 - (CELLS.x**2 + CELLS.y**2)[cells])
@@ -311,7 +304,7 @@ def test_a_pen_that_is_jerked_turns_the_finger_no_faster_than_a_hand_to_its_aim(
     assert_allclose(angles, [0.1] * 5 + [0.0], atol=1e-7)
     assert_allclose(matrix(turn), matrix(aim), atol=1e-12)
     stroke = draw(start(1, 0.0, 0.0, 4e-3), 0.02, 0.0, 4e-3, lean=(0.8, 0.0))
-    down = pressed(path(release(stroke))[1])
+    down = pressed(path(let_go(stroke))[1])
     turned = 2.0 * np.arccos(np.clip(np.abs((down[1:, 3:] * down[:-1, 3:]).sum(1)), 0.0, 1.0))
     assert 0.5 * motion.TURN * PERIOD < turned.max() <= motion.TURN * PERIOD * (1.0 + 1e-6)
 
@@ -319,9 +312,7 @@ def test_a_pen_that_is_jerked_turns_the_finger_no_faster_than_a_hand_to_its_aim(
 @pytest.mark.parametrize("name", ["none", "both", "three turns"])
 def test_the_finger_leans_with_the_pen_on_each_image_and_ends_as_it_began(name):
     images = IMAGES[name][0]
-    stroke, poses = path(
-        release(line(images=images, lean=(0.4, 0.2))), np.array([*AT[:3], *TWISTED])
-    )
+    stroke, poses = path(line(images=images, lean=(0.4, 0.2)), np.array([*AT[:3], *TWISTED]))
     assert stroke.done
     assert_array_equal(poses[-1, 3:], TWISTED)
     down = pressed(poses)
@@ -334,34 +325,24 @@ def test_the_finger_leans_with_the_pen_on_each_image_and_ends_as_it_began(name):
 
 
 def test_a_stroke_that_is_dropped_leaves_a_finger_that_does_not_lean():
-    session, number = queue_stroke(started(), start(0, 0.0, 0.0, 4e-3, lean=(0.5, 0.0)))
+    held = start(0, 0.0, 0.0, 4e-3, lean=(0.5, 0.0))
+    session = queue(started(), held)
     before = session.pose[3:].copy()
     for step in range(1, 10):
         session = sculpting.advance(session, session.pose, step * TICK, 100)
-    assert find_stroke(session, number) is not None
+    assert len(session.strokes) == 1
     assert abs(session.pose[3:] @ before) < 0.99
     assert_array_equal(drop_strokes(session).pose[3:], before)
 
 
-DEPTH = 4e-3
-#: A pin that a finger of 4 mm depth has pressed is lower than this, m.
-FORMED = -2e-3
-
-
-def tap(session, x, y):
-    """Queue a click, mm."""
-    session, number = queue_stroke(session, start(0, 1e-3 * x, 1e-3 * y, DEPTH))
-    return let_go(session, number)
-
-
 def test_of_several_the_last_is_taken_back_first_and_never_begins():
-    session = tap(tap(started(), -15.0, 0.0), 15.0, 0.0)
+    session = queue(started(), *(lay([(x, 0.0)], Brush.LOWER) for x in (-15.0, 15.0)))
     number = session.strokes[-1].number
     assert sculpting.reset(session).strokes == ()
     back = sculpting.rewind(session)
     assert find_stroke(back, number) is None
-    done = finish(back)
-    assert risen(done, -15.0, 0.0) < FORMED
+    done = form(back)
+    assert risen(done, -15.0, 0.0) < -2e-3  # of 4 mm
     assert risen(done, 15.0, 0.0) == 0.0
 
 

@@ -8,8 +8,7 @@ from digiclay.compat import curves
 from digiclay.core.base.errors import DigiclayError
 from digiclay.core.base.modes import COLORS
 from digiclay.core.engine.bodies import PlacedMesh
-from digiclay.core.session import snapshot
-from digiclay.core.session.take import from_bytes, play, to_bytes
+from digiclay.core.session.take import from_bytes, to_bytes
 from digiclay.device import view
 from digiclay.live import handlers, tick
 from digiclay.overlay import views
@@ -19,7 +18,7 @@ from digiclay.roles import PRESSES, bed_of, list_pressers
 from digiclay.sessions import running, sculpting
 from digiclay.strokes.stroke import make_images, start
 
-from tests.assemble import assert_near
+from tests.assemble import assert_near, replayed
 from tests.blender.at_hand import delete, done, looked, save_and_open, select
 from tests.blender.session.balls import ABOVE, place, press, sphere
 from tests.blender.session.live import exact, goes_on, only_bed, shown, started, waits
@@ -235,8 +234,7 @@ def test_a_take_of_a_mesh_is_replayed_to_the_bit_and_baked(bed, ball, clock, how
     bpy.ops.digiclay.session_reset()
     assert bpy.ops.digiclay.take_replay() == {"FINISHED"}
     np.testing.assert_array_equal(exact(bed), formed)
-    *_, (system, state) = play(read)
-    assert snapshot.dump(system, state) == take.end
+    assert replayed(read)
     assert bpy.ops.digiclay.bake(source="TAKE", take=entry.number) == {"FINISHED"}
     bpy.context.scene.frame_set(200)
     # The last frame shows a period before the end, in which pins still move.
@@ -321,8 +319,7 @@ def test_strokes_and_their_images_are_formed_beside_a_mesh_and_kept_in_a_take(be
     assert np.abs(formed - sphere(bed))[pressed].max() < 0.1e-3
     assert np.count_nonzero(formed[~pressed] < 39e-3) > 6
     take = takes.read_recording(session)
-    *_, (system, state) = play(take)
-    assert snapshot.dump(system, state) == take.end
+    assert replayed(take)
 
 
 def test_recorded_strokes_are_played_on_a_bed_that_a_mesh_presses(bed, ball, tmp_path):
@@ -372,5 +369,4 @@ def test_what_is_taken_back_while_a_mesh_is_recorded_is_in_no_take(bed, ball, cl
     clock.tick(3)
     assert (exact(bed) - first).min() < -1e-3
     take = from_bytes(to_bytes(takes.read_recording(running.find(bed))))
-    *_, (system, state) = play(take)
-    assert snapshot.dump(system, state) == take.end
+    assert replayed(take)
