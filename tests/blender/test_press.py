@@ -1,5 +1,7 @@
 """The Press tool: where the mouse points, size and presets of the brush, and strokes that a script plays."""
 
+from dataclasses import astuple
+
 import bpy
 import digiclay
 import numpy as np
@@ -18,7 +20,7 @@ from digiclay.sessions import running
 from digiclay.settings import devices, properties
 from digiclay.strokes.stroke import Brush
 
-from tests.assemble import assert_near
+from tests.assemble import assert_near, table
 from tests.blender.at_hand import in_the_view, new_bed
 
 #: How much larger the bed is than it is added: it then fills a good part of the factory file's
@@ -74,6 +76,12 @@ def test_the_tool_comes_and_goes_with_the_extension():
         assert tools() == []
 
 
+def find_eye(bed, context):
+    """Return the place of the eye in a bed's space, m."""
+    eye = context.region_data.view_matrix.inverted().translation
+    return np.array(bed.matrix_world.inverted() @ eye) / bridge.SCALE
+
+
 def test_a_pixel_on_the_top_of_a_pin_points_at_that_pin(bed, context):
     cells, height = aim.read_surface(bed)
     tops = np.column_stack([cells.positions, height])
@@ -83,10 +91,7 @@ def test_a_pixel_on_the_top_of_a_pin_points_at_that_pin(bed, context):
     near = np.array([found.point for found in met])
     # A pin may hide another; whatever is met lies in front of the top that was asked for, on the
     # same ray.
-    eye = np.array(
-        bed.matrix_world.inverted() @ context.region_data.view_matrix.inverted().translation
-    )
-    eye /= bridge.SCALE
+    eye = find_eye(bed, context)
     visible = np.array([found.pin for found in met]) == np.arange(cells.count)
     assert visible.sum() > 0.9 * cells.count
     # Blender's matrices are float32, at a distance of 2 m of the device.
@@ -105,10 +110,7 @@ def test_a_place_in_the_view_agrees_with_blenders_own_projection(bed, context):
     # A thousandth of a pixel: theirs is reckoned in float32.
     assert_near(bridge.project(context, bed, place)[0], theirs, 1e-2)
     # What lies behind the eye is nowhere on the screen.
-    eye = np.array(
-        bed.matrix_world.inverted() @ context.region_data.view_matrix.inverted().translation
-    )
-    assert np.isnan(bridge.project(context, bed, 1.5 * eye[None] / bridge.SCALE)).all()
+    assert np.isnan(bridge.project(context, bed, 1.5 * find_eye(bed, context)[None])).all()
 
 
 def test_a_hidden_or_unevenly_scaled_bed_is_looked_through_and_says_why(bed, context):
@@ -148,22 +150,24 @@ def test_the_patch_lies_on_the_pins_about_the_mouse_as_wide_as_the_finger_presse
     assert_near(rim.mean(axis=0), 0.0, 1e-9)
 
 
-def test_the_text_beside_the_cursor_names_brush_and_height_or_depth_with_its_unit():
-    finger = Fingertip()
-    assert brush.describe_brush(finger, Brush.RAISE, 15e-3) == "Size 16 mm   Raise, height 15 mm"
-    assert (
-        brush.describe_brush(finger, Brush.LOWER, 4e-3, 0.5)
-        == "Size 16 mm   Lower, depth 4 mm × 50 %"
-    )
-    assert brush.describe_brush(finger, Brush.LEVEL, 4e-3) == "Size 16 mm   Level 100 %"
-    assert brush.describe_brush(finger, Brush.SMOOTH, 4e-3, 0.8) == "Size 16 mm   Smooth 80 %"
-    assert brush.describe_brush(finger, Brush.UNLOCK, 4e-3) == "Size 16 mm   Unlock"
-    assert brush.describe_brush(finger, Brush.STAMP, 4e-3) == "Size 16 mm   Stamp, height 4 mm"
-    assert [one for one in Brush if brush.amount_name(one) == "height"] == [
-        Brush.RAISE,
-        Brush.STAMP,
-        Brush.CREST,
-    ]
+@table(
+    "shown, words",
+    {
+        "raised": ((Brush.RAISE, 15e-3), "Raise, height 15 mm"),
+        "in part": ((Brush.LOWER, 4e-3, 0.5), "Lower, depth 4 mm × 50 %"),
+        "leveled": ((Brush.LEVEL, 4e-3), "Level 100 %"),
+        "smoothed": ((Brush.SMOOTH, 4e-3, 0.8), "Smooth 80 %"),
+        "unlocked": ((Brush.UNLOCK, 4e-3), "Unlock"),
+        "stamped": ((Brush.STAMP, 4e-3), "Stamp, height 4 mm"),
+    },
+)
+def test_the_text_beside_the_cursor_names_brush_and_height_or_depth_with_its_unit(shown, words):
+    assert brush.describe_brush(Fingertip(), *shown) == f"Size 16 mm   {words}"
+
+
+def test_brushes_that_raise_have_a_height():
+    high = {kind for kind in Brush if brush.amount_name(kind) == "height"}
+    assert high == {Brush.RAISE, Brush.STAMP, Brush.CREST}
 
 
 @pytest.fixture
@@ -176,10 +180,8 @@ def paper(extension):
 def lengths(paper):
     """Return size of the fingertip, then radius, edge and flat radius of the blister, mm."""
     scene = properties.scene_of(paper)
-    blister = scene.blister
     width = 2.0 * scene.fingers[0].fingertip.width
-    lengths = (width, blister.radius, blister.edge_radius, blister.flat_radius)
-    return tuple(round(1e3 * length, 4) for length in lengths)
+    return tuple(round(1e3 * length, 4) for length in (width, *astuple(scene.blister)[:3]))
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,6 @@ import pytest
 import trimesh
 from digiclay import bridge
 from digiclay.core.scene.scene_source import load
-from digiclay.core.session import snapshot
 from digiclay.core.session.run_scene import run
 from digiclay.core.session.take import play
 from digiclay.core.shapes.body import read_bodies
@@ -106,8 +105,7 @@ def test_a_fingertip_of_a_scene_with_bodies_is_shown(file):
 def test_a_scene_is_formed_in_its_take_live_and_by_the_take_as_a_scene(file, clock, tmp_path):
     done = run(load(file)).history["height"][-1]
     bed, _ = opened(file)
-    *_, (system, state) = play(takes.read(bed))
-    assert snapshot.dump(system, state) == takes.read(bed).end
+    *_, (_, state) = play(takes.read(bed))
     # Undersides are computed at other times.
     assert np.abs(state.row(0) - done).max() < 0.1e-3
     started(bed)
