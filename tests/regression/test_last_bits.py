@@ -298,9 +298,6 @@ def test_a_disc_holds_the_cells_on_its_edge_in_a_batch_as_alone(arrangement):
         for number, middle in enumerate(middles.tolist()):
             alone = grid.disc(*middle, radius)
             np.testing.assert_array_equal(together[:, number].nonzero()[0], alone)
-            np.testing.assert_array_equal(
-                grid.cover(([x[number]], [y[number]], [radius])).nonzero()[0], alone
-            )
 
 
 def test_a_fingertip_that_hovers_exactly_on_a_pin_changes_nothing_of_what_another_presses_there():

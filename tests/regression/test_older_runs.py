@@ -103,20 +103,28 @@ def test_python_reads_an_older_folder(name):
 
 @pytest.mark.parametrize("name", RECORDED)
 def test_commands_read_an_older_folder(name, tmp_path, capsys):
-    export = ["export", "--format", "stl,3mf", "--kind", "features"]
-    for command, files in (
-        (export, {"features.stl", "features.3mf"}),
-        (["plot"], {"session.png", "surface.png"}),
-    ):
-        out = tmp_path / command[0]
-        assert main([command[0], str(RUNS / name), *command[1:], "--out", str(out), "--quiet"]) == 0
-        assert {path.name for path in out.iterdir()} == files
+    export = ["export", str(RUNS / name), "--format", "stl,3mf", "--kind", "features", "--quiet"]
+    assert main([*export, "--out", str(tmp_path / "export")]) == 0
+    assert {path.name for path in (tmp_path / "export").iterdir()} == {
+        "features.stl",
+        "features.3mf",
+    }
     assert main(["features", str(RUNS / name), "--json"]) == 0
     assert [feature["kind"] for feature in json.loads(capsys.readouterr().out)] == ["boss"]
 
 
+def test_an_older_folder_is_plotted_and_its_pins_form_a_shape(tmp_path):
+    name = RUNS / "cell_states_every_7"
+    assert main(["plot", str(name), "--quiet", "--out", str(tmp_path / "plot")]) == 0
+    files = {path.name for path in (tmp_path / "plot").iterdir()}
+    assert files == {"session.png", "surface.png"}
+    form = ["form", "pyramid", "--scene", str(name), "--quiet", "--out", str(tmp_path / "form")]
+    assert main(form) == 0
+    assert (tmp_path / "form" / "surface.stl").stat().st_size > 0
+
+
 @pytest.mark.parametrize("name", ALL)
-def test_an_older_folder_is_a_scene_for_run_and_form_and_may_be_replaced(name, tmp_path):
+def test_an_older_folder_is_a_scene_for_run_and_may_be_replaced(name, tmp_path):
     older = tmp_path / "older"
     shutil.copytree(RUNS / name, older)
     command = ["run", str(RUNS / "without_recorder"), "--no-errors", "--quiet", "--out", str(older)]
@@ -124,15 +132,3 @@ def test_an_older_folder_is_a_scene_for_run_and_form_and_may_be_replaced(name, t
     assert main([*command, "--overwrite"]) == 0
     assert not (older / "history.npz").exists()
     assert metrics_of(older)["scene"] == "stroke"
-    if name in RECORDED:
-        form = [
-            "form",
-            "pyramid",
-            "--scene",
-            str(RUNS / name),
-            "--quiet",
-            "--out",
-            str(tmp_path / "form"),
-        ]
-        assert main(form) == 0
-        assert (tmp_path / "form" / "surface.stl").stat().st_size > 0

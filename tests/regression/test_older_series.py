@@ -72,7 +72,7 @@ def test_an_older_sweep_that_was_stopped_goes_on_to_the_same_table():
         Path(f"sweep/points/{index:06d}.json").unlink()
     Path("sweep/sweep.csv").unlink()
     before = times("sweep/points/*")
-    assert main([*SWEEP, "--workers", "2"]) == 0
+    assert main([*SWEEP, "--workers", "1"]) == 0
     assert before.items() <= times("sweep/points/*").items()
     expected = [(anew if index % 2 else stored)[index] for index in range(10)]
     for row, values in zip(numbers(Path("sweep/sweep.csv")), expected, strict=True):

@@ -111,16 +111,6 @@ def test_numbers_of_numpy_and_pandas_are_numbers_in_tables(number):
 @pytest.mark.parametrize(
     "content, changes, message",
     [
-        (
-            {"contrl": {}},
-            None,
-            "contrl must be a known key (got an empty section). Did you mean control?",
-        ),
-        (
-            {"valve": {"orifice_diameter": "3 s"}},
-            {},
-            "valve.orifice_diameter must be in m or a multiple",
-        ),
         ("no_such_scene", None, "no_such_scene is neither a file nor a sample"),
         (7, None, "A scene must be tables, a file or a name (got 7)."),
         ({"control": np.array([1, 2])}, None, "control must be a section, [control]"),
@@ -132,26 +122,11 @@ def test_numbers_of_numpy_and_pandas_are_numbers_in_tables(number):
         ("tap", [1], "Changes must be a table of keys and values (got [1])."),
         (
             "tap",
-            {"control.force_gian": 3},
-            "changes: control.force_gian must be a known key (got 3). Did",
-        ),
-        (
-            "tap",
             {"control": {"force_gain": float("nan")}},
             "changes: control.force_gain must be a finite",
         ),
         ("tap", {"control.force_gain": None}, "changes: control.force_gain must be a number"),
-        (
-            "tap",
-            {"control.force_gain": "3"},
-            "changes: control.force_gain must have a unit known here",
-        ),
         ("tap", {3: 4}, "changes: 3 must be a known key (got 4)"),
-        (
-            "tap",
-            {"control.method": "hybird"},
-            "changes: control.method must be one of virtual_master, ",
-        ),
         (
             "tap",
             {"control.method": int},
@@ -198,14 +173,12 @@ def test_a_wrong_scene_is_refused_in_one_line(content, changes, message):
             lambda scene: scene.with_sections(layot=3),
             "layot must be a known key (got 3). Did you mean layout",
         ),
-        (lambda scene: scene.with_sections(layout=3), "layout must be Layout (got int)."),
         (lambda scene: scene.with_sections(valve=None), "valve must be Valve or Motor (got None)."),
         (
             lambda scene: scene.with_sections(fingertip=scene.valve),
             "fingertip must be Fingertip or None (got Valve)",
         ),
         (lambda scene: replace(scene, fingers=[1]), "fingers must be a tuple of Finger (got [1])."),
-        (lambda scene: scene.with_sections(trajectory=None), "trajectory must be Path (got None)."),
     ],
 )
 def test_a_scene_has_only_parts_of_its_sections_and_its_method(tap, change, message):

@@ -242,7 +242,6 @@ def test_a_history_has_the_creep_of_idle_cells_and_says_why_it_has_no_error():
             {"drive": {"line_lag": 1e-3, "leak": 1e-3, "trapped_volume": 1e-9}},
             "drive.trapped_volume must be 0 with drive.leak",
         ),
-        "a leak of all": ({"drive": {"line_lag": 1e-3, "leak": 1.0}}, "leak must be below 1"),
         "gates quicker than any": (
             {"drive": {"line_lag": 1e-300}},
             "drive.line_lag must be 0 or at least 1e-09 s",
@@ -251,8 +250,6 @@ def test_a_history_has_the_creep_of_idle_cells_and_says_why_it_has_no_error():
             {"drive": {"line_lag": 1e-3, "slot": 10e-3, "overlap": 11e-3}},
             "drive.overlap must be at most a slot, 0.01 s",
         ),
-        "a lag below 0": ({"drive": {"line_lag": -1.0}}, "line_lag must be at least 0 s"),
-        "no number": ({"drive": {"line_lag": math.nan}}, "line_lag must be a finite number"),
         "valves without lag": (
             {"drive": {"line_lag": 1e-3}, "valve_lag": "absent"},
             "valve_lag must be given with drive.line_lag",
@@ -329,14 +326,14 @@ def test_a_pin_over_a_trapped_volume_moves_as_scipy_says(line, modulus, top, gat
     gate = 2.0 * system.fastest * area / 0.5e5  # m3/s/Pa of an open one
     late = 1e-3 + np.array([gates.get("overlap", 0.0), 0.0])
 
-    def load(height):
-        return contact.share * 0.125 * math.expm1(2000.0 * max(height - top, 0.0)) / area
+    def load(rise):
+        return contact.share * 0.125 * math.expm1(2000.0 * max(40e-3 + rise - top, 0.0)) / area
 
     def rate(t, y, command):
         given, taken = gate * y[1:3] * (y[3] - load(y[0]), 0.5e5 - y[3])
         return [given / area, *(command - y[1:3]) / lag, (taken - given) * modulus / 1e-9]
 
-    y = np.array([40e-3, 0.0, 0.0, load(40e-3)])
+    y = np.array([0.0, 0.0, 0.0, load(0.0)])
     edges = np.unique(
         [
             0.0,
@@ -347,9 +344,11 @@ def test_a_pin_over_a_trapped_volume_moves_as_scipy_says(line, modulus, top, gat
     for start, end in pairwise(edges):
         slots = np.floor((0.5 * (start + end) - late) / (SLOT * PERIOD)) % 5
         wanted = (slots == (2, line)) * (0.5 * (start + end) > late)
-        done = solve_ivp(rate, (start, end), y, "Radau", args=(wanted,), rtol=1e-8, atol=1e-10)
+        # m, shares and Pa: the rises are micrometers.
+        some = [1e-11, 1e-6, 1e-6, 1.0]
+        done = solve_ivp(rate, (start, end), y, "Radau", args=(wanted,), rtol=1e-5, atol=some)
         y = done.y[:, -1]
-    assert run.height[-1, 12] - 40e-3 == pytest.approx(y[0] - 40e-3, rel=0.02)
+    assert run.height[-1, 12] - 40e-3 == pytest.approx(y[0], rel=0.02)
 
 
 #: Control periods for which a pin is asked for, longer than a set of active cells serves.

@@ -100,21 +100,17 @@ def refused(table):
 POINT = {"time": 0, "position": [0, 0, 0]}
 #: Sections, and how the only line about them begins.
 WRONG = [
-    ({"valve": {"orifice_diameter": -3e-4}}, "valve.orifice_diameter must be above 0 m (got -0.0003 m)."),
     ({"valve": {"orifice_diameter": "-0.3 mm"}}, "valve.orifice_diameter must be above 0 m (got '-0.3 mm')."),
     (
         {"control": {"method": "hybrid", "force_gain": 1}},
         "control.force_gain must be a parameter of hybrid (got 1). It is one of virtual_master, cell_states.",
     ),
-    ({"layout": {"pitch": 4}}, "layout.pitch must be at most 0.5 m (got 4 m)."),
     ({"valve": {"orifice_diamater": 1}}, "valve.orifice_diamater must be a known key (got 1). Did you mean"),
     ({"fluid": {"xyz": 1}}, "fluid.xyz must be a known key (got 1). Known here: density, viscosity."),
     ({"valv": {"a": 1}}, "valv must be a known key (got a section). Did you mean valve?"),
     ({"valve": {"a\nb": 1}}, "valve.'a\\nb' must be a known key (got 1). Known here: "),
     ({"fluid": {"density": "thick"}}, "fluid.density must be a number, or a text such as '3 kg/m3' (got 'th"),
-    ({"layout": {"rows": 0}}, "layout.rows must be at least 1 (got 0)."),
     ({"valve": {"stroke": "3 s"}}, "valve.stroke must be in m or a multiple of it (got '3 s')."),
-    ({"simulation": {"stepper": "leapfrog"}}, "simulation.stepper must be one of bernoulli, richardson, ada"),
     ({"preset": "quick"}, "preset must be one of paper, fast, viscous, design (got 'quick')."),
     ({"control": {"method": "hand"}}, "control.method must be one of virtual_master, cell_states, elastic"),
     ({"blister": {"radius": 0.038, "edge_radius": 0.041}}, "blister.radius must be at most half the bed's l"),
@@ -127,7 +123,6 @@ WRONG = [
     ({"actuator": {"rest_height": 0.2}}, "actuator.rest_height must be at most the stroke, 0.1 m (got 0.2 m"),
     ({"supply": {"high": -1e5}}, "supply.high must be above supply.low (got -100000 Pa, low -50000 Pa)."),
     ({"simulation": {"physics_step": 1e-9}}, "simulation.physics_step must be at least a 1000th of simulati"),
-    ({"simulation": {"duration": -1}}, "simulation.duration must be at least 0 s (got -1 s)."),
     ({"trajectory": {"waypoints": [POINT]}}, "simulation.duration must be above 0 s where no finger has a"),
     ({"delay": {"dead_time": 100}}, "delay.dead_time must be at most 1000 control periods, 5 s (got 100 s)."),
     ({"trajectory": {"waypoints": []}}, "trajectory.waypoints must have at least one waypoint (got none)."),
@@ -142,7 +137,6 @@ WRONG = [
     ({"trajectory": {"waypoints": [{**POINT, "time": time} for time in (0, 2, 1)]}},
      "trajectory.times must increase from waypoint to waypoint (got 1 s after 2 s at waypoint 3)."),
     ({"fluid": {"density": "x" * 10_000}}, "fluid.density must be a number"),
-    ({"shape": {"fit": "squeeze"}}, "shape.fit must be one of contain, cover, stretch, actual, placed"),
     ({"shape": {"file": ""}}, "shape.file must be a sample shape's name"),
 ]  # fmt: skip
 

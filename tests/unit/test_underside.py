@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 import trimesh
 from digiclay.core.base.errors import ParameterError
-from digiclay.core.model.fingertip import Fingertip, compute_forms, compute_underside
 from digiclay.core.model.layout import ARRANGEMENTS, Layout, make_grid
 from digiclay.core.model.underside import CHUNK, check_mesh, rasterize
 from trimesh.transformations import random_rotation_matrix
@@ -58,21 +57,6 @@ def test_the_underside_of_a_crumpled_body_is_where_rays_meet_it_first(arrangemen
     level = float(np.median(found[met]))
     below = rasterize(body.vertices, body.faces, bed, ceiling=level)
     assert np.array_equal(below, np.where(found < level, found, np.inf))
-
-
-def test_a_sphere_of_20480_triangles_is_the_ellipsoid_of_a_fingertip():
-    bed, radius = make_grid(Layout(25, 25, 1e-3)), 0.01
-    ball = trimesh.creation.icosphere(subdivisions=5, radius=radius)
-    ball.apply_translation([1e-4, 2e-4, 0.04 + radius])
-    found = rasterize(ball.vertices, ball.faces, bed)
-    tip = Fingertip(length=radius, width=radius, height=radius)
-    pose = np.array([[1e-4, 2e-4, 0.04, 1.0, 0.0, 0.0, 0.0]])
-    forms, join = compute_forms(tip.outline(pose))
-    wanted = compute_underside(forms, join, bed.compute_basis(np.arange(bed.count)))[0]
-    # At the rim, where the sphere is as steep as a wall, the chords of triangles count.
-    inside = (bed.x - 1e-4) ** 2 + (bed.y - 2e-4) ** 2 < (0.8 * radius) ** 2
-    assert np.abs(found - wanted)[inside].max() < 5e-6
-    assert np.count_nonzero(inside) > 190
 
 
 @pytest.mark.parametrize("arrangement", ARRANGEMENTS)
@@ -158,7 +142,6 @@ TRIANGLE = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
         (TRIANGLE * [[1], [np.nan], [1]], [[0, 1, 2]], "vertex 1 at nan"),
         (TRIANGLE * 1e7, [[0, 1, 2]], "vertex 1 at 1e\\+07"),
         (TRIANGLE * [1, 0, 0], [[0, 1, 2]], "must have a surface"),
-        (TRIANGLE * 0, [[0, 1, 2]], "must have a surface"),
     ],
 )
 def test_what_is_no_body_is_refused(vertices, triangles, rule):
