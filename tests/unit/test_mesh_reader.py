@@ -3,9 +3,7 @@
 import base64
 import json
 import os
-import re
 import struct
-import time
 
 import numpy as np
 import pytest
@@ -16,36 +14,44 @@ from digiclay.core.mesh_io.mesh_reader import READERS, read
 from digiclay.core.surface.formed import Body
 
 from tests.assemble import assert_near
+from tests.mesh_files import FACES, PLACES, VOLUME, assert_refused, put
 
 KINDS = ("gltf", "stl", "stl_ascii", "obj", "ply", "ply_ascii", "off", "glb", "3mf")
 PROMISE = bytes(80) + struct.pack("<I", 4_000_000)
 BINARY = "ply\nformat binary_little_endian 1.0\nelement vertex 9000000000\n"
 
 
+#: 320 triangles, 20 mm across.
+BALL = trimesh.creation.icosphere(subdivisions=2, radius=10.0)
+
+
 def written(folder, kind):
-    """Write a ball of 320 triangles, 20 mm across, in a format; 3MF by the program itself."""
-    ball = trimesh.creation.icosphere(subdivisions=2, radius=10.0)
+    """Write the ball in a format; 3MF by the program itself."""
     path = folder / f"ball.{kind.split('_')[0]}"
     if kind == "3mf":
-        mesh_writer.write(
-            [Body("ball", ball.vertices * 1e-3, ball.faces.astype(np.int32), closed=True)],
-            path,
-            "mm",
-        )
+        body = Body("ball", BALL.vertices * 1e-3, BALL.faces.astype(np.int32), closed=True)
+        mesh_writer.write([body], path, "mm")
     elif kind == "gltf":
-        for name, content in ball.export(file_type="gltf").items():
+        for name, content in BALL.export(file_type="gltf").items():
             (folder / name).write_bytes(content)
         return folder / "model.gltf"
     elif kind == "ply_ascii":
-        ball.export(path, encoding="ascii")
+        BALL.export(path, encoding="ascii")
     else:
-        ball.export(path, file_type=kind)
+        BALL.export(path, file_type=kind)
     return path
 
 
-def obj(folder, text):
-    (folder / "odd.obj").write_bytes(text.encode())
-    return folder / "odd.obj"
+#: Meters in a file's unit, and its upward direction, where it is not a scan that tells neither.
+TOLD = {"gltf": (1.0, "y"), "glb": (1.0, "y"), "obj": (None, "y"), "3mf": (1e-3, "z")}
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_ball_has_the_same_triangles_in_every_format(tmp_path, kind):
+    vertices, faces, *told = read(written(tmp_path, kind))
+    # float32, or 8 digits.
+    assert_near(vertices[faces], BALL.triangles, 1e-6)
+    assert tuple(told) == TOLD.get(kind, (None, "z"))
 
 
 @pytest.mark.parametrize(
@@ -61,7 +67,7 @@ def obj(folder, text):
     ],
 )  # fmt: skip
 def test_whatever_way_an_obj_is_written_it_is_the_same_square(tmp_path, text):
-    back = read(obj(tmp_path, text))
+    back = read(put(tmp_path, "odd.obj", text))
     np.testing.assert_array_equal(back.vertices, [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
     np.testing.assert_array_equal(back.faces, [[0, 1, 2], [0, 2, 3]])
 
@@ -86,15 +92,14 @@ THREE = "v 0 0 0\nv 1 0 0\nv 0 1 0\n"
     ],
 )
 def test_an_obj_that_makes_no_sense_is_refused(tmp_path, text, said):
-    with pytest.raises(ParameterError, match=re.escape(said)):
-        read(obj(tmp_path, text))
+    assert_refused(put(tmp_path, "odd.obj", text), said)
 
 
 def test_bytes_beside_a_gltf_are_read_and_materials_and_pictures_are_not_opened(tmp_path):
     # A pipe that has no writer: reading it would wait for ever.
     os.mkfifo(tmp_path / "pipe")
     text = "mtllib pipe ../../../dev/zero\nusemtl a\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
-    assert len(read(obj(tmp_path, text)).faces) == 1
+    assert len(read(put(tmp_path, "odd.obj", text)).faces) == 1
     path = written(tmp_path, "ply_ascii")
     head = b"comment TextureFile pipe\nelement vertex"
     path.write_bytes(path.read_bytes().replace(b"element vertex", head))
@@ -159,21 +164,13 @@ def test_a_byte_order_mark_and_many_blocks_change_nothing(tmp_path, kind, monkey
     ],
 )  # fmt: skip
 def test_a_head_that_promises_more_than_there_is_is_refused(tmp_path, name, content, said):
-    (tmp_path / name).write_bytes(content if isinstance(content, bytes) else content.encode())
-    with pytest.raises(ParameterError, match=re.escape(said)):
-        read(tmp_path / name)
+    assert_refused(put(tmp_path, name, content), said)
 
 
 def test_a_file_beyond_all_sizes_is_not_read(tmp_path):
     with (tmp_path / "hole.stl").open("wb") as file:
         file.truncate(mesh_limits.MOST_BYTES + 1)  # takes no room on the disk
-    with pytest.raises(ParameterError, match=r"must have at most 2 GB .got hole.stl: 2 GB"):
-        read(tmp_path / "hole.stl")
-
-
-#: A tetrahedron without symmetry: its volume's sign tells a turn from a reflection.
-PLACES = np.array([[0.0, 0, 0], [5, 0, 0], [0, 7, 0], [0, 0, 11]])
-FACES = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+    assert_refused(tmp_path / "hole.stl", "must have at most 2 GB (got hole.stl: 2 GB")
 
 
 def inline(data):
@@ -225,7 +222,7 @@ def test_nodes_are_turned_shifted_and_stretched_as_trimesh_has_them(tmp_path):
     assert_near(np.sort(back.vertices, 0), np.sort(judge.vertices, 0), 1e-6)
     # The mirrored ones turned the right way out: once stretched to 6 times, once to 3 times that.
     volume = trimesh.Trimesh(back.vertices, back.faces, process=False).volume
-    assert volume == pytest.approx(24 * 5 * 7 * 11 / 6, rel=1e-6)
+    assert volume == pytest.approx(24 * VOLUME, rel=1e-6)
 
 
 @pytest.mark.parametrize("mode, corners", [(5, [0, 1, 2, 3, 0]), (6, [0, 1, 2, 3])])
@@ -275,8 +272,7 @@ def test_bytes_from_elsewhere_are_refused(tmp_path, uri):
     path = gltf(inner, with_uri(uri))
     (tmp_path / "bytes.bin").write_bytes((inner / "bytes.bin").read_bytes())
     (inner / "link.bin").symlink_to("/dev/zero")
-    with pytest.raises(ParameterError, match="must have its vertices in the file, or in a file"):
-        read(path)
+    assert_refused(path, "must have its vertices in the file, or in a file")
 
 
 def test_a_pipe_beside_the_gltf_is_not_opened_nor_its_pictures_and_endless_nesting_is_refused(
@@ -293,19 +289,17 @@ def test_a_pipe_beside_the_gltf_is_not_opened_nor_its_pictures_and_endless_nesti
     os.mkfifo(tmp_path / "pipe.bin")
     np.testing.assert_array_equal(read(gltf(tmp_path, change)).faces, FACES)
     path = gltf(tmp_path, with_uri("pipe.bin"))
-    with pytest.raises(ParameterError, match="must have its files beside it"):
-        read(path)
+    assert_refused(path, "must have its files beside it")
     path.write_text("[" * 100_000, encoding="utf-8")
-    with pytest.raises(ParameterError, match="nested too deeply"):
-        read(path)
+    assert_refused(path, "nested too deeply")
 
 
 def many_nodes(tree):
-    """Place a mesh of 30 000 corners, three bytes and their repetition, three thousand times."""
-    tree["nodes"], tree["scenes"] = [{"mesh": 0}] * 3003, [{"nodes": list(range(3003))}]
-    tree["bufferViews"][1] = {"buffer": 1, "byteLength": 60_000}
-    tree["buffers"].append(inline(bytes(60_000)))
-    tree["accessors"][1]["count"] = 30_000
+    """Place a mesh of 300 000 corners, three bytes and their repetition, three hundred times."""
+    tree["nodes"], tree["scenes"] = [{"mesh": 0}] * 300, [{"nodes": list(range(300))}]
+    tree["bufferViews"][1] = {"buffer": 1, "byteLength": 600_000}
+    tree["buffers"].append(inline(bytes(600_000)))
+    tree["accessors"][1]["count"] = 300_000
 
 
 def changed(place, value):
@@ -326,13 +320,6 @@ def changed(place, value):
 def nest(tree):
     tree["nodes"].append({"children": [0, 0]})
     tree["scenes"][0]["nodes"] = [1]
-
-
-def assert_refused_at_once(path, said):
-    began = time.process_time()  # of this process alone: a busy machine takes longer
-    with pytest.raises(ParameterError, match=re.escape(said)):
-        read(path)
-    assert time.process_time() - began < 2.0
 
 
 PRIMITIVE = "meshes.0.primitives.0"
@@ -370,16 +357,16 @@ ALTERING = "must not need an extension that changes its vertices (got one.gltf: 
         ),
     ],
 )
-def test_a_gltf_that_makes_no_sense_is_refused_at_once(tmp_path, place, value, said):
-    assert_refused_at_once(gltf(tmp_path, changed(place, value)), said)
+def test_a_gltf_that_makes_no_sense_is_refused(tmp_path, place, value, said):
+    assert_refused(gltf(tmp_path, changed(place, value)), said)
 
 
 @pytest.mark.parametrize(
     "change, said",
     [
-        (many_nodes, "must have at most 20 million triangles (got one.gltf: 30,030,000)"),
+        (many_nodes, "must have at most 20 million triangles (got one.gltf: 30,000,000)"),
         (nest, "node 0 stands in two places"),
     ],
 )
-def test_a_gltf_of_many_repetitions_is_refused_at_once(tmp_path, change, said):
-    assert_refused_at_once(gltf(tmp_path, change), said)
+def test_a_gltf_of_many_repetitions_is_refused(tmp_path, change, said):
+    assert_refused(gltf(tmp_path, change), said)

@@ -15,6 +15,8 @@ from digiclay.core.surface.formed import take_corners
 from scipy.interpolate import LinearNDInterpolator
 from scipy.spatial import Delaunay
 
+from tests.mesh_files import FACES, PLACES, VOLUME
+
 #: Meshes here are in mm and stand where they are.
 IN_PLACE = Placement(1e-3, 1e-3, 0.0, 0.0)
 #: Heights of a few mm, from products of a few numbers of 53 bits.
@@ -84,13 +86,10 @@ def test_a_table_overhangs_where_there_is_room_below_its_top_and_an_open_surface
 
 @pytest.mark.parametrize("up", ["x", "y", "z", "-x", "-y", "-z"])
 def test_every_direction_of_a_mesh_can_be_up(up):
-    # A tetrahedron without symmetry: its volume's sign tells a turn from a reflection.
-    vertices = np.array([[0.0, 0, 0], [5, 0, 0], [0, 7, 0], [0, 0, 11]])
-    faces = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
-    turned = make_shape_mesh("x", vertices, faces, up, 1e-3).vertices
+    turned = make_shape_mesh("x", PLACES, FACES, up, 1e-3).vertices
     axis, sign = "xyz".index(up[-1]), -1 if up[0] == "-" else 1
-    assert np.array_equal(turned[:, 2], sign * vertices[:, axis])
-    assert trimesh.Trimesh(turned, faces, process=False).volume == pytest.approx(5 * 7 * 11 / 6)
+    assert np.array_equal(turned[:, 2], sign * PLACES[:, axis])
+    assert trimesh.Trimesh(turned, FACES, process=False).volume == pytest.approx(VOLUME)
 
 
 @pytest.mark.parametrize(

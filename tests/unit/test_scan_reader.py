@@ -1,11 +1,11 @@
 """STL, PLY and OFF files as many programs write them, and those that would be read wrong."""
 
-import re
 import struct
 
 import pytest
-from digiclay.core.base.errors import ParameterError
 from digiclay.core.mesh_io.mesh_reader import read
+
+from tests.mesh_files import assert_refused, put
 
 PLACE = [(0, 0, 0), (4, 0, 0), (4, 3, 1.5), (0, 3, 1.5), (2, 5, 0.25)]
 TEXT = "".join("{} {} {}\n".format(*place) for place in PLACE)
@@ -91,8 +91,7 @@ OFF_FACES = "4 0 1 2 3\n3 3 2 4\n"
     ],
 )  # fmt: skip
 def test_whatever_way_a_scan_is_written_it_is_the_same_three_triangles(tmp_path, name, content):
-    (tmp_path / name).write_bytes(content if isinstance(content, bytes) else content.encode())
-    found = read(tmp_path / name)
+    found = read(put(tmp_path, name, content))
     corners = found.vertices[found.faces]
     assert sorted(corners.tolist()) == sorted(
         [list(map(float, PLACE[i])) for i in face] for face in CUT
@@ -115,6 +114,4 @@ def test_whatever_way_a_scan_is_written_it_is_the_same_three_triangles(tmp_path,
     ],
 )  # fmt: skip
 def test_a_scan_that_would_be_read_wrong_is_refused_with_its_cause(tmp_path, name, content, said):
-    (tmp_path / name).write_bytes(content if isinstance(content, bytes) else content.encode())
-    with pytest.raises(ParameterError, match=re.escape(said)):
-        read(tmp_path / name)
+    assert_refused(put(tmp_path, name, content), said)

@@ -30,7 +30,8 @@ def bed(pitch, arrangement):
 
 def read_back(cells, formed, model, path, format, unit="mm"):
     write(make_bodies(formed, model), path, unit, format)
-    shape = Shape(file=str(path), fit="placed", unit="auto" if format in ("glb", "3mf") else unit)
+    tells = unit == "mm" or format in ("glb", "3mf")  # a file that names no unit is in mm
+    shape = Shape(file=str(path), fit="placed", unit="auto" if tells else unit)
     return fit_relief(shape, read(shape), cells, Actuator())
 
 

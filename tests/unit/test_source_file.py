@@ -8,14 +8,12 @@ import numpy as np
 import pytest
 import trimesh
 from digiclay.core.base.errors import DigiclayError
-from digiclay.core.mesh_io import mesh_writer
 from digiclay.core.model.actuator import Actuator
 from digiclay.core.model.layout import Layout, make_grid
 from digiclay.core.scene.scene_source import load
 from digiclay.core.shapes.fitting import SAMPLES, find_shape, fit_shape, list_shapes, read
 from digiclay.core.shapes.mesh_relief import ShapeMesh
 from digiclay.core.shapes.request import Shape
-from digiclay.core.surface.formed import Body
 
 BED = make_grid(Layout(13, 13, 3e-3))
 
@@ -44,28 +42,6 @@ def test_every_sample_shape_fits_a_bed_without_clipping_and_every_mesh_is_closed
         assert shape.closed
 
 
-@pytest.mark.parametrize("kind", ["stl", "obj", "ply", "glb", "off", "3mf"])
-def test_a_mesh_is_the_same_shape_in_every_format(tmp_path, kind):
-    solid = trimesh.creation.icosphere(subdivisions=3, radius=10.0)
-    path = tmp_path / f"Ein Körper mit Blank.{kind}"
-    # A GLB is in meters, y up; an OBJ that says nothing is y up.
-    unit = 1e-3 if kind == "glb" else 1.0
-    turned = solid.vertices[:, [0, 2, 1]] * [1, 1, -1] if kind in ("glb", "obj") else solid.vertices
-    if kind == "3mf":
-        mesh_writer.write(
-            [Body("ball", turned * 1e-3, solid.faces.astype(np.int32), closed=True)], path
-        )
-    else:
-        trimesh.Trimesh(turned * unit, solid.faces, process=False).export(path)
-    bare = read(Shape(file=str(path)))
-    left, front, right, back = bare.box
-    # 32-bit numbers, or 8 digits.
-    assert (right - left) * bare.length == pytest.approx(20e-3, rel=1e-6)
-    assert (back - front) * bare.length == pytest.approx(20e-3, rel=1e-6)
-    solid.export(tmp_path / "plain.stl")
-    assert np.abs(heights(path) - heights(tmp_path / "plain.stl")).max() < 1e-7
-
-
 OBJECTS = io.BytesIO()
 np.save(OBJECTS, np.array([{}, {}], dtype=object), allow_pickle=True)
 
@@ -73,28 +49,12 @@ np.save(OBJECTS, np.array([{}, {}], dtype=object), allow_pickle=True)
 @pytest.mark.parametrize(
     "name, content, said",
     [
-        ("empty.stl", b"", "must "),
-        ("rubbish.stl", b"rubbish" * 30, "must "),
-        ("empty.obj", b"# nothing\n", "must "),
-        ("points.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\n", "must "),
-        (
-            "nan.obj",
-            b"v 0 0 0\nv 1 nan 0\nv 0 1 0\nf 1 2 3\n",
-            "must have vertices that are finite numbers",
-        ),
-        (
-            "half.ply",
-            b"ply\nformat ascii 1.0\nelement vertex 3\n",
-            "must be a PLY file that can be read",
-        ),
+        ("points.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\n", "must hold a surface made of faces"),
         ("half.glb", b"glTF\x02\0\0\0\xff\0\0\0", "must be whole"),
         ("notes.doc", b"hello", "must be a mesh, a picture or an array"),
         ("notes.txt", b"hello", "must be a grid of numbers that can be read"),
         ("empty.npy", b"", "must hold one array of numbers"),
-        ("rubbish.npy", b"rubbish", "must hold one array of numbers"),
         ("objects.npy", OBJECTS.getvalue(), "must hold one array of numbers"),  # not unpickled
-        ("empty.png", b"", "must be a picture that can be read"),
-        ("rubbish.png", b"rubbish", "must be a picture that can be read"),
     ],
 )
 def test_a_file_that_holds_no_shape_is_refused_by_name(tmp_path, name, content, said):
