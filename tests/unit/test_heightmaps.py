@@ -72,21 +72,12 @@ def test_a_map_gives_each_pin_the_mean_over_its_square(values, rows, columns, pi
     assert np.abs(found.value - known)[found.covered].max() < 1e-10  # rounding of numbers up to 60
 
 
-@given(
-    st.integers(2, 40),
-    st.integers(2, 40),
-    st.integers(1, 9),
-    st.integers(1, 200),
-    st.integers(0, 2**32 - 1),
-)
-def test_means_keep_the_sum(rows, columns, block, chunk, seed):
-    values = np.random.default_rng(seed).uniform(-1.0, 1.0, (rows, columns))
-    kept = heightmap.CHUNK
-    try:
-        heightmap.CHUNK = chunk
+@given(st.integers(2, 40), st.integers(2, 40), st.integers(1, 9), st.integers(1, 200))
+def test_means_keep_the_sum(rows, columns, block, chunk):
+    values = np.random.default_rng(block).uniform(-1.0, 1.0, (rows, columns))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(heightmap, "CHUNK", chunk)
         means = average_blocks(values, block)
-    finally:
-        heightmap.CHUNK = kept
     tall = np.diff([*range(0, rows, block), rows])
     wide = np.diff([*range(0, columns, block), columns])
     assert means.shape == (len(tall), len(wide))
@@ -96,20 +87,13 @@ def test_means_keep_the_sum(rows, columns, block, chunk, seed):
 @pytest.mark.parametrize(
     "values, said",
     [
-        (np.zeros((1, 1)), "at least 2 x 2 heights (got odd.npy: 1 x 1)"),
         (np.zeros((1, 9)), "at least 2 x 2 heights (got odd.npy: 1 x 9)"),
         (np.zeros(9), "at least 2 x 2 heights (got odd.npy: 9)"),
-        (np.zeros((2, 2, 3)), "at least 2 x 2 heights (got odd.npy: 2 x 2 x 3)"),
         (np.zeros(()), "at least 2 x 2 heights (got odd.npy: a single number)"),
-        (np.array([["a", "b"], ["c", "d"]]), "hold numbers (got odd.npy: <U1)"),
         (np.zeros((2, 2), complex), "hold numbers (got odd.npy: complex128)"),
         (
             np.array([[0.0, 1.0], [np.nan, 2.0]]),
             "numbers only, of at most 1e+60 (got odd.npy: nan at 1, 0)",
-        ),
-        (
-            np.array([[0.0, np.inf], [1.0, 2.0]]),
-            "numbers only, of at most 1e+60 (got odd.npy: inf at 0, 1)",
         ),
         (np.array([[0.0, 1.0], [2.0, -1e308]]), "of at most 1e+60 (got odd.npy: -1e+308 at 1, 1)"),
     ],
@@ -243,15 +227,16 @@ def test_a_text_that_is_no_grid_is_refused_with_its_row(tmp_path, name, text, sa
         read_grid(tmp_path / name)
 
 
-def test_a_picture_of_a_hundred_megapixels_is_taken_and_one_of_more_refused_before_it_is_read(
-    tmp_path,
+def test_a_large_picture_is_taken_in_means_and_one_of_too_many_pixels_refused_before_it_is_read(
+    tmp_path, monkeypatch
 ):
+    monkeypatch.setattr(Image, "MAX_IMAGE_PIXELS", 60)  # of more Pillow warns
+    monkeypatch.setattr(heightmap, "MOST_VALUES", 30)
     path = tmp_path / "large.png"
-    Image.new("L", (10_000, 10_000), 7).save(path, compress_level=1)
+    Image.new("L", (10, 10), 7).save(path)
     found = make_height_map(path.name, read_pixels(path))
-    assert found.pixels == (10_000, 10_000)
-    assert found.values.size <= heightmap.MOST_VALUES
-    assert np.all(found.values == 7.0)
+    assert found.pixels == (10, 10)
+    np.testing.assert_array_equal(found.values, np.full((5, 5), 7.0))
     # A head that says 15 000 x 10 000 pixels, and no pixels at all; Pillow itself would open it.
     path = tmp_path / "huge.png"
     Image.new("L", (2, 2)).save(path)
