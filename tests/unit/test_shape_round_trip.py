@@ -6,13 +6,12 @@ from digiclay.core.base.errors import ParameterError
 from digiclay.core.mesh_io.export_model import Model, make_bodies
 from digiclay.core.mesh_io.mesh_writer import FORMATS, find_suffix, write
 from digiclay.core.model.actuator import Actuator
-from digiclay.core.model.layout import Layout, make_grid
+from digiclay.core.model.layout import ARRANGEMENTS, Layout, make_grid
 from digiclay.core.shapes.fitting import fit_relief, read
 from digiclay.core.shapes.mesh_relief import make_shape_mesh
 from digiclay.core.shapes.request import Placement, Shape
 from digiclay.core.surface.formed import Formed
 
-ARRANGEMENTS = ("aligned", "staggered", "hexagonal")
 #: mm. In the middle of a bed the last ones have no place that is a round number, in binary or in
 #: decimals.
 PITCHES = (3.0, 2.3, 2.54)
