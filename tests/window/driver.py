@@ -50,8 +50,12 @@ def key(kind, at=None, **modifiers):
     )
 
 
+def hover(at, **modifiers):
+    event("MOUSEMOVE", "NOTHING", at, **modifiers)
+
+
 def click(at):
-    event("MOUSEMOVE", "NOTHING", at)
+    hover(at)
     yield 0.2
     key("LEFTMOUSE", at)
     yield 0.3
@@ -90,11 +94,15 @@ def on_the_bed(x, y, z=40.0):
     return pixel(world(x, y, z))
 
 
-def call(operator, *how, **properties):
+def in_the_view():
+    """Return the override of the context with the first 3D view."""
     area, region = view()
-    with bpy.context.temp_override(window=window(), area=area, region=region):
-        done = operator(*how, **properties)
-    return done
+    return bpy.context.temp_override(window=window(), area=area, region=region)
+
+
+def call(operator, *how, **properties):
+    with in_the_view():
+        return operator(*how, **properties)
 
 
 def open_sidebar(tab="Digital Clay"):
@@ -111,22 +119,38 @@ def empty_scene():
     call(bpy.ops.object.select_all, action="SELECT")
     call(bpy.ops.object.delete)
     bpy.ops.ed.undo_push(message="Empty scene")
-    event("MOUSEMOVE", "NOTHING", middle())
+    hover(middle())
     yield None
 
 
-def add_paper_bed():
-    call(bpy.ops.mesh.digital_clay_add, bed="paper")
+def whole_view():
     key("HOME")
     yield None
+
+
+def add_bed(**chosen):
+    call(bpy.ops.mesh.digital_clay_add, **chosen)
+    bpy.ops.ed.undo_push(message="Add")
+    yield from whole_view()
 
 
 def scene_with_bed(**chosen):
     yield from empty_scene()
-    call(bpy.ops.mesh.digital_clay_add, **chosen)
-    bpy.ops.ed.undo_push(message="Add")
-    key("HOME")
-    yield None
+    yield from add_bed(**chosen)
+
+
+def open_browser(operator, name, **options):
+    """Open the file browser of an operator, with the name of a file; return the context of its commands."""
+    call(operator, "INVOKE_DEFAULT", **options)
+    yield 1.0
+    windows = bpy.context.window_manager.windows
+    browser = next(each for each in windows if each.screen.areas[0].type == "FILE_BROWSER")
+    area = browser.screen.areas[0]
+    if name:
+        chosen = area.spaces.active.params
+        chosen.directory, chosen.filename = bytes(OUT), name
+        yield None
+    return bpy.context.temp_override(window=browser, area=area)
 
 
 def beds():
@@ -138,8 +162,7 @@ def fingertip(number=0):
 
 
 def sessions():
-    running = part("sessions.running").list_sessions()
-    return running
+    return part("sessions.running").list_sessions()
 
 
 def session():
@@ -211,7 +234,7 @@ def grab(offset, axis, steps=6, look_as="", end="LEFTMOUSE", periods=0):
     start = bpy.context.view_layer.objects.active.matrix_world.translation.copy()
     scale = part("bridge").SCALE * 1e-3
     key_at = pixel(start)
-    event("MOUSEMOVE", "NOTHING", key_at)
+    hover(key_at)
     yield None
     key("G", key_at)
     yield 0.2
@@ -220,7 +243,7 @@ def grab(offset, axis, steps=6, look_as="", end="LEFTMOUSE", periods=0):
     for step in range(1, steps + 1):
         place = [a + scale * step / steps * d for a, d in zip(start, offset, strict=True)]
         key_at = pixel(place)
-        event("MOUSEMOVE", "NOTHING", key_at)
+        hover(key_at)
         yield None
         yield from settle(1)
         yield from simulate(periods)
@@ -265,24 +288,22 @@ def rounds(count=3):
 
 
 def settle(ticks=3):
-    running = part("sessions.running")
-    start = max((session.tick for session in running.list_sessions()), default=0)
-    for _ in range(100):
-        yield 0.1
-        now = max((session.tick for session in running.list_sessions()), default=start + ticks)
-        if now >= start + ticks:
-            return
-    raise AssertionError("The session does not tick any more")
+    """Wait until the sessions, if there are any, have ticked so often."""
+
+    def last():
+        return max((running.tick for running in sessions()), default=0)
+
+    start = last()
+    yield from until(lambda: not sessions() or last() >= start + ticks, every=0.1)
 
 
 def simulate(periods):
-    begun = {one.uid: one.state.period for one in part("sessions.running").list_sessions()}
-    for _ in range(200):
-        sessions = part("sessions.running").list_sessions()
-        if all(one.state.period >= begun.get(one.uid, 0) + periods for one in sessions):
-            return
-        yield 0.05
-    raise AssertionError("The session does not simulate any more")
+    """Wait until all sessions have simulated so many control periods."""
+    ends = {running.uid: running.state.period + periods for running in sessions()}
+    yield from until(
+        lambda: all(running.state.period >= ends.get(running.uid, 0) for running in sessions()),
+        every=0.05,
+    )
 
 
 def look(name):
@@ -290,7 +311,7 @@ def look(name):
     evaluate()
     bridge, running = part("bridge"), part("sessions.running")
     found = {"beds": len(beds()), "said": running.last_message()}
-    found["sessions"] = len(running.list_sessions())
+    found["sessions"] = len(sessions())
     for bed in beds()[:1]:
         session = running.find(bed)
         found["kept"] = len(bed.get("digiclay_state", b""))

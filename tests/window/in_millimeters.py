@@ -37,8 +37,8 @@ def find_pin(column, row):
     """Return the place of the pin that is seen at a place, pitches from the middle; None without."""
     pitch = blender.beds()[0].digiclay.layout.pitch
     x, y = blender.on_the_bed(pitch * column, pitch * row)
-    area, region = blender.view()
-    with bpy.context.temp_override(window=blender.window(), area=area, region=region):
+    _, region = blender.view()
+    with blender.in_the_view():
         target = blender.part("press.aim").find_target(bpy.context, (x - region.x, y - region.y))
     return target and [target.pin % 25 - 12, target.pin // 25 - 12]
 

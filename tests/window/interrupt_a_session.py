@@ -104,7 +104,7 @@ def script():
     addon_utils.disable(blender.EXTENSION)
     yield 1.0
     blender.SEEN["panels left"] = [name for name in dir(bpy.types) if name.startswith("DIGICLAY_")]
-    blender.event("MOUSEMOVE", "NOTHING", blender.middle())
+    blender.hover(blender.middle())
     yield 1.0
     addon_utils.enable(blender.EXTENSION)
     yield None

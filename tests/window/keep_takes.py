@@ -11,8 +11,7 @@ from tests.window import driver as blender
 
 def script():
     """Do what a user does with takes; the Takes panel is in sight from the first take on."""
-    yield from blender.empty_scene()
-    yield from blender.add_paper_bed()
+    yield from blender.scene_with_bed(bed="paper")
     # Software GL draws a frame or two a second; in between the session is to catch up.
     blender.preferences().most_periods = 100
     # The least there is. Blender counts it from the start of the program.
@@ -131,28 +130,16 @@ def animated():
     blender.SEEN["animation stopped"] = stopped.exists()
     blender.call(export, "INVOKE_DEFAULT", filepath=str(whole), **options)
     yield from blender.until(whole.is_file)
-    with (yield from open_browser(export, options)):
+    with (yield from blender.open_browser(export, "", **options)):
         bpy.ops.file.cancel()  # a traceback of it fails every test of this script
     yield 1.0
-    with (yield from open_browser(export, options, browsed.name)):
+    browser = yield from blender.open_browser(export, browsed.name, **options)
+    blender.shot("animation_browser")
+    with browser:
         bpy.ops.file.execute()
     yield from blender.until(browsed.is_file)
     blender.SEEN["animations"] = [whole.read_bytes() == browsed.read_bytes(), whole.stat().st_size]
     note("animated")
-
-
-def open_browser(operator, options, name=""):
-    """Open the file browser of an operator, with the name of a file; return the context of its commands."""
-    blender.call(operator, "INVOKE_DEFAULT", **options)
-    yield 1.0
-    windows = bpy.context.window_manager.windows
-    browser = next(each for each in windows if each.screen.areas[0].type == "FILE_BROWSER")
-    area = browser.screen.areas[0]
-    if name:
-        space = area.spaces.active
-        space.params.directory, space.params.filename = os.fsencode(blender.OUT), name
-        blender.shot("animation_browser")
-    return bpy.context.temp_override(window=browser, area=area)
 
 
 def baked():

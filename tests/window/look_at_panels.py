@@ -25,7 +25,7 @@ def script():
     yield from blender.empty_scene()
     yield from blender.open_sidebar()
     blender.shot("panels_start")
-    yield from blender.add_paper_bed()
+    yield from blender.add_bed(bed="paper")
     blender.shot("panels_all")
     for picture, (root, sections) in PICTURES.items():
         with blender.unfolded(picture, root, *sections.split()) as tab:
@@ -82,8 +82,7 @@ def refused():
 
 def export():
     """Form a ridge and a pit on another bed, and take them out of the bed in every way there is."""
-    yield from blender.empty_scene()
-    yield from blender.add_paper_bed()
+    yield from blender.scene_with_bed(bed="paper")
     bed = blender.beds()[0]
     form(bed)
     with blender.unfolded("export", "DIGICLAY_PT_features") as tab:
@@ -102,8 +101,7 @@ def export():
         bpy.ops.mesh.digital_clay_make, "EXEC_DEFAULT", True, kind="features", skin="smooth"
     )
     yield None
-    blender.key("HOME")
-    yield None
+    yield from blender.whole_view()
     yield None
     blender.shot("export_meshes")
     count = len(bpy.data.objects)
@@ -112,25 +110,16 @@ def export():
     yield None
     blender.SEEN["undone"] = count - len(bpy.data.objects)
     blender.select(blender.beds()[0])
-    yield from browser()
+    yield from export_by_browser()
 
 
-def browser():
+def export_by_browser():
     """Export by File > Export: look at the browser's options, change the format, and confirm."""
-    blender.call(
-        bpy.ops.export_mesh.digital_clay, "INVOKE_DEFAULT", kind="solid", file_format="3mf"
-    )
-    yield 1.0
-    yield None
-    windows = bpy.context.window_manager.windows
-    area = next(a for w in windows for a in w.screen.areas if a.type == "FILE_BROWSER")
-    shown = next(w for w in windows if area in w.screen.areas[:])
-    area.spaces.active.params.directory = str(blender.OUT).encode()
-    area.spaces.active.params.filename = "für später.stl"
-    yield None
+    export = bpy.ops.export_mesh.digital_clay
+    chosen = {"kind": "solid", "file_format": "3mf"}
+    browser = yield from blender.open_browser(export, "für später.stl", **chosen)
     blender.shot("export_browser")
-    region = next(r for r in area.regions if r.type == "WINDOW")
-    with bpy.context.temp_override(window=shown, area=area, region=region):
+    with browser:
         bpy.ops.file.execute()
     yield 0.5
     blender.SEEN["files"] = sorted(path.name for path in blender.OUT.glob("*.3mf"))

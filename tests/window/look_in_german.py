@@ -74,7 +74,7 @@ def script():
         if issubclass(kind, bpy.types.Panel):
             kind.append(measure)
     yield from unfold("DIGICLAY_PT_start", "")
-    yield from blender.add_paper_bed()
+    yield from blender.add_bed(bed="paper")
     bpy.ops.mesh.primitive_cube_add(location=(0.0, 0.0, 3.0))
     bpy.context.object.name = "Cube"  # a word that Blender translates
     yield None

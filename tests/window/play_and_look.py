@@ -208,7 +208,7 @@ def drawn():
 
 
 def tapped(at, name):
-    blender.event("MOUSEMOVE", "NOTHING", at)
+    blender.hover(at)
     yield 0.3
     blender.event("LEFTMOUSE", "PRESS", at)
     # The Press tool presses 4 mm below the pins.
@@ -252,8 +252,7 @@ def pick():
     )
     yield from blender.click((timeline.x + timeline.width // 2, timeline.y + timeline.height // 2))
     blender.SEEN["clicked in the timeline"] = list(picked(blender.beds()[0]))
-    blender.key("HOME")
-    yield None
+    yield from blender.whole_view()
     yield from blender.click(blender.on_the_bed(6, -9))
     blender.SEEN["picked elsewhere"] = list(picked(blender.beds()[0]))
     blender.SEEN["told in"] = list(blender.part("operators.action")._TOLD)
@@ -275,7 +274,7 @@ def escape():
         blender.call(bpy.ops.digiclay.session, "INVOKE_DEFAULT")
         area = next(one for one in blender.window().screen.areas if one.type == name)
         at = area.x + area.width // 2, area.y + area.height // 2
-        blender.event("MOUSEMOVE", "NOTHING", at)
+        blender.hover(at)
         yield from blender.until(loop.is_aside)
         before = modal(), len(blender.sessions())
         blender.key("ESC", at)
@@ -313,7 +312,7 @@ def pressed(name, kind, **held):
 def changed_by_f9(name):
     """Click on "Linked" in the panel of a copy that F9 opens beside the mouse, and leave the panel."""
     x, y = blender.middle()
-    blender.event("MOUSEMOVE", "NOTHING", (x, y))
+    blender.hover((x, y))
     yield 0.2
     blender.key("F9", (x, y))
     yield 0.5
@@ -321,13 +320,13 @@ def changed_by_f9(name):
     yield from looked(name)
     blender.SEEN["linked by F9"] = len({bed.data.name for bed in blender.beds()}) == 1
     for at in ((x, y + 60), (x - 250, y + 150)):
-        blender.event("MOUSEMOVE", "NOTHING", at)
+        blender.hover(at)
         yield 0.3
 
 
 def units():
     """Delete a bed, undo and redo that; drag a copy off, undo and redo that; hide; delete in mid-session."""
-    blender.event("MOUSEMOVE", "NOTHING", blender.middle())
+    blender.hover(blender.middle())
     blender.select(blender.beds()[0])
     yield 0.5
     counted("one bed")
@@ -340,7 +339,7 @@ def units():
     yield 1.0
     counted("copy in hand")
     x, y = blender.middle()
-    blender.event("MOUSEMOVE", "NOTHING", (x + 120, y))
+    blender.hover((x + 120, y))
     yield 0.5
     blender.key("LEFTMOUSE", (x + 120, y))
     yield from looked("copied")

@@ -6,8 +6,7 @@ from tests.window import driver as blender
 
 
 def script():
-    yield from blender.empty_scene()
-    yield from blender.add_paper_bed()
+    yield from blender.scene_with_bed(bed="paper")
     origin = blender.beds()[0].location
     # Upside down, its lowest point some millimeters above the pins.
     bpy.ops.mesh.primitive_monkey_add(
@@ -16,8 +15,7 @@ def script():
     yield 0.5
     blender.SEEN["added"] = sorted(blender.call(bpy.ops.digiclay.add_presser))
     yield from blender.open_sidebar()
-    blender.key("HOME")
-    yield None
+    yield from blender.whole_view()
     yield from blender.start(bpy.data.objects["Suzanne"])
     yield from blender.grab((0, 0, -17), "Z", look_as="pressing")
     yield from blender.after("pressed")

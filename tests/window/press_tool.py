@@ -18,7 +18,7 @@ def drag(way, pause=0.3):
     """Hold the mouse along a way over the bed, mm, at its start until the finger is there; it stays down."""
     for step, (x, y) in enumerate(way):
         at = blender.on_the_bed(x, y)
-        blender.event("MOUSEMOVE", "NOTHING", at)
+        blender.hover(at)
         yield 0.15
         if step == 0:
             blender.event("LEFTMOUSE", "PRESS", at)
@@ -67,8 +67,7 @@ def note(name):
 
 
 def script():
-    yield from blender.empty_scene()
-    yield from blender.add_paper_bed()
+    yield from blender.scene_with_bed(bed="paper")
     # Software GL draws a frame or two a second; in between the session is to catch up.
     blender.preferences().most_periods = 100
     blender.call(bpy.ops.wm.tool_set_by_id, name="digiclay.press_tool")
@@ -76,7 +75,7 @@ def script():
     note("added")
     # An outline about 625 pins is what takes software GL longest.
     blender.call(bpy.ops.object.select_all, action="DESELECT")
-    blender.event("MOUSEMOVE", "NOTHING", blender.on_the_bed(-15, 5))
+    blender.hover(blender.on_the_bed(-15, 5))
     yield 1.0
     blender.shot("press_cursor")
     yield from edges()
@@ -111,7 +110,7 @@ def keys():
         said(f"{name} let go")
     blender.event("LEFT_CTRL", "PRESS", at, ctrl=True)
     yield from blender.rounds()
-    blender.event("MOUSEMOVE", "NOTHING", (at[0] + 1, at[1]))
+    blender.hover((at[0] + 1, at[1]))
     yield from blender.rounds()
     said("moved without Ctrl")
 
@@ -134,7 +133,7 @@ def edges():
         )
         pictures = []
         for preferences.show_cursor_text in (False, True):
-            blender.event("MOUSEMOVE", "NOTHING", at)
+            blender.hover(at)
             yield from blender.rounds(8)
             blender.shot(f"press_text_{name}")
             pictures.append(blender.read_shot(f"press_text_{name}"))
@@ -158,7 +157,7 @@ def depths():
     # Moves that Blender makes up itself have the keys that are held.
     blender.event("LEFT_CTRL", "PRESS", at, ctrl=True)
     for step in range(1, 5):
-        blender.event("MOUSEMOVE", "NOTHING", (at[0], at[1] + 20 * step), ctrl=True)
+        blender.hover((at[0], at[1] + 20 * step), ctrl=True)
         yield 0.1
     yield from come()
     note("after Ctrl")
@@ -187,15 +186,15 @@ def depths():
 
 def disabled():
     """Disable the extension with the tool in hand and the mouse over the bed, and go on moving it."""
-    yield from blender.add_paper_bed()
+    yield from blender.add_bed(bed="paper")
     tools, at = blender.window().workspace.tools, blender.on_the_bed(-15, 5)
     held = [tools.from_space_view3d_mode("OBJECT").idname]
-    blender.event("MOUSEMOVE", "NOTHING", at)
+    blender.hover(at)
     yield 1.0
     addon_utils.disable(blender.EXTENSION)
     held.append(tools.from_space_view3d_mode("OBJECT").idname)
     for step in range(3):
-        blender.event("MOUSEMOVE", "NOTHING", (at[0] + 5 * step, at[1]))
+        blender.hover((at[0] + 5 * step, at[1]))
         yield 1.0
     blender.SEEN["tools held"] = held
     addon_utils.enable(blender.EXTENSION)  # for what comes after the script

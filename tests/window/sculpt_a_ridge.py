@@ -15,11 +15,9 @@ def script():
 
 def valley():
     after, undo = blender.after, blender.undo
-    yield from blender.empty_scene()
-    yield from blender.add_paper_bed()
+    yield from blender.scene_with_bed(bed="paper")
     yield from blender.open_sidebar()
-    blender.key("HOME")
-    yield None
+    yield from blender.whole_view()
     blender.look("added")
     blender.select(blender.fingertip())
     yield None
@@ -70,11 +68,9 @@ def valley():
 
 def shape():
     """Display a sample shape, press the fingertip into it live, and keep what was formed."""
-    yield from blender.empty_scene()
-    yield from blender.add_paper_bed()
+    yield from blender.scene_with_bed(bed="paper")
     yield from blender.open_sidebar()
-    blender.key("HOME")
-    yield None
+    yield from blender.whole_view()
     blender.select(blender.beds()[0])
     blender.look("flat")
     blender.call(bpy.ops.digiclay.shape_sample, "EXEC_DEFAULT", True, sample="ripple", rise=12.0)
@@ -120,8 +116,7 @@ def shape():
     yield None
     blender.call(bpy.ops.digiclay.add_sample, "EXEC_DEFAULT", True, sample="session:signature")
     yield None
-    blender.key("HOME")
-    yield None
+    yield from blender.whole_view()
     blender.shot("sample_signature")
     blender.SEEN["beds"] = len(blender.beds())
     blender.key("Z", ctrl=True)

@@ -24,11 +24,9 @@ def count_orange(name):
 
 
 def read_shot(name):
+    """Return the pixels of the 3D view in a picture, (height, width, 3), the lower row first."""
     _, region = blender.view()
-    image = bpy.data.images.load(str(blender.OUT / f"{name}.png"))
-    width, height = image.size
-    pixels = np.array(image.pixels[:], np.float32).reshape(height, width, -1)
-    bpy.data.images.remove(image)
+    pixels = blender.read_shot(name)
     return pixels[region.y : region.y + region.height, region.x : region.x + region.width, :3]
 
 

@@ -13,7 +13,7 @@ def script():
     yield from blender.scene_with_bed(rows=25, columns=25)
     yield from stamp()
     blender.call(bpy.ops.digiclay.session_stop)
-    blender.event("MOUSEMOVE", "NOTHING", blender.middle())
+    blender.hover(blender.middle())
     yield None
     # Blender loses an operator of which it has had a subclass: last.
     action = blender.part("operators.action")
@@ -60,11 +60,11 @@ def stamp():
     )
     for name, x in (("FILE", -15.0), ("heart", 15.0)):
         settings.stamp, at = name, blender.on_the_bed(x, 0.0)
-        blender.event("MOUSEMOVE", "NOTHING", at)
+        blender.hover(at)
         yield None
         blender.event("LEFTMOUSE", "PRESS", at)
         for step in (5, 10, 20, 30):
-            blender.event("MOUSEMOVE", "NOTHING", (at[0] + step, at[1]))
+            blender.hover((at[0] + step, at[1]))
             yield 0.2
         blender.SEEN[f"stamp {name}"] = list_modal()
         blender.event("LEFTMOUSE", "RELEASE", (at[0] + 30, at[1]))
