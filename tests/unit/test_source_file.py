@@ -50,6 +50,11 @@ np.save(OBJECTS, np.array([{}, {}], dtype=object), allow_pickle=True)
     "name, content, said",
     [
         ("points.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\n", "must hold a surface made of faces"),
+        (
+            "far.obj",
+            b"v 0 0 0\nv 1 1e999 0\nv 0 1 0\nf 1 2 3\n",
+            "(got schöner Ordner far.obj: vertex 1 at 1, inf, 0)",
+        ),
         ("half.glb", b"glTF\x02\0\0\0\xff\0\0\0", "must be whole"),
         ("notes.doc", b"hello", "must be a mesh, a picture or an array"),
         ("notes.txt", b"hello", "must be a grid of numbers that can be read"),

@@ -7,7 +7,8 @@ import numpy as np
 from ..base.arrays import Faces, Floats
 from ..base.errors import OutputError
 from ..files.tables import Record
-from .mesh_writer import CLAY, GlbArrays, add_triangles, turn_upright
+from .mesh_writer import CLAY, GlbArrays, add_triangles
+from .obj_reader import UP, make_axes, turn
 
 
 class Animation(NamedTuple):
@@ -79,7 +80,7 @@ def write_glb(file: BinaryIO, animation: Animation, factor: float) -> None:
     """Write nodes that move, one per pin, or a skin with one morph target per frame, in meters, y up."""
     rate, points, faces, pin = animation
     arrays, count = GlbArrays(), len(points)
-    paths = turn_upright(points.reshape(-1, 3)).reshape(points.shape)
+    paths = turn(points, make_axes(UP))
     times = arrays.add(np.arange(count) / rate)
     if pin is None:
         if count > MOST_TARGETS:

@@ -7,7 +7,7 @@ from typing import NamedTuple
 from ..base.arrays import Floats, Indices
 from . import gltf_reader, obj_reader, scan_reader, threemf_reader
 from .mesh_limits import refuse_size
-from .obj_reader import find_axes, make_axes
+from .obj_reader import find_axes, make_axes, turn
 
 #: Byte order mark that a UTF-8 text may begin with.
 BOM = b"\xef\xbb\xbf"
@@ -37,7 +37,7 @@ def _read_obj(path: Path) -> Read:
     data = _read_bytes(path)
     vertices, faces = obj_reader.read(data, path.name)
     up, forward = find_axes(data)
-    return Read(vertices @ make_axes(up, forward).T @ make_axes(up), faces, None, up)
+    return Read(turn(vertices, make_axes(up, forward).T @ make_axes(up)), faces, None, up)
 
 
 def _read_scan(path: Path) -> Read:

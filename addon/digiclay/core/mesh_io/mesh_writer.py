@@ -16,7 +16,7 @@ from ..base.errors import OutputError, ParameterError
 from ..files.run_folder import open_whole
 from ..files.tables import Record
 from ..surface.formed import NO_PIN, Body, split_pieces
-from .obj_reader import UP, find_forward, make_axes
+from .obj_reader import UP, find_forward, make_axes, turn
 
 #: One triangle of a binary file.
 TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("spare", "<u2")])
@@ -202,14 +202,9 @@ def write_glb(file: BinaryIO, bodies: Sequence[Body], factor: float) -> None:
 
 def add_triangles(arrays: GlbArrays, vertices: Floats, faces: Array) -> Record:
     """Add triangles with the material number 0; return them as a part of a mesh."""
-    corners = arrays.add(turn_upright(vertices), "VEC3", target=VERTICES)
+    corners = arrays.add(turn(vertices, make_axes(UP)), "VEC3", target=VERTICES)
     indices = arrays.add(faces.ravel(), target=INDICES)
     return {"attributes": {"POSITION": corners}, "indices": indices, "material": 0}
-
-
-def turn_upright(vertices: Floats) -> Floats:
-    """Return vertices (v, 3) with y up: x stays, and the bed's y becomes -z."""
-    return np.stack([vertices[:, 0], vertices[:, 2], -vertices[:, 1]], axis=1)
 
 
 CORE = "http://schemas.microsoft.com/3dmanufacturing/core/2015/02"

@@ -39,6 +39,16 @@ def make_axes(up: str, forward: str = "") -> Floats:
     return np.stack([np.cross(ahead, above), ahead, above])
 
 
+def turn(vertices: Floats, axes: Floats) -> Floats:
+    """Return vertices (..., 3) @ axes (3, 3), which are turned by right angles: exact, infinite or not."""
+    return vertices[..., np.abs(axes).argmax(axis=0)] * axes.sum(axis=0)
+
+
+def turn_up(vertices: Floats, up: str) -> Floats:
+    """Return the vertices (v, 3) of a file with z upwards, as they are seen with its usual forward axis."""
+    return turn(vertices, make_axes(up).T)
+
+
 def find_axes(data: bytes) -> tuple[str, str]:
     """Return the upward and the forward axis of an OBJ file by a comment such as ``# z up``."""
     comment = COMMENT.search(data[:HEAD])

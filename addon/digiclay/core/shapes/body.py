@@ -17,10 +17,11 @@ from ..files.formats import inflate
 from ..files.tables import shorten
 from ..mesh_io import mesh_reader
 from ..mesh_io.mesh_reader import READERS
+from ..mesh_io.obj_reader import turn_up
 from ..model.contact import Contact
 from ..model.relaxation import Relaxation
 from ..model.underside import MOST_SAMPLES, Mesh, check_mesh, refuse_flat
-from .request import AUTO, LENGTHS, UPWARDS, find_length, turn_up
+from .request import AUTO, LENGTHS, UPWARDS, find_length
 
 #: Most triangles of a body, whose underside is computed many times per second, and bytes of a
 #: packed mesh.

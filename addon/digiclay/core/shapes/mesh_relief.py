@@ -9,9 +9,10 @@ from numpy.typing import NDArray
 
 from ..base.arrays import Cells, Flags, Floats, Indices
 from ..mesh_io.mesh_limits import CORNERS, LARGEST, make_refusal
+from ..mesh_io.obj_reader import turn_up
 from ..model.layout import RELATIVE_TOLERANCE, Grid
 from ..surface.regions import label_components
-from .request import Placement, Tops, turn_up
+from .request import Placement, Tops
 
 #: A hole is small if no more than this share of the covered pins stands under it.
 SMALL = 0.05

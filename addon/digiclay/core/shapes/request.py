@@ -10,22 +10,9 @@ from ..files.tables import Record
 
 #: Units of length of a file, in meters.
 LENGTHS = {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "inch": 25.4e-3}
-#: Upward directions of a file: its axes that become x, y, z, and their signs.
-UPWARDS: dict[str, tuple[tuple[int, int, int], tuple[int, int, int]]] = {
-    "z": ((0, 1, 2), (1, 1, 1)),
-    "y": ((0, 2, 1), (1, -1, 1)),
-    "x": ((2, 1, 0), (-1, 1, 1)),
-    "-z": ((0, 1, 2), (1, -1, -1)),
-    "-y": ((0, 2, 1), (1, 1, -1)),
-    "-x": ((2, 1, 0), (1, 1, -1)),
-}
+#: Upward directions of a file.
+UPWARDS = ("z", "y", "x", "-z", "-y", "-x")
 AUTO = "auto"
-
-
-def turn_up(vertices: Floats, up: str) -> Floats:
-    """Return the vertices (v, 3) of a file with z upwards; `up`: one of `UPWARDS`."""
-    axes, signs = UPWARDS[up]
-    return vertices[:, axes] * signs
 
 
 def find_length(unit: str, of_file: float | None) -> float:
