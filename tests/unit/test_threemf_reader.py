@@ -24,11 +24,12 @@ MESH = (
     + "".join('<triangle v1="{}" v2="{}" v3="{}"/>'.format(*row) for row in FACES)
     + "</triangles></mesh>"
 )
+OBJECT = f'<object id="1">{MESH}</object>'
 
 
-def packed(path, resources, build, head="", **parts):
+def packed(path, resources, build, head="", unit="millimeter", **parts):
     """Write a 3MF of a model's resources and build, and of further parts."""
-    model = f'{HEAD}{head}<model unit="millimeter" xmlns="{CORE}" xmlns:p="{PRODUCTION}">'
+    model = f'{HEAD}{head}<model unit="{unit}" xmlns="{CORE}" xmlns:p="{PRODUCTION}">'
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("[Content_Types].xml", TYPES)
         archive.writestr("_rels/.rels", RELATIONS)
@@ -43,38 +44,24 @@ def packed(path, resources, build, head="", **parts):
     return path
 
 
-def placement(*rows):
-    made = lib3mf.Transform()
-    for index, row in enumerate(rows):
-        made.Fields[index][:] = row
-    return made
+def placed(number, *rows, kind="component"):
+    """Return a component or an item: an object at a placement, its rows (4, 3)."""
+    transform = " ".join(f"{value:.9g}" for row in rows for value in row)
+    return f'<{kind} objectid="{number}" transform="{transform}"/>'
 
 
 def test_components_and_items_stand_where_lib3mf_puts_them(tmp_path):
-    wrapper = lib3mf.Wrapper()
-    model = wrapper.CreateModel()
-    model.SetUnit(lib3mf.ModelUnit.Inch)
-    mesh = model.AddMeshObject()
-    for place in PLACES:
-        position = lib3mf.Position()
-        position.Coordinates[:] = place
-        mesh.AddVertex(position)
-    for face in FACES:
-        triangle = lib3mf.Triangle()
-        triangle.Indices[:] = face.tolist()
-        mesh.AddTriangle(triangle)
-    inner, outer = model.AddComponentsObject(), model.AddComponentsObject()
     c, s = math.cos(0.5), math.sin(0.5)
-    inner.AddComponent(mesh, placement((c, s, 0), (-s, c, 0), (0, 0, 2), (1, 2, 3)))
-    inner.AddComponent(mesh, wrapper.GetIdentityTransform())
-    outer.AddComponent(inner, placement((1, 0, 0), (0, c, s), (0, -s, c), (0, 40, 0)))
-    mirror = placement((-1, 0, 0), (0, 1, 0), (0, 0, 1), (10, 0, 0))
-    model.AddBuildItem(outer, mirror)
-    model.AddBuildItem(mesh, placement((1, 0, 0), (0, 1, 0), (0, 0, 1), (0, 0, 50)))
-    path = tmp_path / "placed.3mf"
-    model.QueryWriter("3mf").WriteToFile(str(path))
-
-    judge = wrapper.CreateModel()
+    inner = placed(1, (c, s, 0), (-s, c, 0), (0, 0, 2), (1, 2, 3)) + '<component objectid="1"/>'
+    outer = placed(2, (1, 0, 0), (0, c, s), (0, -s, c), (0, 40, 0))
+    objects = "".join(
+        f'<object id="{number}"><components>{inside}</components></object>'
+        for number, inside in ((2, inner), (3, outer))
+    )
+    mirrored = placed(3, (-1, 0, 0), (0, 1, 0), (0, 0, 1), (10, 0, 0), kind="item")
+    above = placed(1, (1, 0, 0), (0, 1, 0), (0, 0, 1), (0, 0, 50), kind="item")
+    path = packed(tmp_path / "placed.3mf", OBJECT + objects, mirrored + above, unit="inch")
+    judge = lib3mf.Wrapper().CreateModel()
     judge.QueryReader("3mf").ReadFromFile(str(path))
     objects = judge.MergeToModel().GetMeshObjects()
     points = []
@@ -123,7 +110,6 @@ LAUGHS = "".join(
     f'<!ENTITY {name} "{10 * f"&{other};"}">' for other, name in pairwise("abcdefghij")
 )
 ENTITIES = f'<!DOCTYPE x [<!ENTITY a "aaaaaaaaaa">{LAUGHS}]>'
-OBJECT = f'<object id="1">{MESH}</object>'
 OWN = '<components><component objectid="1"/></components>'
 ITEM = '<item objectid="1"/>'
 

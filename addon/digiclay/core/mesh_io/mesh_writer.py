@@ -17,9 +17,8 @@ from ..files.run_folder import open_whole
 from ..files.tables import Record
 from ..surface.formed import NO_PIN, Body, split_pieces
 from .obj_reader import UP, find_forward, make_axes, turn
+from .scan_reader import TRIANGLE
 
-#: One triangle of a binary file.
-TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("spare", "<u2")])
 TEXT = (
     "facet normal %.6e %.6e %.6e\nouter loop\n"
     + 3 * "vertex %.9g %.9g %.9g\n"

@@ -213,11 +213,6 @@ class Formed:
         shift = float(np.sign(self.along) * (self.position[self.columns, 0] - self.position[0, 0]))
         return shift if abs(shift) > 1e-3 * self.pitch else 0.0
 
-    @property
-    def row_spacing(self) -> float:
-        """Distance between rows, m."""
-        return abs(self.across)
-
     def nearest(self, points: Floats) -> Indices:
         """Return the pin in the nearest row that is nearest to each of points (k, 2), m."""
         row = np.rint((points[:, 1] - self.position[0, 1]) / self.across).clip(0, self.rows - 1)
@@ -236,7 +231,7 @@ class Formed:
     @property
     def spacing(self) -> float:
         """Mean of the distances in a row and of rows, m."""
-        return 0.5 * (self.pitch + self.row_spacing)
+        return 0.5 * (self.pitch + abs(self.across))
 
     @cached_property
     def neighbors(self) -> Indices:
