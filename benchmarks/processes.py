@@ -36,8 +36,8 @@ CASES: dict[str, tuple[str, ...]] = {
     "Method II": ("control.method=cell_states",),
     "Method III": ("control.method=hybrid",),
 }
-#: The last case: a command as a whole, bytecode kept.
-START = "digiclay run tap --quiet --overwrite"
+#: The last case: a command as a whole, bytecode kept; so often, of which the least time counts.
+START, STARTS = "digiclay run tap --quiet --overwrite", 5
 #: Run at both commits: prints the least processor time of a control period in each case, s.
 PROGRAM = """
 import json, sys, time
@@ -130,7 +130,7 @@ def run_commit(tree: Path, commit: str, count: int) -> list[float]:
         run_python(tree, f"commits: {commit}", "-c", PROGRAM, cases, str(count))
     )
     starts = []
-    for _ in range(5):
+    for _ in range(STARTS):
         before = sum(getrusage(RUSAGE_CHILDREN)[:2])
         run_python(tree, f"commits: {commit}", "-m", *START.split(), PYTHONDONTWRITEBYTECODE="")
         starts.append(sum(getrusage(RUSAGE_CHILDREN)[:2]) - before)

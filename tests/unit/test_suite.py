@@ -13,6 +13,7 @@ from digiclay.cli import main
 from digiclay.core.base.modes import Mode
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.toml_table import resolve
+from digiclay.core.session.run_scene import run
 from digiclay.core.studies.nominal_relief import find_nominal, measure_relief
 from scipy.stats import t as student
 
@@ -22,6 +23,7 @@ from digiclay_study.method_trials import (
     OUTCOMES,
     RANDOM,
     draw_drags,
+    judge_trial,
     list_paths,
     list_trajectories,
     measure_trial,
@@ -217,8 +219,9 @@ def test_a_trial_of_several_fingers_is_judged_by_the_worst():
         {"layout": {"rows": 15, "columns": 25}, "control": {"method": "virtual_master"}}
     )
     placed, measure = place_trial(scene, "two-hands")
-    short = replace(placed, simulation=replace(placed.simulation, duration=4.0))
+    short = replace(placed, simulation=replace(placed.simulation, duration=3.0))
     both = measure(short, None)["figures"]
+    assert list(both) == list(OUTCOMES)
     each = [measure(replace(short, fingers=(finger,)), None)["figures"] for finger in short.fingers]
     # Apart as they are, each is as alone; the sum of both would be 0.4 N off.
     for name in ("rfd", "max_total_force", "lag_max"):
@@ -236,11 +239,11 @@ def placed_lift(method):
 def test_a_phase_is_judged_alone_and_a_method_that_counts_nothing_itself_loses_the_fingertip():
     placed, _ = placed_lift("virtual_master")
     short = placed.with_sections(simulation=replace(placed.simulation, duration=2.5))
-    whole, part = (measure_trial(short, phase=phase)["figures"] for phase in (None, (2.0, 2.4)))
-    assert list(whole) == list(part) == list(OUTCOMES)
-    assert part["rfd"] != whole["rfd"]
+    done = run(short)
+    assert judge_trial(done, (2.0, 2.4))["rfd"] != judge_trial(done, None)["rfd"]
     placed, measure = placed_lift("elastic")
-    phase, whole = (found["figures"] for found in (measure(placed, None), measure_trial(placed)))
+    done = run(placed)
+    phase, whole = (judge_trial(done, each) for each in (measure.keywords["phase"], None))
     assert phase["contact_loss_share"] > 0.5
     assert (phase["losses"], whole["losses"]) == (1.0, 1.0)
 
