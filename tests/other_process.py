@@ -14,6 +14,21 @@ PACKAGES = os.pathsep.join([str(ROOT / "addon"), str(ROOT)])
 PROGRAM = "from digiclay.cli import console; console()"
 
 
+def carry_out(*command, stderr=subprocess.PIPE, **options):
+    """Run a command, which ends well; return what it printed."""
+    done = subprocess.run(
+        [str(word) for word in command],
+        stdout=subprocess.PIPE,
+        stderr=stderr,
+        encoding="utf-8",
+        errors="replace",
+        timeout=TIMEOUT,
+        **options,
+    )
+    assert done.returncode == 0, f"{done.stdout[-4000:]}{done.stderr}"
+    return done.stdout
+
+
 def dead():
     """Return the number of a process that has ended."""
     process = subprocess.Popen([sys.executable, "-c", ""])

@@ -1,12 +1,11 @@
 """A copy of the package that a test may change: a new part is written into it and run."""
 
 import shutil
-import subprocess
 import sys
 from filecmp import dircmp
 from pathlib import Path
 
-from tests.timeouts import TIMEOUT
+from tests.other_process import carry_out
 
 ROOT = Path(__file__).parents[1]
 
@@ -20,16 +19,8 @@ def copy_package(folder):
 
 def run_python(copy, *arguments):
     """Run Python on the copy; return what it printed."""
-    done = subprocess.run(
-        [sys.executable, *arguments],
-        env={"PYTHONPATH": str(copy / "addon"), "PATH": ""},
-        capture_output=True,
-        encoding="utf-8",
-        check=False,
-        timeout=TIMEOUT,
-    )
-    assert done.returncode == 0, done.stderr
-    return done.stdout
+    environment = {"PYTHONPATH": str(copy / "addon"), "PATH": ""}
+    return carry_out(sys.executable, *arguments, env=environment)
 
 
 def find_changes(copy):

@@ -3,7 +3,6 @@
 import ast
 import functools
 import re
-import subprocess
 import sys
 import tomllib
 from collections.abc import Callable, Iterable
@@ -11,7 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.timeouts import TIMEOUT
+from tests.other_process import carry_out
+from tests.scene_files import command
 
 ROOT = Path(__file__).parents[2]
 PACKAGE = ROOT / "addon" / "digiclay"
@@ -133,25 +133,8 @@ def package_imports(package: Path) -> dict[str, set[str]]:
 
 
 def tracked(*patterns: str) -> list[Path]:
-    listed = subprocess.run(
-        [
-            "git",
-            "-c",
-            "safe.directory=*",
-            "ls-files",
-            "-co",
-            "--exclude-standard",
-            "-z",
-            "--",
-            *patterns,
-        ],
-        cwd=ROOT,
-        capture_output=True,
-        encoding="utf-8",
-        check=True,
-        timeout=TIMEOUT,
-    )
-    found = [ROOT / name for name in listed.stdout.split("\0") if name]
+    git = command("git -c safe.directory=* ls-files -co --exclude-standard -z --")
+    found = [ROOT / name for name in carry_out(*git, *patterns, cwd=ROOT).split("\0") if name]
     assert found, f"git lists no file for {patterns}"
     return [path for path in found if path.is_file()]
 

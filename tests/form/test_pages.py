@@ -52,7 +52,7 @@ SHOWN = re.compile(r"!\[[^\]]*\]\(([^)\s]+)\)")
 MADE = {"benchmarks.md", "changes.md", "contributing.md"}
 
 
-def _lines(text: str) -> Iterator[tuple[str, bool]]:
+def list_lines(text: str) -> Iterator[tuple[str, bool]]:
     fenced = False
     for line in text.splitlines():
         fence = line.lstrip().startswith("```")
@@ -61,7 +61,9 @@ def _lines(text: str) -> Iterator[tuple[str, bool]]:
 
 
 def _headings(text: str) -> list[str]:
-    return [line.lstrip("# ") for line, code in _lines(text) if not code and line.startswith("#")]
+    return [
+        line.lstrip("# ") for line, code in list_lines(text) if not code and line.startswith("#")
+    ]
 
 
 def _anchors(text: str) -> set[str]:
@@ -72,7 +74,7 @@ def _anchors(text: str) -> set[str]:
 
 def find_commands(text: str) -> list[tuple[str, str]]:
     """Return program and arguments of every command of a page, in blocks of code and within sentences."""
-    lines = list(_lines(CONTINUED.sub(" ", text)))
+    lines = list(list_lines(CONTINUED.sub(" ", text)))
     blocks = [line.strip() for line, code in lines if code]
     prose = " ".join(line for line, code in lines if not code)
     matches = [COMMAND.match(line) for line in (*blocks, *re.findall(r"`([^`]+)`", prose))]
@@ -114,7 +116,7 @@ def _parameters() -> dict[tuple[str, str], Quantity]:
 
 def find_undated(page: Path, text: str) -> list[str]:
     rows, measured = [], False
-    for line, code in _lines(text):
+    for line, code in list_lines(text):
         if code or not line.startswith("|"):
             measured = False
         elif re.search(r"\|\s*commit\s*\|", line, re.IGNORECASE):
@@ -269,7 +271,9 @@ def read_prose(path: Path) -> str:
             for line in range(node.lineno, (node.end_lineno or 0) + 1)
         }
         return "\n".join(line if n in kept else "" for n, line in enumerate(text.splitlines(), 1))
-    return "\n".join("" if code else re.sub(r"`[^`]*`", "", line) for line, code in _lines(text))
+    return "\n".join(
+        "" if code else re.sub(r"`[^`]*`", "", line) for line, code in list_lines(text)
+    )
 
 
 def test_every_symbol_of_pages_and_of_the_paper_is_declared() -> None:

@@ -2,11 +2,12 @@
 
 import shutil
 import subprocess
+from functools import partial
 
 import pytest
 from digiclay.cli import main
 
-from tests.timeouts import TIMEOUT
+from tests.other_process import carry_out
 
 PROGRAMS = ("admesh", "assimp", "prusa-slicer")
 
@@ -45,15 +46,5 @@ def meshes(paper):
     return out
 
 
-def told(*command):
-    done = subprocess.run(
-        [str(part) for part in command],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        check=False,
-        encoding="utf-8",
-        errors="replace",
-        timeout=TIMEOUT,
-    )
-    assert done.returncode == 0, done.stdout
-    return done.stdout
+#: Runs another program and returns all that it says.
+told = partial(carry_out, stderr=subprocess.STDOUT)

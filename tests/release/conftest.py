@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 from digiclay import __version__
 
+from tests.other_process import carry_out
 from tests.timeouts import TIMEOUT
 
 ROOT = Path(__file__).parents[2]
@@ -27,17 +28,7 @@ ENVIRONMENT = {name: value for name, value in os.environ.items() if not name.sta
 
 
 def git(folder, *words):
-    command = ["git", "-c", "safe.directory=*", *words]
-    done = subprocess.run(
-        command,
-        cwd=folder,
-        env=ENVIRONMENT,
-        capture_output=True,
-        encoding="utf-8",
-        timeout=TIMEOUT,
-        check=True,
-    )
-    return done.stdout
+    return carry_out("git", "-c", "safe.directory=*", *words, cwd=folder, env=ENVIRONMENT)
 
 
 def commit(folder):

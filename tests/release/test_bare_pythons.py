@@ -15,6 +15,8 @@ import pytest
 from digiclay import __version__
 from digiclay.cli import main
 
+from tests.other_process import carry_out
+from tests.scene_files import command
 from tests.timeouts import TIMEOUT
 
 ROOT = Path(__file__).parents[2]
@@ -56,25 +58,14 @@ def read_pins(name):
     return dict(re.findall(r"^([\w-]+)==([\w.]+)$", text, re.MULTILINE))
 
 
-def _carry_out(*command):
+def _carry_out(*words):
     environment = {**os.environ, "GOAL": "test-release", "PYTHONPATH": ""}
-    done = subprocess.run(
-        command, cwd=ROOT, env=environment, capture_output=True, encoding="utf-8", timeout=TIMEOUT
-    )
-    assert done.returncode == 0, f"{done.stdout[-2000:]}{done.stderr[-2000:]}"
-    return done.stdout
+    return carry_out(*words, cwd=ROOT, env=environment)
 
 
 def _install(environment, *words):
-    pip = (
-        environment / "bin" / "python",
-        "-m",
-        "pip",
-        "--disable-pip-version-check",
-        "install",
-        "--quiet",
-    )
-    _carry_out(*pip, "--retries", "5", *words)
+    pip = command("-m pip --disable-pip-version-check install --quiet --retries 5")
+    _carry_out(environment / "bin" / "python", *pip, *words)
 
 
 def make_bare(folder, version, wheel, pins):

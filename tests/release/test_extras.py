@@ -2,26 +2,13 @@
 
 import json
 import re
-import subprocess
 import sys
 import tomllib
 
-from tests.timeouts import TIMEOUT
+from tests.other_process import carry_out
+from tests.scene_files import command
 
 from .conftest import ENVIRONMENT, ROOT, copy_checkout
-
-
-def carry_out(folder, *words):
-    done = subprocess.run(
-        words,
-        cwd=folder,
-        env=ENVIRONMENT | {"GOAL": "demo"},
-        capture_output=True,
-        encoding="utf-8",
-        timeout=TIMEOUT,
-    )
-    assert done.returncode == 0, f"{done.stdout[-2000:]}{done.stderr[-2000:]}"
-    return done.stdout
 
 
 def test_all_extras_fit_into_the_checkout_without_another_numpy(tmp_path):
@@ -30,19 +17,15 @@ def test_all_extras_fit_into_the_checkout_without_another_numpy(tmp_path):
     # As `make demo` sets it up, but without Blender's module, which is 400 MB.
     few = re.findall(r"^(?:numpy|setuptools|trimesh)==.*$", pins, re.MULTILINE)
     (checkout / "few.txt").write_text("\n".join(few) + "\n", encoding="utf-8")
-    carry_out(checkout, "tools/environment", ".venv", "few.txt", "3.11", "PYTHON", sys.executable)
+    here = {"cwd": checkout, "env": ENVIRONMENT | {"GOAL": "demo"}}
+    words = ".venv", "few.txt", "3.11", "PYTHON", sys.executable
+    carry_out("tools/environment", *words, **here)
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     extras = {*project["optional-dependencies"]} - {"blender", "dev"}
-    pip = (
-        ".venv/bin/python",
-        "-m",
-        "pip",
-        "--disable-pip-version-check",
-        "install",
-        "--dry-run",
-        "--quiet",
+    pip = command(
+        ".venv/bin/python -m pip --disable-pip-version-check install --dry-run --quiet --report -"
     )
-    said = carry_out(checkout, *pip, "--report", "-", f"digiclay[{','.join(extras)}]")
+    said = carry_out(*pip, f"digiclay[{','.join(extras)}]", **here)
     found = [one["metadata"] for one in json.loads(said)["install"]]
     wanted = {one["name"].lower(): one["version"] for one in found}
     assert {"matplotlib", "optuna", "scipy", "websockets"} <= wanted.keys()

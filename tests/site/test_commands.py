@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import pytest
 
-from tests.form.test_pages import CONTINUED, PAGES
+from tests.form.test_pages import CONTINUED, PAGES, list_lines
 
 ROOT = Path(__file__).parents[2]
 LIST = Path(__file__).with_name("not_executed.toml")
@@ -46,23 +46,13 @@ def find_commands(text: str) -> list[Command]:
 
     One of a sentence with a placeholder is a form, and one without arguments a name.
     """
-    found, fenced = [], False
-    for line in CONTINUED.sub(" ", text).splitlines():
-        fence = line.lstrip().startswith("```")
-        fenced ^= fence
-        if fenced or line.startswith("    "):
-            match = PROGRAM.fullmatch(line.strip())
-            found += [Command(_complete(match[1]), True)] if match else []
-            continue
-        for inside in re.findall(r"`([^`]+)`", line):
-            match = PROGRAM.fullmatch(inside)
-            if match and not PLACEHOLDER.search(inside) and not NAME.fullmatch(inside):
-                found.append(Command(_complete(match[1]), False))
+    found = []
+    for line, block in list_lines(CONTINUED.sub(" ", text)):
+        texts = [line.strip()] if block else re.findall(r"`([^`]+)`", line)
+        for match in filter(None, map(PROGRAM.fullmatch, texts)):
+            if block or not (PLACEHOLDER.search(match[0]) or NAME.fullmatch(match[0])):
+                found.append(Command(_complete(match[1]), block))
     return found
-
-
-def find_files(text: str) -> dict[str, str]:
-    return dict(FILE.findall(text))
 
 
 @functools.cache
@@ -96,7 +86,7 @@ def execute(command: str, folder: Path) -> str:
 
 def play(text: str, folder: Path, excused: set[str]) -> list[str]:
     """Carry out the commands of a page that are not excused, in a folder with its files; return failures."""
-    for name, content in find_files(text).items():
+    for name, content in FILE.findall(text):
         (folder / name).write_text(content, encoding="utf-8")
     once = dict.fromkeys(
         command.text for command in find_commands(text) if command.text not in excused
