@@ -1,5 +1,6 @@
 """Scenes with bodies: imprints, walls, several bodies and fingers, stored states, and what is refused."""
 
+import re
 import struct
 from dataclasses import replace
 
@@ -30,22 +31,11 @@ from digiclay.core.shapes.body import pack_mesh
 from digiclay.plots.run import session_figure
 
 from digiclay_serve.served_session import begin_session
+from tests.assemble import refused_in_a_line
 
 BALL = trimesh.creation.icosphere(4, radius=12e-3)
 BOX = trimesh.creation.box((12e-3, 12e-3, 20e-3))
 REST = 40e-3
-
-
-def hand():
-    """Return a mesh like a hand: a palm with five fingers, a bumpy underside, all of one piece."""
-    points, faces = np.array(BALL.vertices), np.array(BALL.faces)
-    points = points * (1.6, 1.4, 0.8)
-    around = np.arctan2(points[:, 1], points[:, 0])
-    points[:, :2] *= (1.0 + 0.3 * np.cos(5.0 * around) * np.hypot(*points[:, :2].T) / 19e-3)[
-        :, None
-    ]
-    points[:, 2] += 0.6e-3 * np.sin(points[:, 0] / 2e-3) * np.cos(points[:, 1] / 3e-3)
-    return trimesh.Trimesh(points, faces, process=False)
 
 
 def path(*places):
@@ -69,16 +59,30 @@ def table(*bodies, method="plastic", size=21, **sections):
     return {**bed, "body": list(bodies), **sections}
 
 
-def drag(speed=0.1, depth=15e-3):
-    """Return the path of a box that is dragged through the pins."""
-    height = REST - depth + 10e-3
-    return path((0, -45e-3, 0, height), (65e-3 / speed, 20e-3, 0, height))
+#: A box is dragged through the pins, 15 mm deep.
+DRAG = path((0, -45e-3, 0, REST - 5e-3), (0.65, 20e-3, 0, REST - 5e-3))
+
+
+def press_bodies(*bodies, held=False, **values):
+    """Return the run of a scene of bodies; `held`: without a method, behind shut valves."""
+    scene = resolve(table(*bodies, **values))
+    return run(replace(scene, control=None) if held else scene)
+
+
+def assert_formed(done, time, least):
+    """Assert that more pins than so many have the form of the underside at a time, s; the others rest."""
+    under, height = find_under(done.scene, time)[0], done.history["height"][-1]
+    pressed = under < done.scene.actuator.rest_height
+    assert pressed.sum() > least
+    assert np.corrcoef(height[pressed], under[pressed])[0, 1] > 0.999
+    assert np.sqrt(np.mean((height - under)[pressed] ** 2)) < 0.3e-3
+    assert (height[~pressed] == done.scene.actuator.rest_height).all()
 
 
 @pytest.fixture(scope="module")
 def press():
-    """Return a run in which a hand presses."""
-    return run(resolve(table(body(hand()))))
+    """Return a run in which a ball presses."""
+    return press_bodies(body(BALL))
 
 
 def find_under(scene, time):
@@ -112,30 +116,22 @@ def test_a_mesh_of_a_ball_is_a_fingertip_of_its_size():
 
 
 def test_clay_keeps_the_form_of_the_body(press):
-    under = find_under(press.scene, 0.5)[0]
-    height, pressed = press.history["height"][-1], under < REST
-    assert pressed.sum() > 80
-    assert np.corrcoef(height[pressed], under[pressed])[0, 1] > 0.999
-    assert np.sqrt(np.mean((height - under)[pressed] ** 2)) < 0.3e-3
-    # Pins beside the body stay.
-    assert (height[~pressed] == REST).all()
+    assert_formed(press, 0.5, 40)
 
 
 def test_the_force_is_that_of_the_body_and_its_metrics_are_recorded(press):
     history, (felt,) = press.history, press.metrics["bodies"]
     assert np.array_equal(history["body_force"][:, 0], history["force"])
-    assert felt["max_total_force"] == press.metrics["max_total_force"] > 5.0
-    assert felt["pressed_pins"] == (history["force"] > 0.0).sum(axis=1).max() > 80
+    assert felt["max_total_force"] == press.metrics["max_total_force"] > 4.0
+    assert felt["pressed_pins"] == (history["force"] > 0.0).sum(axis=1).max() > 40
     assert np.array_equal(history["body"][:, 0], history["fingertip"])
     assert press.metrics["duration"] == pytest.approx(0.9)
 
 
 def test_the_force_is_stiffness_times_indentation_up_to_the_cap():
     # A pin behind a shut valve does not move.
-    scene = resolve(table(body(BALL, stiffness=300.0, cap=1e-3)))
-    done = run(replace(scene, control=None))
-    under = find_under(done.scene, 0.5)[0]
-    wanted = 300.0 * np.clip(REST - under, 0.0, 1e-3)
+    done = press_bodies(body(BALL, stiffness=300.0, cap=1e-3), held=True)
+    wanted = 300.0 * np.clip(REST - find_under(done.scene, 0.5)[0], 0.0, 1e-3)
     # The spring is straight to 0.1 %.
     assert done.history["force"][100] == pytest.approx(wanted, rel=1e-3, abs=1e-12)
     assert (done.history["height"][-1] == REST).all()
@@ -143,56 +139,42 @@ def test_the_force_is_stiffness_times_indentation_up_to_the_cap():
 
 def test_damping_adds_to_the_force_of_a_fast_press_and_not_to_that_of_a_held_one():
     way = path((0, 0, 0, 52e-3), (0.04, 0, 0, 51e-3), (0.4, 0, 0, 51e-3))
-    forces = [
-        run(replace(resolve(table(body(BALL, way, damping=c))), control=None)).history[
-            "total_force"
-        ]
-        for c in (0.0, 0.4)
-    ]
-    middle = (
-        0.4
-        * 25e-3
-        * (
-            run(replace(resolve(table(body(BALL, way))), control=None)).history["force"][8] > 0
-        ).sum()
+    free, damped = (
+        press_bodies(body(BALL, way, damping=damping), held=True).history for damping in (0.0, 0.4)
     )
-    assert forces[1][8] - forces[0][8] == pytest.approx(middle, rel=0.2)
-    assert forces[1][-1] == pytest.approx(forces[0][-1], rel=1e-6)
+    added = damped["total_force"] - free["total_force"]
+    # At 25 mm/s.
+    assert added[8] == pytest.approx(0.4 * 25e-3 * (free["force"][8] > 0).sum(), rel=0.2)
+    assert abs(added[-1]) < 1e-6 * free["total_force"][-1]
 
 
-@pytest.mark.parametrize("damping", [0.0, 0.2])
-@pytest.mark.parametrize("method", ["plastic", "elastic", "viscous", "push_pull", "force_display"])
+@pytest.mark.parametrize(
+    "method, damping",
+    [("plastic", 0.0), ("plastic", 0.2), ("elastic", 0.2), ("viscous", 0.2), ("push_pull", 0.2),
+     ("force_display", 0.2)],
+)  # fmt: skip
 def test_a_wall_that_meets_pins_sideways_presses_them_at_a_bounded_force(method, damping):
-    done = run(resolve(table(body(BOX, drag(), damping=damping), method=method)))
-    (felt,) = done.metrics["bodies"]
+    (felt,) = press_bodies(body(BOX, DRAG, damping=damping), method=method).metrics["bodies"]
     assert 0.3 < felt["max_cell_force"] < 2.0
     assert felt["pressed_pins"] >= 16
 
 
-def test_a_pin_toy_of_friction_keeps_the_form():
-    control = {"method": "plastic", "yield_force": 0.1}
-    done = run(resolve({**table(body(BALL)), "control": control}))
-    under = find_under(done.scene, 0.5)[0]
-    pressed = under < REST - 0.5e-3
-    assert np.corrcoef(done.history["height"][-1][pressed], under[pressed])[0, 1] > 0.999
-
-
 def test_turned_sides_of_triangles_change_nothing(press):
-    mesh = hand()
+    mesh = BALL.copy()
     mesh.faces = mesh.faces[:, ::-1]
-    again = run(resolve(table(body(mesh))))
+    again = press_bodies(body(mesh))
     assert np.array_equal(again.history["height"], press.history["height"])
 
 
 def test_a_thin_blade_presses_pins_with_round_ends():
     blade = trimesh.creation.box((1e-3, 40e-3, 20e-3))
     way = path((0, 1.4e-3, 0, 52e-3), (0.4, 1.4e-3, 0, 46e-3))
-    felt = [
-        run(resolve(table(body(blade, way, tip_radius=radius)))).metrics["bodies"][0]
+    flat, round_ = (
+        press_bodies(body(blade, way, tip_radius=radius)).metrics["bodies"][0]["pressed_pins"]
         for radius in (0.0, 0.5e-3)
-    ]
-    assert felt[0]["pressed_pins"] == 0
-    assert felt[1]["pressed_pins"] >= 12
+    )
+    assert flat == 0
+    assert round_ >= 12
 
 
 FINGER = {"trajectory": path((0, 0.02, 0.02, 42e-3), (0.4, 0.02, 0.02, 38e-3))}
@@ -205,30 +187,26 @@ def place(mesh, x, y):
 
 
 def test_several_bodies_press_as_one_mesh_of_all():
-    left, right = place(BALL, -9e-3, 0.0), place(BOX, 12e-3, 3e-3)
+    places = (-9e-3, 0.0, 0.0), (12e-3, 3e-3, 0.0)
     two = trimesh.util.concatenate(
-        [
-            BALL.copy().apply_translation((-9e-3, 0, 0)),
-            BOX.copy().apply_translation((12e-3, 3e-3, 0)),
-        ]
+        [mesh.copy().apply_translation(at) for mesh, at in zip((BALL, BOX), places, strict=True)]
     )
-    apart, joint = run(resolve(table(left, right))), run(resolve(table(body(two))))
+    apart = press_bodies(place(BALL, *places[0][:2]), place(BOX, *places[1][:2]))
+    joint = press_bodies(body(two))
     # They touch no pin in common; the mesh's vertices are rounded elsewhere.
     assert np.abs(apart.history["height"] - joint.history["height"]).max() < 1e-9
-    each = apart.history["body_force"].sum(axis=2).max(axis=0)
-    assert each.min() > 1.0
+    assert apart.history["body_force"].sum(axis=2).max(axis=0).min() > 1.0
 
 
 def test_a_body_and_a_finger_are_felt_apart():
-    both = run(resolve(table(place(BALL, -15e-3, -15e-3), **FINGER)))
-    body_alone = run(resolve(table(place(BALL, -15e-3, -15e-3))))
+    ball = place(BALL, -15e-3, -15e-3)
+    both, body_alone = press_bodies(ball, **FINGER), press_bodies(ball)
     finger_alone = run(resolve(table(**FINGER) | {"simulation": {"duration": 0.9}}))
     height = body_alone.history["height"] + finger_alone.history["height"] - REST
     # 0.00 µm from both alone.
     assert np.abs(both.history["height"] - height).max() < 5e-9
-    assert both.history["finger_force"] == pytest.approx(
-        finger_alone.history["total_force"], abs=1e-6
-    )
+    force = finger_alone.history["total_force"]
+    assert both.history["finger_force"] == pytest.approx(force, abs=1e-6)
     for name in ("max_cell_force", "max_total_force", "contact_share"):
         assert both.metrics[name] == pytest.approx(finger_alone.metrics[name], rel=1e-5)
     (felt,) = both.metrics["bodies"]
@@ -240,8 +218,8 @@ def test_a_body_and_a_finger_are_felt_apart():
 def test_a_fingertip_on_a_pin_that_a_body_presses_is_capped_too():
     deep = {"trajectory": path((0, 0, 0, 42e-3), (0.05, 0, 0, 25e-3), (0.9, 0, 0, 25e-3))}
     way = path((0, 0, 0, 38e-3 + 12e-3), (0.9, 0, 0, 38e-3 + 12e-3))
-    alone = run(replace(resolve(table(**deep)), control=None))
-    both = run(replace(resolve(table(body(BALL, way), **deep)), control=None))
+    alone = press_bodies(held=True, **deep)
+    both = press_bodies(body(BALL, way), held=True, **deep)
     assert alone.metrics["max_cell_force"] > 1e6
     middle = len(both.history["position"]) // 2
     # 0.64 N of the body, and at most 1 N of a fingertip 1.6 mm deep.
@@ -251,15 +229,10 @@ def test_a_fingertip_on_a_pin_that_a_body_presses_is_capped_too():
 def test_a_fingertip_relaxes_while_a_body_hovers_over_its_pins():
     places = ((0, 42), (0.1, 39), (0.2, 60), (0.6, 60), (0.7, 39), (0.9, 39))
     twice = {"trajectory": path(*((time, 0, 0, height * 1e-3) for time, height in places))}
-    away = path(
-        (0, 0, 0, 0.07),
-        (0.25, 0, 0, 0.07),
-        (0.3, 0, 0, 0.05005),
-        (0.6, 0, 0, 0.05005),
-        (0.62, 0, 0, 0.07),
-    )
-    alone = run(replace(resolve(table(**twice)), control=None))
-    both = run(replace(resolve(table(body(BOX, away), **twice)), control=None))
+    hovers = ((0, 70), (0.25, 70), (0.3, 50.05), (0.6, 50.05), (0.62, 70))
+    away = path(*((time, 0, 0, height * 1e-3) for time, height in hovers))
+    alone = press_bodies(held=True, **twice)
+    both = press_bodies(body(BOX, away), held=True, **twice)
     assert both.metrics["bodies"][0]["max_total_force"] == 0.0
     assert both.history["finger_force"] == pytest.approx(alone.history["total_force"], abs=1e-9)
 
@@ -268,7 +241,7 @@ def test_pins_beside_a_body_that_stops_suddenly_are_not_touched():
     # Within 0.1 s, the longest time between two undersides, the path bends by 40 mm.
     way = path((0, 0, 0, 0.23), (0.05, 0, 0, 0.111), (0.3, 0, 0, 0.111))
     full = {"actuator": {"rest_height": 0.1}, "simulation": {"duration": 0.3}}
-    done = run(replace(resolve(table(body(BOX, way), **full)), control=None))
+    done = press_bodies(body(BOX, way), held=True, **full)
     assert done.history["force"].max() == 0.0
 
 
@@ -280,8 +253,8 @@ def press_on(scene, state, system, count):
 
 @pytest.mark.parametrize("others", [{}, FINGER], ids=["alone", "beside a finger"])
 def test_a_stored_state_in_mid_press_goes_on_to_the_last_bit(others):
-    turned = drag()
-    turned["waypoints"][1]["orientation"] = [0.9, 0.1, 0.2, 0.3]
+    (start, end), sides = DRAG["waypoints"], [0.9, 0.1, 0.2, 0.3]
+    turned = {**DRAG, "waypoints": [start, {**end, "orientation": sides}]}
     scene = resolve(table(body(BOX, turned, damping=0.2), body(BALL), **others))
     whole = press_on(scene, begin(assemble(scene)), assemble(scene), 110)
     for count in (47, 58):  # neither is a multiple of the periods between two undersides
@@ -294,7 +267,7 @@ def test_a_stored_state_in_mid_press_goes_on_to_the_last_bit(others):
 
 def test_the_error_estimate_covers_the_error():
     way = path((0, -20e-3, 0, 44e-3), (0.15, 10e-3, 5e-3, 43e-3))
-    scene = resolve(table(body(hand(), way, travel=8e-3)))
+    scene = resolve(table(body(BALL, way, travel=8e-3)))
     done = run(scene)
     bodies = tuple(replace(each, body=replace(each.body, travel=0.0)) for each in scene.bodies)
     fine = replace(scene, simulation=scene.simulation.refined(20), bodies=bodies, control=None)
@@ -308,7 +281,7 @@ def test_the_error_estimate_covers_the_error():
 @pytest.mark.parametrize("stepper", ["richardson", "runge_kutta_4"])
 def test_other_steppers_agree(stepper):
     heights = [
-        run(resolve(table(body(BOX, drag()), simulation=simulation))).history["height"][-1]
+        press_bodies(body(BOX, DRAG), simulation=simulation).history["height"][-1]
         for simulation in ({}, {"stepper": stepper, "physics_step": 1e-3})
     ]
     # The default step is 5 ms: the closed form is then within some micrometers.
@@ -369,7 +342,6 @@ def stl(folder, triangles):
     ("given", "words"),
     [
         (change(scale=0.0), "body #1.scale must be above 0"),
-        (change(scale=-2.0), "body #1.scale must be above 0"),
         (change(scale=float("nan")), "body #1.scale must be a finite number"),
         (change(stiffness=0), "body #1.stiffness must be above 0"),
         (change(damping=-1.0), "body #1.damping must be at least 0"),
@@ -377,7 +349,6 @@ def stl(folder, triangles):
         (change(samples=4), "body #1.samples must be odd"),
         (change(stifness=3.0), "body #1.stifness must be a known key"),
         (change(file="x.stl"), "body #1.file must be left out where mesh is given"),
-        (change(up="y"), "body #1.up must be left out where mesh is given"),
         (change(unit="mm"), "body #1.unit must be left out where mesh is given"),
         (change(up="w"), "body #1.up must be one of auto, z, y, x, -z, -y, -x (got 'w')"),
         (change(unit="km"), "body #1.unit must be one of auto, mm, cm, m, inch (got 'km')"),
@@ -407,8 +378,6 @@ def stl(folder, triangles):
             table(body(BALL), method="virtual_master"),
             "body must be left out: the method virtual_master",
         ),
-        (table(body(BALL), method="cell_states"), "body must be left out: the method cell_states"),
-        (table(body(BALL), method="hybrid"), "body must be left out: the method hybrid"),
     ],
     ids=lambda value: value if isinstance(value, str) else "",
 )
@@ -419,11 +388,9 @@ def test_what_cannot_press_is_refused_in_one_line(given, words, tmp_path, monkey
     (tmp_path / "lines.obj").write_text("v 0 0 0\nv 1 1 1\nl 1 2\n", encoding="utf-8")
     if "many.stl" in str(given["body"][:1]):
         stl(tmp_path, 2_000_000)
-    with pytest.raises(DigiclayError) as raised:
+    with refused_in_a_line(DigiclayError, re.escape(words)) as raised:
         assemble(resolve(given))
-    assert words in str(raised.value)
     assert len(str(raised.value)) <= 400
-    assert "\n" not in str(raised.value)
 
 
 @pytest.mark.parametrize(
@@ -442,14 +409,18 @@ def test_a_packed_mesh_of_too_many_triangles_is_refused():
         assemble(resolve(change(mesh=many)))
 
 
-def test_a_batch_refuses_bodies():
-    with pytest.raises(DigiclayError, match="must have no bodies"):
-        list(run_together([resolve(table(body(BALL)))] * 2))
+def run_batch(scene):
+    return list(run_together([scene] * 2))
 
 
-def test_a_server_refuses_bodies():
-    with pytest.raises(DigiclayError, match="must be left out"):
-        begin_session(resolve(table(body(BALL))))
+@pytest.mark.parametrize(
+    "use, words",
+    [(run_batch, "must have no bodies"), (begin_session, "must be left out")],
+    ids=["a batch", "a server"],
+)
+def test_what_runs_scenes_without_bodies_refuses_them(use, words):
+    with pytest.raises(DigiclayError, match=words):
+        use(resolve(table(body(BALL))))
 
 
 @pytest.mark.parametrize("others", [{}, FINGER], ids=["alone", "beside a finger"])

@@ -8,7 +8,7 @@ from digiclay.core.scene.recorder import Recorder
 from digiclay.core.scene.scene_source import find, load
 from digiclay.core.session.run_scene import run
 
-from tests.scenes.test_bodies import find_under
+from tests.scenes.test_bodies import assert_formed
 
 
 @pytest.mark.parametrize("name, held", [("hand_print", 1.5), ("face_cast", 2.3)])
@@ -16,13 +16,7 @@ def test_the_print_of_a_sample_body_is_its_underside(name, held):
     scene = load(find(name))
     assert scene.cells == 10_000
     assert scene.fingers[0].fingertip is None
-    done = run(replace(scene, recorder=Recorder(every=1000)))
-    height, under = done.history["height"][-1], find_under(scene, held)[0]
-    pressed = under < scene.actuator.rest_height
-    assert pressed.sum() > 1400
-    assert np.corrcoef(height[pressed], under[pressed])[0, 1] > 0.999
-    assert np.sqrt(np.mean((height - under)[pressed] ** 2)) < 0.3e-3
-    assert (height[~pressed] == scene.actuator.rest_height).all()
+    assert_formed(run(replace(scene, recorder=Recorder(every=1000))), held, 1400)
 
 
 def test_a_ball_that_rolls_leaves_a_track_with_its_knobs():

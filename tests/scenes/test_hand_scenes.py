@@ -1,11 +1,9 @@
 """Scenes of several fingers: what the samples form, and every command that takes such a scene or its run."""
 
-import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from digiclay.cli import main
 from digiclay.core.base.errors import OutputError
 from digiclay.core.model.touch import MOST_FORCE
 from digiclay.core.scene.recorder import write
@@ -25,7 +23,7 @@ from tests.own_methods import (
     small,
     write_method,
 )
-from tests.scene_files import folder_with, rows, timeless
+from tests.scene_files import call, folder_with, left, read_json, rows, timeless
 
 WAY = """trajectory.waypoints = [
   {{ time = 0, position = [{0}, 0, 0.041] }}, {{ time = 0.1, position = [{0}, 0, 0.038] }}]
@@ -44,16 +42,8 @@ flat_radius = 0.002
 fingertip.length = "11 mm"
 {WAY.format(0.009)}
 """
-SHAPED = ["form", "dome", "--scene", "my.toml", "--out", "out", "--quiet", "--finger"]
-GAINS = [
-    "sweep",
-    "my.toml",
-    "--vary",
-    "control.force_gain=3,4",
-    "--metric",
-    "rfd,lag",
-    "--quiet",
-]
+SHAPED = "form dome --scene my.toml --out out --finger"
+SHARES = "sweep my.toml --vary finger.2.contact.share=0.2,0.3 --metric rfd,lag --workers"
 
 
 def assert_sample(name, fingers):
@@ -90,48 +80,42 @@ def test_a_sample_of_hands_loses_no_finger_and_forms_what_it_is_called(name, fin
 
 
 @pytest.mark.parametrize(
-    "command, made",
+    "line, made, said",
     [
-        (["run", "my.toml", "--plots", "--out", "out", "--quiet"], ("session.png", "history.npz")),
-        (["compare", "my.toml", "--methods", "hybrid,cell_states", "--out", "out"], ("compare.png",)),
-        ([*SHAPED, "scene"], ("history.npz",)),
-        (["sweep", "my.toml", "--vary", "finger.2.contact.share=0.2,0.3", "--out", "out"], ("sweep.csv",)),
-        (["run", "my.toml", "--budget", "300um", "--set", "contact.stiffness=300", "--out", "out"], ()),
-    ],
-    ids=lambda part: " ".join(part[:1]),
-)  # fmt: skip
-def test_a_command_takes_a_scene_of_two_fingers(command, made, tmp_path, monkeypatch):
-    folder = folder_with(TWO, tmp_path, monkeypatch)
-    assert main(command) == 0
-    assert set(made) <= {path.name for path in (folder / "out").glob("*")}
-
-
-@pytest.mark.parametrize(
-    "command, said",
-    [
-        ([*SHAPED[:-2], "--finger", "press"], "formed by the first of 2 fingers alone"),
         (
-            ["compare", "my.toml", "--methods", "hybrid,cell_states", "--speed", "--out", "out"],
+            "run my.toml --plots --budget 300um --set contact.stiffness=300 --out out",
+            {"session.png", "history.npz"},
+            "at finger",
+        ),
+        (
+            f"{SHAPED} press",
+            {"history.npz"},
+            "formed by the first of 2 fingers alone",
+        ),
+        (f"{SHAPED} scene", {"history.npz"}, ""),
+        (
+            "compare my.toml --methods virtual_master,cell_states --speed --out out",
+            {"compare.png", "metrics.json"},
             "Followed, for the first finger alone, ",
         ),
-        (
-            ["compare", "my.toml", "--methods", "hybrid,cell_states", "--out", "out"],
-            "The worst of 2 fingers; metrics.json has each.",
-        ),
     ],
+    ids=["run", "form by a press", "form", "compare"],
 )
-def test_a_command_says_what_it_takes_of_several_fingers(
-    command, said, tmp_path, monkeypatch, capsys
+def test_a_command_takes_two_fingers_and_says_what_of_them(
+    line, made, said, tmp_path, monkeypatch, capsys
 ):
     folder = folder_with(TWO, tmp_path, monkeypatch)
-    assert main(command) == 0
-    assert said in capsys.readouterr().out
-    found = json.loads((folder / "out" / "metrics.json").read_text(encoding="utf-8"))
-    assert ("fingers" in found) == (command[0] == "compare")
-    if command[0] == "compare":
-        for method, each in found["fingers"].items():
-            largest = max(one["max_total_force"] for one in each)
-            assert found["methods"][method]["max_total_force"] == largest
+    assert call(line) == 0
+    assert made <= set(left(folder / "out"))
+    told = capsys.readouterr().out
+    assert said in told
+    if not line.startswith("compare"):
+        return
+    assert "The worst of 2 fingers; metrics.json has each." in told
+    found = read_json(folder / "out" / "metrics.json")
+    for method, fingers in found["fingers"].items():
+        largest = max(finger["max_total_force"] for finger in fingers)
+        assert found["methods"][method]["max_total_force"] == largest
 
 
 def test_rows_are_beyond_a_finger_where_one_is_and_not_where_all_together_are():
@@ -154,7 +138,7 @@ def test_a_budget_leaves_out_the_relaxation_of_all_fingers():
 
 def test_describe_names_the_finger_of_a_part_and_counts_all_rows(tmp_path, monkeypatch, capsys):
     folder_with(TWO, tmp_path, monkeypatch)
-    assert main(["describe", "my.toml"]) == 0
+    assert call("describe my.toml") == 0
     said = capsys.readouterr().out
     assert "of 2: length 11 mm" in said
     assert "  contact     stiffness" in said
@@ -163,7 +147,7 @@ def test_describe_names_the_finger_of_a_part_and_counts_all_rows(tmp_path, monke
         in said
     )
     assert "forces of the fingers (2); 112 bytes" in said
-    assert main(["describe", "my.toml", "--parameters"]) == 0
+    assert call("describe my.toml --parameters") == 0
     assert "finger #2.fingertip.length = 0.011 m" in capsys.readouterr().out
 
 
@@ -172,29 +156,28 @@ def test_points_of_several_fingers_run_one_at_a_time_to_the_same_bits(
 ):
     folder = folder_with(TWO, tmp_path, monkeypatch)
     for count in "12":
-        assert main([*GAINS[:-1], "--out", count, "--workers", count]) == 0
+        assert call(f"{SHARES} {count} --out {count}") == 0
     assert "2 points one at a time: they have several fingers" in capsys.readouterr().out
     assert timeless(folder / "1" / "sweep.csv") == timeless(folder / "2" / "sweep.csv")
-    assert main(["run", "my.toml", "--set", "control.force_gain=4", "--out", "run", "--quiet"]) == 0
-    metrics = json.loads((folder / "run" / "metrics.json").read_text(encoding="utf-8"))
+    assert call("run my.toml --set finger.2.contact.share=0.3 --out run --quiet") == 0
+    metrics = read_json(folder / "run" / "metrics.json")
     assert float(rows(folder / "1" / "sweep.csv")[1]["rfd (N)"]) == metrics["rfd"]
-    assert metrics["rfd"] == max(one["rfd"] for one in metrics["fingers"])
+    assert metrics["rfd"] == max(finger["rfd"] for finger in metrics["fingers"])
 
 
-@pytest.mark.parametrize("broken", ["fingertip", "finger_force"])
-def test_a_run_of_two_fingers_is_read_back_and_one_with_too_few_is_refused(broken, tmp_path):
+def test_a_run_of_two_fingers_is_read_back_and_one_with_too_few_is_refused(tmp_path):
     scene = tmp_path / "my.toml"
     scene.write_text(TWO, encoding="utf-8")
     done = run(load(scene))
-    assert "at finger" in done.summary()
     save(done, tmp_path)
-    kept = read_run(tmp_path, "fingertip", "finger_force").history
-    np.testing.assert_array_equal(kept["finger_force"], done.history["finger_force"])
-    write({**done.history, broken: done.history[broken][:, :1]}, tmp_path / HISTORY)
-    with pytest.raises(
-        OutputError, match=rf"{broken} must have the shape \(21, 2.*of its scene \(got \(21, 1"
-    ):
-        read_run(tmp_path, "fingertip", "finger_force")
+    stored = read_run(tmp_path, "fingertip", "finger_force").history
+    np.testing.assert_array_equal(stored["finger_force"], done.history["finger_force"])
+    for name in ("fingertip", "finger_force"):
+        write({**done.history, name: done.history[name][:, :1]}, tmp_path / HISTORY)
+        with pytest.raises(
+            OutputError, match=rf"{name} must have the shape \(21, 2.*of its scene \(got \(21, 1"
+        ):
+            read_run(tmp_path, "fingertip", "finger_force")
 
 
 @pytest.mark.parametrize(

@@ -19,10 +19,10 @@ from digiclay.core.control.cell_states import (
 )
 from digiclay.core.control.travel import Heading, Rim
 from digiclay.core.model.actuator import Actuator
-from digiclay.core.model.control_interface import Measurement
 from digiclay.core.model.layout import Layout, make_grid
 
 from tests.assemble import table
+from tests.measured import measure
 
 REST = 40e-3
 BLISTER = Blister(radius=12e-3, edge_radius=15.5e-3, flat_radius=3e-3)
@@ -33,15 +33,12 @@ BED = make_grid(Layout(rows=13, columns=13))
 MIDDLE = 6 * 13 + 6
 
 
-def seen(forces=None, modes=None):
+def seen(forces, modes=None):
     """Measure a bed at rest on which some cells are pressed, or in some mode."""
-    force, mode = np.zeros(BED.count), np.full(BED.count, Mode.REST, np.int8)
-    for row, values in ((force, forces), (mode, modes)):
-        row[list(values or ())] = list((values or {}).values())
-    level, cells = np.full(BED.count, REST), np.arange(BED.count)
-    return Measurement(
-        BED.compute_basis(cells), level, force, level.copy(), mode, np.zeros((1, BED.count)), cells
-    )
+    measured = measure(BED.x, BED.y, rows=1)
+    for row, values in ((measured.force, forces), (measured.mode, modes or {})):
+        row[list(values)] = list(values.values())
+    return measured
 
 
 def ordered(measured, memory=None):

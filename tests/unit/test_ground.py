@@ -9,11 +9,11 @@ from digiclay.core.control.blister import Blister
 from digiclay.core.control.ground import GROUNDS
 from digiclay.core.control.travel import Heading, update_heading
 from digiclay.core.control.virtual_master import VirtualMaster
-from digiclay.core.model.control_interface import Measurement
 from digiclay.core.model.layout import Layout, make_grid
 from digiclay.core.scene.toml_table import format_scene, resolve
 
 from tests.assemble import make_system, master, table
+from tests.measured import measure
 
 BED = make_grid(Layout(15, 15))
 EAST = (1.0, 0.0)
@@ -21,20 +21,16 @@ EAST = (1.0, 0.0)
 RIDGE = np.where(np.abs(BED.x) < 4e-3, 44e-3, 40e-3)
 
 
-def seen(target, mode, own=None):
+def seen(target, mode, own=0.0):
     """Return a measurement of a whole bed at its commanded heights that nobody touches."""
-    cells, modes = np.arange(BED.count), np.full(BED.count, mode, np.int8)
-    rows = np.zeros((1, BED.count)) if own is None else own[None].copy()
-    free = np.zeros(BED.count)
-    return Measurement(
-        BED.compute_basis(cells), target.copy(), free, target.copy(), modes, rows, cells
-    )
+    measured = measure(BED.x, BED.y, height=target, mode=mode, rows=1)
+    measured.own[0] = own
+    return measured
 
 
 def command(memory, measured, ground="cell"):
-    control = VirtualMaster(ground=ground)
-    orders = make_system(Layout(15, 15), control=control).controller.command(memory, measured)[1]
-    return orders
+    system = make_system(Layout(15, 15), control=VirtualMaster(ground=ground))
+    return system.controller.command(memory, measured)[1]
 
 
 def at(x, y):
@@ -43,7 +39,7 @@ def at(x, y):
 
 #: Share of the way to the top 12 mm from the middle.
 SHARE = Blister().evaluate_profile(np.array([12e-3]))[0]
-RISEN = seen(np.full(BED.count, 47e-3), Mode.BLISTER, own=np.full(BED.count, 40e-3))
+RISEN = seen(np.full(BED.count, 47e-3), Mode.BLISTER, own=40e-3)
 
 
 @table(
@@ -66,7 +62,7 @@ def test_a_cell_rises_from_its_own_ground(measured, place, height):
 
 def test_a_cell_takes_its_commanded_height_for_its_ground_and_what_was_raised_stays():
     for mode in (Mode.REST, Mode.HOLD, Mode.EDGE):
-        measured = seen(RIDGE, mode, own=np.full(BED.count, 90e-3))
+        measured = seen(RIDGE, mode, own=90e-3)
         command(master(height=50e-3), measured)
         np.testing.assert_array_equal(measured.own[0], RIDGE)
     # It comes up out of a valley of 4 mm, whose bottom it has raised to its top.
@@ -89,7 +85,7 @@ def test_a_cell_takes_its_commanded_height_for_its_ground_and_what_was_raised_st
     ],
 )
 def test_what_is_left_behind_a_blister_that_travels(target, ground, top, kept):
-    behind = seen(np.full(BED.count, target), Mode.FROZEN, own=np.full(BED.count, ground))
+    behind = seen(np.full(BED.count, target), Mode.FROZEN, own=ground)
     found = command(master(*EAST, height=top), behind).target[at(-12, 0)]
     assert (found == target) == kept
 

@@ -8,13 +8,13 @@ from digiclay.core.control.finger_estimate import FingerFilter, Spread, invert_s
 from digiclay.core.control.finger_sections import Sections
 from digiclay.core.control.flow_servo import make_flow_servo
 from digiclay.core.control.servo import Tracking, lock_overloaded
-from digiclay.core.model.control_interface import Measurement
 from digiclay.core.model.fingertip import Fingertip, compute_forms, compute_underside
 from digiclay.core.model.valve import Valve
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.toml_table import resolve
 
 from tests.assemble import make_basis, make_system, table
+from tests.measured import measure
 
 PERIOD, BAND = 5e-3, 1e-6
 #: Elongation of the default fingertip, 10 by 8 mm.
@@ -199,12 +199,9 @@ def test_of_cells_picked_for_some_fingers_each_finger_has_its_own(wanted):
 )
 def test_a_single_pin_gives_way_that_carries_nearly_half_of_the_set_point(asked, force, yields):
     system = assemble(resolve({"control": {"method": "hybrid", "force_setpoint": asked}}))
-    controller, count, pin = system.controller, system.grid.count, 312
-    pressed, level = np.zeros(count), np.full(count, 40e-3)
-    pressed[pin] = force
-    basis, mode = system.grid.compute_basis(np.arange(count)), np.zeros(count, np.int8)
-    own = np.zeros((controller.rows, count))
-    seen = Measurement(basis, level, pressed, level.copy(), mode, own, np.arange(count), mode * 0.0)
+    controller, pin = system.controller, 312
+    seen = measure(system.grid.x, system.grid.y, rows=controller.rows)
+    seen.force[pin] = force
     _, orders = controller.command(controller.begin(), seen)
     assert (orders.target[pin] < 40e-3, orders.command[pin] < 0.0) == (yields, yields)
     np.testing.assert_array_equal(np.delete(orders.target, pin), 40e-3)

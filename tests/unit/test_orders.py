@@ -18,7 +18,6 @@ from digiclay.core.control.orders import (
 from digiclay.core.control.pin_motion import MotionParameters
 from digiclay.core.control.virtual_master import Master, Phase
 from digiclay.core.engine.simulation import begin
-from digiclay.core.model.control_interface import Measurement
 from digiclay.core.model.physics import find_speeds
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.toml_table import resolve
@@ -26,6 +25,7 @@ from digiclay.core.session.live_session import has_arrived, simulate_path
 from numpy.testing import assert_array_equal
 
 from tests.assemble import assert_near, table
+from tests.measured import measure
 from tests.reliefs import heighten, make_orders, make_spike_and_ridge, measure_roughness, stay_away
 
 ARRANGEMENTS = ("aligned", "staggered", "hexagonal")
@@ -395,9 +395,7 @@ def test_the_disc_of_a_period_holds_the_methods_and_the_smoothed_one_and_no_more
     place, radius, held
 ):
     system, memory = bed(), Master(Phase.SHAPING, 2e-3, -1e-3, 40e-3)
-    cells, none = np.empty(0, np.intp), np.empty(0)
-    basis, own = system.grid.compute_basis(cells), np.empty((0, 0))
-    touched = Measurement(basis, none, none, none, np.empty(0, np.int8), own, cells)
+    touched = measure(np.empty(0), np.empty(0))
     smoothed = order(bed(method="absent"), *place, radius)
     discs = [system.controller.locate(memory, touched)[1], smoothed.locate(None, touched)[1]]
     x, y, whole = order(system, *place, radius).locate(memory, touched)[1]

@@ -18,24 +18,17 @@ from digiclay.core.control.virtual_master import (
     make_master_cell,
 )
 from digiclay.core.model.conduit import Conduit
-from digiclay.core.model.control_interface import Measurement
 from digiclay.core.model.laws import law_parameters
 from digiclay.core.model.layout import Layout, make_grid
 from digiclay.core.model.valve import Fluid, Valve
 
-from tests.assemble import make_basis, make_system, master, path, record, table
+from tests.assemble import make_system, master, path, record, table
+from tests.measured import measure
 
 
 def control():
     """Return Method I."""
     return make_system(Layout(15, 15), control=VirtualMaster()).controller
-
-
-def measure(x, y, force, height=40e-3, mode=Mode.REST):
-    """Return a measurement of cells at places, m, all at a height, m, with forces, N."""
-    level, modes = np.full(x.size, height), np.full(x.size, mode, np.int8)
-    own = np.empty((0, x.size))
-    return Measurement(make_basis(x, y), level, force, level.copy(), modes, own, np.arange(x.size))
 
 
 def touched(*presses, height=40.0):
@@ -240,7 +233,7 @@ BESIDE = {"x": 0.4e-3, "y": 0.2e-3}
 
 def bed(mode=Mode.REST):
     """Return a measurement of a whole bed that nobody touches."""
-    return measure(BED.x, BED.y, np.zeros(BED.count), mode=mode)
+    return measure(BED.x, BED.y, mode=mode)
 
 
 def at(x, y):
