@@ -10,11 +10,7 @@ import trimesh
 from digiclay.cli import main
 from digiclay.core.base.errors import DigiclayError
 from digiclay.core.batch.run_together import run_together
-from digiclay.core.engine.bodies import MovedMesh, PathUndersides
 from digiclay.core.engine.simulation import begin, periods
-from digiclay.core.model.fingertip import Fingertip, compute_forms, compute_underside
-from digiclay.core.model.trajectory import make_level
-from digiclay.core.model.underside import check_mesh
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.scene_source import Setting, load
 from digiclay.core.scene.toml_table import format_scene, resolve, tabulate
@@ -91,28 +87,6 @@ def find_under(scene, time):
     stretch = system.undersides.find(round(time / system.period))
     cells = np.arange(system.grid.count)
     return np.array([stretch.at(number, cells)[0] for number in range(len(scene.bodies))])
-
-
-def test_a_mesh_of_a_ball_is_a_fingertip_of_its_size():
-    # 20,480 triangles are within 3 µm of the ball, measured across them; its sides are steeper.
-    ball, grid = trimesh.creation.icosphere(5, radius=12e-3), assemble(resolve({})).grid
-    moved = MovedMesh(
-        check_mesh(ball.vertices, ball.faces),
-        make_level(np.array([0.0]), np.array([[1e-3, 2e-3, 47e-3]])),
-        1,
-        0.0,
-        1e-3,
-    )
-    under = PathUndersides((moved,), grid, np.array([0.0, 5e-3]), 0.1)
-    under = under.find(0).at(0, np.arange(grid.count))[0]
-    tip = Fingertip(12e-3, 12e-3, 12e-3)
-    pose = np.array([[1e-3, 2e-3, 35e-3, 1.0, 0.0, 0.0, 0.0]])
-    exact = compute_underside(
-        *compute_forms(tip.outline(pose)), grid.compute_basis(np.arange(grid.count))
-    )[0]
-    inside = np.hypot(grid.x - 1e-3, grid.y - 2e-3) < 0.8 * 12e-3
-    assert inside.sum() > 30
-    assert np.abs(under - exact)[inside].max() < 5e-6
 
 
 def test_clay_keeps_the_form_of_the_body(press):

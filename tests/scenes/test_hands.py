@@ -88,7 +88,7 @@ LONG = replace(
 )
 
 
-@pytest.mark.parametrize("method", [None, "virtual_master", "elastic"])
+@pytest.mark.parametrize("method", [None, "virtual_master"])
 def test_a_third_finger_that_hovers_over_two_that_meet_changes_nothing(method):
     two, three = beds(method, 2, 3)
     poses = press(three, [(-3e-3, 1e-3), (3e-3, -1e-3), (9e-3, 1e-3)], (6e-3, 2e-3), 150)
@@ -112,30 +112,28 @@ def test_nobody_knows_who_presses_a_pin_just_below_two_predicted_fingertips(belo
     assert shares.ravel().tolist() == [1.0, 0.0]
 
 
-def drag(system, apart, angle, turn):
+def drag(system):
     """Return poses (t, p, 2, 7): pressed, lifted by 5.5 and 11.5 mm, at rest, then off at once.
 
-    They are so far apart, m, in a direction, rad, and go in one that is turned from it; the lower
-    rises.
+    They are 12 mm apart, and go in the direction of the lower one, which rises.
     """
     time = np.arange(730)[:, None] * PERIOD + system.instants
     poses = np.zeros((*time.shape, 2, 7))
     poses[..., 3] = 1.0
-    gone = 12e-3 * np.maximum(time - 2.92, 0.0)
-    for finger, (side, top) in enumerate(((0.5, 42e-3), (-0.5, 48e-3))):
+    gone, angle = 12e-3 * np.maximum(time - 2.92, 0.0), np.deg2rad(160)
+    for finger, (ahead, top) in enumerate(((6e-3, 42e-3), (-6e-3, 48e-3))):
         way = [(0.0, 42e-3), (0.5, 36.5e-3), (0.7, 36.5e-3), (2.62, top)]
-        height = np.interp(time, *np.transpose(way)) + (0.5 * gone if side > 0.0 else 0.0)
-        poses[..., finger, 0] = 1.3e-3 + side * apart * np.cos(angle) + gone * np.cos(angle + turn)
-        poses[..., finger, 1] = 0.7e-3 + side * apart * np.sin(angle) + gone * np.sin(angle + turn)
-        poses[..., finger, 2] = height
+        along = ahead + gone
+        poses[..., finger, 0] = 1.3e-3 + along * np.cos(angle)
+        poses[..., finger, 1] = 0.7e-3 + along * np.sin(angle)
+        poses[..., finger, 2] = np.interp(time, *np.transpose(way)) + 0.5 * gone * (ahead > 0.0)
     return poses
 
 
-@pytest.mark.parametrize("apart, angle, turn", [(12.0, 160, 0), (13.7, 30, 90)])
-def test_a_finger_beside_a_higher_one_is_followed_as_alone(apart, angle, turn):
-    # While pins far above a fingertip told of its place, both were lost at 12 mm, and at 13.7.
+def test_a_finger_beside_a_higher_one_is_followed_as_alone():
+    # While pins far above a fingertip told of its place, both were lost.
     one, two = beds("virtual_master", 1, 2, layout=replace(PAPER.layout, rows=27, columns=27))
-    poses = drag(two, apart * 1e-3, np.deg2rad(angle), np.deg2rad(turn))
+    poses = drag(two)
     _, both = follow(two, poses)
     alone = np.hstack([follow(one, poses[:, :, [finger]])[1] for finger in (0, 1)])
     # In all rows of the lift: without contact the force is off by the whole set point.
@@ -156,6 +154,7 @@ class Unlike(NamedTuple):
 
 
 UNLIKE = (FINGER, SOFT, LONG)
+ELASTIC = replace(FINGER, relaxation=None)
 
 
 @cache
@@ -186,22 +185,35 @@ def test_a_session_of_three_fingers_goes_on_from_a_kept_state_to_the_same_bits(m
     assert snapshot.dump(system, state) == snapshot.dump(system, last)
 
 
-@pytest.mark.parametrize("method", [*FOLLOWING, "viscous"])
-def test_fingers_that_come_and_go_leave_the_others_what_they_have(method):
-    one, three = beds(method, 1, 3)
+#: A set that is made anew adds up in another order; a controller with other rows begins anew. N.
+ORDER, ANEW = 1e-6, 0.2
+
+
+@pytest.mark.parametrize(
+    "method, middle, apart",
+    [
+        ("virtual_master", ELASTIC, ORDER),
+        ("viscous", ELASTIC, ORDER),
+        ("cell_states", LONG, ORDER),
+        ("hybrid", FINGER, ORDER),
+        ("hybrid", LONG, ANEW),
+    ],
+)
+def test_fingers_that_come_and_go_leave_the_others_what_they_have(method, middle, apart):
+    # The one that stays may have another number of filters than those that come and go.
+    one, three = assemble(scene(method, middle)), assemble(scene(method, FINGER, middle, FINGER))
     places = [(-40e-3, 1e-3), (2e-3, -4e-3), (40e-3, 2e-3)]
     poses = press(three, places, (6e-3, -9e-3), 120)
     state, _ = follow(three, poses)
-    kept = snapshot.change_fingers(three, one, state.copy(), [1])
-    assert np.array_equal(kept.row(0), state.row(0))
+    single = snapshot.change_fingers(three, one, state.copy(), [1])
+    assert np.array_equal(single.row(0), state.row(0))
     still = np.repeat(poses[-1:, -1:], len(three.instants), axis=1)
-    after, force = follow(one, np.repeat(still[:, :, [1]], 5, axis=0), kept)
+    after, force = follow(one, np.repeat(still[:, :, [1]], 5, axis=0), single)
     _, forces = follow(three, np.repeat(still, 5, axis=0), state)
-    # A set that is made anew adds up in another order.
-    assert_near(force[:, 0], forces[:, 1], 1e-6)
+    assert_near(force[:, 0], forces[:, 1], apart)
     more = snapshot.change_fingers(one, three, after, [None, 0, None])
     _, again = follow(three, np.repeat(still, 3, axis=0), more)
-    assert np.isfinite(again).all()
+    assert (again[-1] > 0.0).all()
 
 
 @pytest.mark.parametrize("later", [False, True], ids=["both from the start", "one comes later"])
@@ -229,24 +241,6 @@ def test_where_blisters_overlap_each_pin_has_the_ground_it_had_before_the_first_
     # They sink 5.5 mm, less the indentation: no pin is commanded deeper, and none is raised.
     assert 34.2e-3 < np.min(targets) < 36e-3
     assert np.max(targets) <= REST + 0.2e-3
-
-
-ELASTIC = replace(FINGER, relaxation=None)
-
-
-@pytest.mark.parametrize(
-    "first, method",
-    [(ELASTIC, "virtual_master"), (ELASTIC, "viscous"), (LONG, "cell_states"), (LONG, "hybrid")],
-)
-def test_a_finger_with_more_filters_than_the_others_comes_and_goes(first, method):
-    one, two = assemble(scene(method, first)), assemble(scene(method, first, FINGER))
-    poses = press(two, [(-20e-3, 1e-3), (20e-3, 0.0)], (6e-3, 0.0), 120)
-    state, alone = follow(one, poses[:, :, :1])
-    state, both = follow(two, poses[-5:], snapshot.change_fingers(one, two, state, [0, None]))
-    assert (alone[-1] > 0.0).all()
-    assert (both[-1] > 0.0).all()
-    _, left = follow(one, poses[-5:, :, :1], snapshot.change_fingers(two, one, state, [0]))
-    assert (left[-1] > 0.0).all()
 
 
 def displaying(method):

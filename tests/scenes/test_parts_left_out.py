@@ -41,16 +41,16 @@ def imported(*settings):
 @pytest.mark.parametrize(
     "without, with_, modules",
     [
-        (("conduit=absent",), (), {"model.conduit"}),
         (("fingertip=absent",), (), {"model.relaxation"}),
         (
-            [f"{part}=absent" for part in ("valve_lag", "delay", "relaxation", "control", "recorder")], (),
-            {"model.lag", "model.relaxation", "control.virtual_master", "control.blister", "control.servo"},
+            [f"{part}=absent" for part in ("conduit", "valve_lag", "delay", "relaxation", "control")], (),
+            {"model.conduit", "model.lag", "model.relaxation", "control.virtual_master", "control.blister",
+             "control.servo"},
         ),
-        ((), ("simulation.stepper=heun",), {"steppers.explicit"}),
-        ((), ("sensors.delay=1",), {"model.sensors"}),
-        ((), ("hand.mass=5 g",), {"model.yielding_hand"}),
-        ((), ("drive.sections=4",), {"model.matrix_drive"}),
+        (
+            (), ("simulation.stepper=heun", "sensors.delay=1", "hand.mass=5 g", "drive.sections=4"),
+            {"steppers.explicit", "model.sensors", "model.yielding_hand", "model.matrix_drive"},
+        ),
         (("sensors.delay=1",), ("sensors.observer=valve",), {"model.observer"}),
     ],
 )  # fmt: skip

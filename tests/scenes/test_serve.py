@@ -153,9 +153,6 @@ def test_hands_of_a_quest_are_recorded_and_played_into_a_server(tmp_path):
         assert {data for _, data in packets} == set(lines.splitlines(keepends=True))
         with (tmp_path / "hands.txt").open("a") as file:
             file.write('[1.0, "Left wr')  # the disk was full
-        one_second = time.monotonic() + 2.5  # the lease of the first
-        while time.monotonic() < one_second:
-            client.recv(TIMEOUT)
         osc = ["--to", f"osc://127.0.0.1:{one.osc_port}", "--play", "hands.txt"]
         played = subprocess.Popen([*command, *osc], cwd=tmp_path, env=environment)
         fingers_after(client, 0, 1, 2, 3, 4)
@@ -179,27 +176,6 @@ def test_a_pose_comes_back_as_forces_and_heights(server):
             frame = press(client, 7)
     assert frame.forces.sum() == pytest.approx(frame.total_force, rel=1e-5)
     assert np.argmin(frame.heights) == 40  # the pin in the middle of 9 x 9
-
-
-def test_json_says_the_same_and_flags_a_jump_of_10_mm(server):
-    with server.connect("?rate=200") as client:
-        bed = json.loads(client.recv(TIMEOUT))
-        said = {"type": "pose", "position": [0.0, 0.0, 0.039], "number": 8}
-        client.send(json.dumps(said))
-        frame = {}
-        while frame.get("number") != 8 or "pose_limited" in frame["flags"]:
-            frame = json.loads(client.recv(TIMEOUT))
-        assert (frame["type"], frame["version"]) == ("state", 1)
-        assert (frame["position"], frame["orientation"]) == (
-            [0.0, 0.0, 0.039],
-            [1.0, 0.0, 0.0, 0.0],
-        )
-        assert len(frame["heights"]) == len(frame["forces"]) == 81
-        while not {"beyond_a_finger", "force_limited"} <= set(frame["flags"]) - {"pose_limited"}:
-            client.send(json.dumps({**said, "position": [0.0, 0.0, 0.029]}))
-            frame = json.loads(client.recv(TIMEOUT))
-            assert sum(frame["forces"]) <= bed["most_force"] * (1.0 + 1e-6)  # 32 bits
-    assert frame["total_force"] == bed["most_force"] == 2.0
 
 
 def test_a_reset_brings_the_bed_to_rest(server):
@@ -275,15 +251,6 @@ def test_a_flood_or_a_slow_reader_harms_nobody(server):
         periods = [next(frames(other)).period for _ in range(50)]
         assert periods == sorted(set(periods))
     is_well(server, 15)
-
-
-def test_the_fingertip_has_one_client_at_a_time(server):
-    with server.connect("?format=binary&rate=200") as first, server.connect("?rate=0") as second:
-        press(first, 16)
-        second.recv(TIMEOUT)
-        second.send(pack_pose(Pose(PRESS, 17)))
-        assert "Another client moves the fingertip" in json.loads(second.recv(TIMEOUT))["message"]
-    is_well(server, 18)  # it has gone, so that the fingertip is free
 
 
 def test_the_force_of_a_client_that_has_gone_ends_and_frames_say_so(server):
@@ -406,8 +373,7 @@ def test_the_pins_come_as_blobs_and_a_reset_has_its_message(door):
 
 def test_a_wrong_osc_message_is_answered_in_one_line(door):
     for address, values in (
-        ("pose", (0.0, 0.0)), ("pose", (float("nan"), 0.0, 0.0)), ("pose", ("x", 0.0, 0.0)),
-        ("subscribe", ("state", 1e9)), ("subscribe", ("state",)), ("posse", ()),
+        ("pose", (float("nan"), 0.0, 0.0)), ("subscribe", ("state", 1e9)), ("posse", ()),
     ):  # fmt: skip
         # Errors are sent ten times a second at most.
         (said, *_) = received(

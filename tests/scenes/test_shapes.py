@@ -29,19 +29,18 @@ WAY = (
 SHAPE = {"file": "dome", "rise": 10e-3}
 
 
-def scene(method, **sections):
-    control = {"method": method} if method else "absent"
-    return followed("", WAY, **{"control": control, "shape": SHAPE, **sections})
+def scene(control):
+    return followed("", WAY, control=control, shape=SHAPE)
 
 
 @cache
 def formed(method):
-    return run(scene(method))
+    return run(scene({"method": method}))
 
 
 @cache
 def wanted():
-    return assemble(scene("elastic")).controller.display.heights
+    return assemble(scene({"method": "elastic"})).controller.display.heights
 
 
 EDITING = [method for method in METHODS if method != "shape_display"]
@@ -55,7 +54,7 @@ def test_every_method_takes_over_a_shape_that_stands(method):
     assert np.ptp(shown) > 9e-3
     # The physics brought it there: no pin faster than its valve lets it.
     rises = np.diff(history["height"][: round(SHOWN / PERIOD)], axis=0)
-    assert rises.max() <= assemble(scene(method)).fastest * PERIOD * (1.0 + 1e-9)
+    assert rises.max() <= assemble(scene({"method": method})).fastest * PERIOD * (1.0 + 1e-9)
     assert not history["force"][: round(SHOWN / PERIOD)].any()
     # Before it stands its cells are on their way.
     assert np.any(history["mode"][5] == Mode.BLISTER)
@@ -76,7 +75,7 @@ def test_every_method_takes_over_a_shape_that_stands(method):
     ],
 )
 def test_without_a_method_the_shape_stands_or_as_the_display_shows_it_and_costs_nothing(control):
-    made = scene(None, control=control)
+    made = scene(control)
     system, way = assemble(made), made.section("trajectory").trajectory()
     *_, last = periods(system, [way], begin(system), round(SHOWN / PERIOD))
     assert np.abs(last.row(0) - wanted()).max() <= DEAD_BAND + 1e-12

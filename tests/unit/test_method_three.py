@@ -5,7 +5,6 @@ import math
 import numpy as np
 import pytest
 from digiclay.core.control.finger_estimate import FingerFilter, Spread, invert_six
-from digiclay.core.control.finger_sections import Sections
 from digiclay.core.control.flow_servo import make_flow_servo
 from digiclay.core.control.servo import Tracking, lock_overloaded
 from digiclay.core.model.fingertip import Fingertip, compute_forms, compute_underside
@@ -180,18 +179,6 @@ def test_the_command_is_proportional_to_the_height_error_and_an_overloaded_cell_
     command, force = np.array([0.5, 0.5, -0.5]), np.array([0.16, 0.15, 1.0])
     assert lock_overloaded(command, force, 0.157).tolist() == [0.0, 0.5, -0.5]
     assert lock_overloaded(command[:0], force[:0], 0.157).tolist() == []
-
-
-@pytest.mark.parametrize("wanted", [[True] * 4, [True, False, True, True], [False] * 4])
-def test_of_cells_picked_for_some_fingers_each_finger_has_its_own(wanted):
-    sections, values = Sections([4, 3, 2, 3]), np.arange(12.0)
-    every = {0: [1.0, 3.0], 1: [5.0], 3: [9.0, 11.0]}  # none of the third finger's
-    cells, fingers, picked = sections.pick(np.array([1, 3, 5, 9, 11]), wanted)
-    found = dict(zip(fingers, (own.tolist() for own in picked.cut(values[cells])), strict=True))
-    assert found == {finger: own for finger, own in every.items() if wanted[finger]}
-    assert picked.add(values[cells]) == [sum(own) for own in found.values()]
-    spread = sections.spread([(1, 2), (3, 4), (5, 6), (7, 8)]).tolist()
-    assert spread == [[1] * 4 + [3] * 3 + [5] * 2 + [7] * 3, [2] * 4 + [4] * 3 + [6] * 2 + [8] * 3]
 
 
 @pytest.mark.parametrize(

@@ -10,14 +10,13 @@ from digiclay.core.control.orders import (
     Orders,
     Verb,
     find_fault,
-    order_periods,
     place,
     repeat_order,
     share,
 )
 from digiclay.core.control.pin_motion import MotionParameters
-from digiclay.core.control.virtual_master import Master, Phase
 from digiclay.core.engine.simulation import begin
+from digiclay.core.model.layout import enclose_discs
 from digiclay.core.model.physics import find_speeds
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.toml_table import resolve
@@ -25,7 +24,6 @@ from digiclay.core.session.live_session import has_arrived, simulate_path
 from numpy.testing import assert_array_equal
 
 from tests.assemble import assert_near, table
-from tests.measured import measure
 from tests.reliefs import heighten, make_orders, make_spike_and_ridge, measure_roughness, stay_away
 
 ARRANGEMENTS = ("aligned", "staggered", "hexagonal")
@@ -381,26 +379,19 @@ def test_one_quick_pass_of_smooth_halves_what_varies_on_flat_ground_and_on_a_rid
     assert float(state.row(0)[line].std()) < 0.5 * before
 
 
-def order(system, x, y, radius):
-    orders = Orders(repeat_order(1, Verb.AVERAGE, x, y, radius, 1.0))
-    (control,) = order_periods(system.controller, system.grid, system.cell, system.period, orders)
-    return control
-
-
-@pytest.mark.parametrize(
-    "place, radius, held",
-    [((12e-3, -9e-3), 5e-3, None), ((1e-3, 2e-3), 5e-3, 0), ((-3e-3, 1e-3), 60e-3, 1)],
+@table(
+    "other, held",
+    {
+        "apart": ((12e-3, -9e-3, 5e-3), None),
+        "within": ((1e-3, 2e-3, 5e-3), 0),
+        "around": ((-3e-3, 1e-3, 60e-3), 1),
+    },
 )
-def test_the_disc_of_a_period_holds_the_methods_and_the_smoothed_one_and_no_more(
-    place, radius, held
-):
-    system, memory = bed(), Master(Phase.SHAPING, 2e-3, -1e-3, 40e-3)
-    touched = measure(np.empty(0), np.empty(0))
-    smoothed = order(bed(method="absent"), *place, radius)
-    discs = [system.controller.locate(memory, touched)[1], smoothed.locate(None, touched)[1]]
-    x, y, whole = order(system, *place, radius).locate(memory, touched)[1]
-    for disc in discs:
+def test_a_disc_that_holds_two_is_no_larger_than_it_must_be(other, held):
+    both = (2e-3, -1e-3, 15e-3), other
+    x, y, whole = enclose_discs(*both)
+    for disc in both:
         assert np.hypot(disc[0] - x, disc[1] - y) + disc[2] <= whole * (1.0 + 1e-12)
-    (a, b, one), (c, d, other) = discs
-    least = (np.hypot(a - c, b - d) + one + other) / 2.0
-    assert whole == pytest.approx(least if held is None else (one, other)[held])
+    (a, b, radius), (c, d, another) = both
+    least = (np.hypot(a - c, b - d) + radius + another) / 2.0
+    assert whole == pytest.approx(least if held is None else both[held][2])

@@ -85,7 +85,7 @@ def test_the_fingertip_is_anothers_when_its_client_is_silent(monkeypatch):
                 link.order(POSE, client)
                 moved.append(client)
         link.leave("two")  # it did not move the fingertip
-        with pytest.raises(FrequentError):
+        with pytest.raises(FrequentError, match="Another client moves the fingertip"):
             link.order(POSE, "two")
         monkeypatch.setattr(door_link, "LEASE", 1e-3)
         link.order(POSE, "one")

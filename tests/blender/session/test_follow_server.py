@@ -1,10 +1,8 @@
 """A live session follows a server of poses: a socket that speaks its OSC, and `digiclay serve` itself."""
 
 import importlib.util
-import signal
 import socket
 import struct
-import time
 
 import bpy
 import numpy as np
@@ -15,7 +13,7 @@ from digiclay.roles import fingertip_of, fingertips_of
 from digiclay.sessions import running
 
 from tests.blender.at_hand import select
-from tests.blender.session.live import FLOAT32, TICK, exact, started
+from tests.blender.session.live import FLOAT32, exact, started
 from tests.timeouts import TIMEOUT
 
 SERVES = pytest.mark.skipif(
@@ -241,29 +239,14 @@ def test_the_session_follows_digiclay_serve(bed, clock, tmp_path):
     assert read_pose(state(*PRESS)).tolist() == list(PRESS)
 
 
-@SERVES
-@pytest.mark.parametrize(
-    "number, words",
-    [
-        (signal.SIGKILL, "has ended"),
-        (signal.SIGSTOP, "No pose from"),  # its port is open still
-    ],
-)
-def test_a_servers_end_is_told_in_two_seconds(bed, clock, tmp_path, number, words):
-    from tests.served import serve
-
-    started(bed)
-    with serve(tmp_path) as one:
-        bpy.ops.digiclay.follow_server(address=f"127.0.0.1:{one.osc_port}", token=TOKEN)
-        while follow.find(bed.session_uid).pose is None:
-            assert clock.tick() == []
-            time.sleep(TICK)
-        one.process.send_signal(number)
-        clock.tick()
-        notes, ended, period = [], clock.now, running.find(bed).state.period
-        while not notes:
-            time.sleep(TICK)
-            notes = clock.tick()
-    assert [words in note.message for note in notes] == [True]
+def test_a_servers_end_is_told_in_two_seconds_and_nothing_stalls(bed, clock, server):
+    address = followed(bed, server, clock)
+    arrived(server, address, state(*PRESS))
+    clock.tick()
+    server.close()
+    notes, ended, period = [], clock.now, running.find(bed).state.period
+    while not notes:
+        notes = clock.tick()
+    assert ["has ended" in note.message for note in notes] == [True]
     assert clock.now - ended < 2.0
-    assert running.find(bed).state.period > period  # nothing stalls
+    assert running.find(bed).state.period > period
