@@ -9,6 +9,7 @@ import pytest
 from digiclay.core.base.arrays import Floats
 from digiclay.core.control.blister import Blister
 from digiclay.core.control.methods import find_method
+from digiclay.core.control.virtual_master import Phase
 from digiclay.core.engine.simulation import advance, begin
 from digiclay.core.engine.state import State
 from digiclay.core.engine.system import System
@@ -207,6 +208,7 @@ def test_fingers_that_come_and_go_leave_the_others_what_they_have(method, middle
     state, _ = follow(three, poses)
     single = snapshot.change_fingers(three, one, state.copy(), [1])
     assert np.array_equal(single.row(0), state.row(0))
+    assert apart < ANEW or single.memory.phase is Phase.IDLE
     still = np.repeat(poses[-1:, -1:], len(three.instants), axis=1)
     after, force = follow(one, np.repeat(still[:, :, [1]], 5, axis=0), single)
     _, forces = follow(three, np.repeat(still, 5, axis=0), state)
