@@ -348,6 +348,8 @@ def stl(folder, triangles):
         ),
         (table(3), "body must be a list of tables"),
         (table(body(BALL), hand={}), "hand must be left out beside [[body]]"),
+        # As of --with a finger's file: no finger presses where nobody said.
+        (table(body(BALL), contact={"stiffness": 300.0}), "contact must be left out where only"),
         (
             table(body(BALL), method="virtual_master"),
             "body must be left out: the method virtual_master",

@@ -99,12 +99,25 @@ def resolve(table: Table, name: str = "", cache: ReadParts | None = None) -> Sce
     if _has_bodies_alone(table):
         # What is recorded as a fingertip's path is the first body's.
         fingers = (Finger(None, None, None, bodies[0].trajectory),)
-    return Scene(**parts, **texts, fingers=fingers, method=method, bodies=bodies)
+    scene = Scene(**parts, **texts, fingers=fingers, method=method, bodies=bodies)
+    if bodies and FINGERS not in table and "trajectory" not in table:
+        _refuse_finger_without_path(table)
+    return scene
 
 
 def _has_bodies_alone(table: Table) -> bool:
     """Return whether nothing but bodies presses."""
     return bool(table.get(BODIES)) and not any(key in table for key in (*FINGER_SECTIONS, FINGERS))
+
+
+def _refuse_finger_without_path(table: Table) -> None:
+    """Refuse sections of a finger beside bodies, which would press with it where nobody said."""
+    for section in FINGER_PARTS:
+        if table.get(section, ABSENT) != ABSENT:
+            rule = (
+                "must be left out where only bodies press: a finger beside them has a [trajectory]"
+            )
+            raise ParameterError(section, "", rule, show_value(table[section]))
 
 
 def _read_bodies(given: object, cache: ReadParts) -> tuple[Presser, ...]:
@@ -188,7 +201,7 @@ def tabulate(scene: Scene) -> Record:
 
     def tabulate_finger(finger: Finger) -> Record:
         path, tables = finger.trajectory, tabulate_parts(FINGER_PARTS, finger)
-        if path != press:
+        if path != press or scene.bodies:
             tables["trajectory"] = tabulate_path(path)
         return tables
 
