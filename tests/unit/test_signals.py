@@ -30,9 +30,9 @@ OVERSHOOT = pytest.approx(np.exp(-np.pi * 0.5 / DAMPED), abs=1e-6)
     {
         "a second-order system, by its formula": (RESPONSE, 1.0, OVERSHOOT),
         "a falling signal, like its mirror image": (-RESPONSE, -1.0, OVERSHOOT),
-        "a share of the way": ([2.0, 7.0], 4.0, 1.5),
+        "a share of the way": (np.array([2.0, 7.0]), 4.0, 1.5),
         "a signal that never passes its target": (1.0 - np.exp(-FINE), 1.0, 0.0),
-        "a signal that starts at its target": ([1.0, 2.0], 1.0, None),
+        "a signal that starts at its target": (np.array([1.0, 2.0]), 1.0, None),
     },
 )
 def test_the_overshoot_is_known(values, target, wanted):
@@ -57,7 +57,7 @@ def test_the_overshoot_is_known(values, target, wanted):
             pytest.approx(5.0, abs=1e-9),
         ),
         "a signal outside its band at the end": (FINE, np.sin(FINE), 0.0, 0.1, None),
-        "a signal that is not a number": ([0.0, 1.0], [1.0, np.nan], 1.0, 0.1, None),
+        "a signal that is not a number": (FINE[:2], np.array([1.0, np.nan]), 1.0, 0.1, None),
         "a signal always in its band": (FINE, np.ones(10001), 1.0, 0.1, 0.0),
     },
 )

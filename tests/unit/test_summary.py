@@ -151,9 +151,8 @@ def test_shaping_wants_contact_and_a_follower_and_a_loss_is_a_gap_between_two_co
         ([0, 1, 1, 0], 0.0),
         ([1], 0.0),
     ):
-        assert compute_contact_loss_share(range(len(force)), force) == pytest.approx(
-            share, rel=ROUNDING
-        )
+        found = compute_contact_loss_share(np.arange(len(force)), np.array(force))
+        assert found == pytest.approx(share, rel=ROUNDING)
 
 
 #: 9 pins of 9 mm² raised by 3 and 1 mm and sunk by 1 mm; differences of heights lose three digits.

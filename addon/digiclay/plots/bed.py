@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from ..core.base.arrays import Floats
+from ..core.base.arrays import Array, Floats
 from ..core.metrics.summary import find_contact_rows, split_fingers
 from ..core.model.layout import find_grid_shape
 from ..core.surface.formed import make_skin, make_solid
@@ -42,7 +42,7 @@ def fill_room(axes: Any, size: Floats, room: Room = ROOM) -> None:
     axes.set_position((now.x0 + across, now.y0 + up, now.width, now.height))
 
 
-History = Mapping[str, ArrayLike]
+History = Mapping[str, Array]
 #: The side walls of the relief.
 CUT = "#CFCAC0"
 #: Where the light of the relief comes from, a unit vector.

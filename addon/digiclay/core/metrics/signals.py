@@ -7,7 +7,6 @@ either side of it, so histories with uneven rows are judged alike.
 import math
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from ..base.arrays import Flags, Floats
 
@@ -17,12 +16,11 @@ from ..base.arrays import Flags, Floats
 WINDOW = 0.25
 
 
-def compute_weights(time: ArrayLike) -> Floats:
+def compute_weights(time: Floats) -> Floats:
     """Return the time each row stands for, (t,), s: ``w_i = (t_{i+1} - t_{i-1}) / 2``, half at the ends."""
-    moment = np.asarray(time, dtype=np.float64)
-    if len(moment) < 2:  # nothing to average over
-        return np.ones(len(moment))
-    half = 0.5 * np.diff(moment)
+    if len(time) < 2:  # nothing to average over
+        return np.ones(len(time))
+    half = 0.5 * np.diff(time)
     return np.concatenate([half, [0.0]]) + np.concatenate([[0.0], half])
 
 
@@ -44,43 +42,38 @@ def compute_deviation(values: Floats, weight: Floats) -> float | None:
     return None if middle is None else compute_rms(values - middle, weight)
 
 
-def measure_overshoot(values: ArrayLike, target: float) -> float | None:
+def measure_overshoot(values: Floats, target: float) -> float | None:
     """Return how far a signal goes beyond its target, as a share of its way there.
 
     ``max_i (y_i - y_target) / (y_target - y_0)``, at least 0; None for a signal at its target from
     the start.
     """
-    signal = np.asarray(values, dtype=np.float64)
-    if not len(signal) or signal[0] == target:
+    if not len(values) or values[0] == target:
         return None
-    way = target - float(signal[0])
-    return max(0.0, float(np.max((signal - target) / way)))
+    way = target - float(values[0])
+    return max(0.0, float(np.max((values - target) / way)))
 
 
-def measure_settling_time(
-    time: ArrayLike, values: ArrayLike, target: float, band: float
-) -> float | None:
+def measure_settling_time(time: Floats, values: Floats, target: float, band: float) -> float | None:
     """Return the time after which ``|y_i - y_target| <= band`` to the end, s; None when it never does."""
-    moment, signal = np.asarray(time, dtype=np.float64), np.asarray(values, dtype=np.float64)
-    outside = np.flatnonzero(~(np.abs(signal - target) <= band))
-    if not len(signal) or (outside.size and outside[-1] == len(signal) - 1):
+    outside = np.flatnonzero(~(np.abs(values - target) <= band))
+    if not len(values) or (outside.size and outside[-1] == len(values) - 1):
         return None
-    return float(moment[outside[-1] + 1] - moment[0]) if outside.size else 0.0
+    return float(time[outside[-1] + 1] - time[0]) if outside.size else 0.0
 
 
-def measure_amplitude(values: ArrayLike) -> float:
+def measure_amplitude(values: Floats) -> float:
     """Return half the distance from a signal's lowest to its highest value."""
-    return 0.5 * float(np.ptp(np.asarray(values, dtype=np.float64)))
+    return 0.5 * float(np.ptp(values))
 
 
-def measure_frequency(time: ArrayLike, values: ArrayLike) -> float | None:
+def measure_frequency(time: Floats, values: Floats) -> float | None:
     """Return how often a signal rises through its mean, Hz; None when it does so less than three times."""
-    moment, signal = np.asarray(time, dtype=np.float64), np.asarray(values, dtype=np.float64)
-    above = signal > signal.mean() if len(signal) else np.empty(0, dtype=bool)
+    above = values > values.mean() if len(values) else np.empty(0, dtype=bool)
     rises = np.flatnonzero(~above[:-1] & above[1:])
     if rises.size < 3:
         return None
-    return float((rises.size - 1) / (moment[rises[-1]] - moment[rises[0]]))
+    return float((rises.size - 1) / (time[rises[-1]] - time[rises[0]]))
 
 
 def find_stretches(rows: Flags) -> list[slice]:
@@ -91,18 +84,17 @@ def find_stretches(rows: Flags) -> list[slice]:
     ]
 
 
-def measure_oscillation(time: ArrayLike, values: ArrayLike, rows: Flags) -> float | None:
+def measure_oscillation(time: Floats, values: Floats, rows: Flags) -> float | None:
     """Return the rms over time of a signal less its moving average.
 
     ``sqrt(sum w_i (y_i - m_i)² / sum w_i)``, m_i the mean of y over the window, s, around row i. A
     row counts when its whole window is within an unbroken stretch of the chosen rows; None when no
     row does.
     """
-    moment, signal = np.asarray(time, dtype=np.float64), np.asarray(values, dtype=np.float64)
     off: list[Floats] = []
     weight: list[Floats] = []
     for stretch in find_stretches(rows):
-        t, y = moment[stretch], signal[stretch]
+        t, y = time[stretch], values[stretch]
         area = np.concatenate([[0.0], np.cumsum(0.5 * (y[1:] + y[:-1]) * np.diff(t))])
         # Half a millionth of the window: an edge on the first row is within.
         inner = (t - 0.5 * WINDOW >= t[0] - 5e-7 * WINDOW) & (

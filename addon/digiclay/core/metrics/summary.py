@@ -9,9 +9,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from ..base.arrays import Cells, Flags, Floats
+from ..base.arrays import Array, Cells, Flags, Floats
 from ..base.errors import ParameterError
 from ..base.modes import Mode
 from ..model.control_interface import SetPoint, find_set_point
@@ -37,9 +36,9 @@ BALL = 10e-3
 AT_ONCE = 2**17
 
 
-def find_contact_rows(total_force: ArrayLike) -> Flags:
+def find_contact_rows(total_force: Floats) -> Flags:
     """Return which rows have contact, shape (t,), from the total force in N."""
-    return np.asarray(np.asarray(total_force, dtype=np.float64) > 0.0)
+    return np.asarray(total_force > 0.0)
 
 
 class CellSums(NamedTuple):
@@ -70,15 +69,14 @@ class CellSums(NamedTuple):
         return self.touching & (self.following > 0)
 
 
-def sum_cells(history: Mapping[str, ArrayLike]) -> CellSums:
+def sum_cells(history: Mapping[str, Array]) -> CellSums:
     """Return the sums over the cells of a history, the arrays of ``history.npz``, of at least one row."""
     total, height, force, position = (
-        np.asarray(history[name], dtype=np.float64)
-        for name in ("total_force", "height", "force", "position")
+        history[name] for name in ("total_force", "height", "force", "position")
     )
     x, y = (np.broadcast_to(along[:, None], force.T.shape) for along in position.T)
     _, x, y, lifted, strongest = sum_row(force.T, x, y, height.T)
-    following = np.count_nonzero(np.asarray(history["mode"]) == Mode.FORCE_FOLLOW, axis=1)
+    following = np.count_nonzero(history["mode"] == Mode.FORCE_FOLLOW, axis=1)
     return CellSums(total, x, y, lifted, strongest, following, height[0], height[-1])
 
 
@@ -92,7 +90,7 @@ def sum_row(force: Floats, x: Floats, y: Floats, height: Floats) -> Floats:
     return sums
 
 
-def measure_lag(sums: CellSums, fingertip: ArrayLike) -> Floats:
+def measure_lag(sums: CellSums, fingertip: Floats) -> Floats:
     """Return how far the blister is behind the fingertip, (t, 7), in the rows in contact, m.
 
     ``lag = |p - sum F_j r_j / sum F_j|`` in the horizontal plane, p the lowest point, r_j the
@@ -100,17 +98,17 @@ def measure_lag(sums: CellSums, fingertip: ArrayLike) -> Floats:
     """
     rows = sums.touching
     centroid = np.column_stack([sums.x, sums.y])[rows] / sums.total[rows, None]
-    return np.asarray(np.hypot(*(np.asarray(fingertip, np.float64)[rows, :2] - centroid).T))
+    return np.asarray(np.hypot(*(fingertip[rows, :2] - centroid).T))
 
 
-def measure_surface_under(sums: CellSums, fingertip: ArrayLike) -> Floats:
+def measure_surface_under(sums: CellSums, fingertip: Floats) -> Floats:
     """Return ``sum F_j H_j / sum F_j - z``, the surface under the fingertip, in the rows in contact, m."""
-    rows, tip = sums.touching, np.asarray(fingertip, dtype=np.float64)
-    return sums.height[rows] / sums.total[rows] - tip[rows, 2]
+    rows = sums.touching
+    return sums.height[rows] / sums.total[rows] - fingertip[rows, 2]
 
 
 def measure_ridge_errors(
-    position: ArrayLike, final: ArrayLike, fingertip: ArrayLike, rows: Flags, away: float = AWAY
+    position: Floats, final: Floats, fingertip: Floats, rows: Flags, away: float = AWAY
 ) -> Floats:
     """Return how far the cells the fingertip has passed over stand above its path at the end.
 
@@ -119,22 +117,21 @@ def measure_ridge_errors(
     stretch, to a place at least `away` from it: where it pressed or left is no ridge. Returned are
     the cells that count, in the order in which the fingertip passed them.
     """
-    place, tip = np.asarray(position, dtype=np.float64), np.asarray(fingertip, dtype=np.float64)
     chosen = np.flatnonzero(rows)
     nearest = np.empty(chosen.size, dtype=np.intp)
-    several = max(1, AT_ONCE // max(len(place), 1))
+    several = max(1, AT_ONCE // max(len(position), 1))
     for first in range(0, chosen.size, several):
         part = slice(first, first + several)
-        square = (tip[chosen[part], 0, None] - place[:, 0]) ** 2
-        square += (tip[chosen[part], 1, None] - place[:, 1]) ** 2
+        square = (fingertip[chosen[part], 0, None] - position[:, 0]) ** 2
+        square += (fingertip[chosen[part], 1, None] - position[:, 1]) ** 2
         nearest[part] = np.argmin(square, axis=1)
     last = {int(cell): i for i, cell in enumerate(nearest)}
     stretch = np.concatenate([[0], np.cumsum(np.diff(chosen) > 1)]) if chosen.size else chosen
     errors = []
     for cell, i in sorted(last.items(), key=lambda pair: pair[1]):
         after = chosen[i:][stretch[i:] == stretch[i]]
-        if np.max(np.hypot(*(tip[after, :2] - place[cell]).T)) >= away:
-            errors.append(float(np.asarray(final)[cell]) - float(tip[chosen[i], 2]))
+        if np.max(np.hypot(*(fingertip[after, :2] - position[cell]).T)) >= away:
+            errors.append(float(final[cell]) - float(fingertip[chosen[i], 2]))
     return np.array(errors)
 
 
@@ -182,7 +179,7 @@ BOUNCE = 0.05
 
 
 def compute_rfd(
-    time: ArrayLike, total_force: ArrayLike, set_point: ArrayLike, rows: Flags | None = None
+    time: Floats, total_force: Floats, set_point: Floats | float, rows: Flags | None = None
 ) -> float | None:
     """Return the reference force deviation, N.
 
@@ -193,13 +190,12 @@ def compute_rfd(
     include touching down, and leave out the gaps when the fingertip is lost: read it next to
     `compute_contact_loss_share`. Returns none when there is no such row.
     """
-    force = np.asarray(total_force, dtype=np.float64)
-    wanted = np.broadcast_to(np.asarray(set_point, dtype=np.float64), force.shape)
-    chosen = (find_contact_rows(force) if rows is None else rows) & ~np.isnan(wanted)
-    return compute_rms((force - wanted)[chosen], compute_weights(time)[chosen])
+    wanted = np.broadcast_to(set_point, total_force.shape)
+    chosen = (find_contact_rows(total_force) if rows is None else rows) & ~np.isnan(wanted)
+    return compute_rms((total_force - wanted)[chosen], compute_weights(time)[chosen])
 
 
-def compute_contact_loss_share(time: ArrayLike, total_force: ArrayLike) -> float | None:
+def compute_contact_loss_share(time: Floats, total_force: Floats) -> float | None:
     """Return the share of the time from first to last contact without contact; None: no contact.
 
     A pause the session makes on purpose, with the fingertip lifted, counts as well.
@@ -218,10 +214,10 @@ class Loss(NamedTuple):
     time: float
 
 
-def find_contact_ends(time: ArrayLike, total_force: ArrayLike) -> Floats:
+def find_contact_ends(time: Floats, total_force: Floats) -> Floats:
     """Return when contact ends, s, shape (ends,), bounces counted once, from times, s, and forces (t,), N."""
     touching = find_contact_rows(total_force)
-    ends: Floats = np.asarray(time, dtype=np.float64)[1:][touching[:-1] & ~touching[1:]]
+    ends: Floats = time[1:][touching[:-1] & ~touching[1:]]
     return ends[np.diff(ends, prepend=-np.inf) > BOUNCE]
 
 
@@ -342,18 +338,17 @@ def find_worst_finger(history: Mapping[str, Any], set_point: SetPoint | None) ->
 ALL = slice(None)
 
 
-def compute_cell_area(position: ArrayLike) -> float | None:
+def compute_cell_area(position: Floats) -> float | None:
     """Return the area a cell of positions (n, 2), row by row, stands for, m²; None for a single pin."""
-    place = np.asarray(position, dtype=np.float64)
-    rows, columns = find_grid_shape(place)
-    along = abs(float(place[1, 0] - place[0, 0])) if columns > 1 else 0.0
-    across = abs(float(place[columns, 1] - place[0, 1])) if rows > 1 else 0.0
+    rows, columns = find_grid_shape(position)
+    along = abs(float(position[1, 0] - position[0, 0])) if columns > 1 else 0.0
+    across = abs(float(position[columns, 1] - position[0, 1])) if rows > 1 else 0.0
     # A single row is taken as wide as its pins are apart.
     return (along or across) * (across or along) or None
 
 
 def compute_metrics(
-    history: Mapping[str, ArrayLike], set_point: SetPoint | None
+    history: Mapping[str, Array], set_point: SetPoint | None
 ) -> dict[str, float | None]:
     """Return every metric of a session by the keys of `METRICS`, SI; None without a basis, never a NaN.
 
@@ -362,12 +357,10 @@ def compute_metrics(
     """
     if "finger_force" in history:
         return take_worst([compute_metrics(own, set_point) for own in split_fingers(history)])
-    time = np.asarray(history["time"], dtype=np.float64)
+    time = history["time"]
     if not len(time):
         raise ParameterError("History", "time", "must have at least one row", "none")
-    fingertip, position = (
-        np.asarray(history[name], dtype=np.float64) for name in ("fingertip", "position")
-    )
+    fingertip, position = history["fingertip"], history["position"]
     return compute_metrics_from_sums(sum_cells(history), time, fingertip, position, set_point)
 
 

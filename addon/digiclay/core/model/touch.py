@@ -184,13 +184,13 @@ def find_indentations(fingertip: Fingertip, history: Mapping[str, Floats]) -> Fl
     most = np.max(height, axis=1, where=felt, initial=-np.inf) - history["fingertip"][:, 2]
     deepest_first, deepest = np.argsort(-most, kind="stable"), np.zeros(len(most))
     cells = np.flatnonzero(felt.any(axis=0))  # few of a large bed
-    x, y = np.asarray(history["position"], dtype=np.float64)[cells].T
+    x, y = history["position"][cells].T
     basis = np.array([np.ones_like(x), x, y, x * x, x * y, y * y])
     for start in range(0, len(most), ROWS):
         rows = deepest_first[start : start + ROWS]
         if most[rows[0]] <= min(deepest.max(), MOST_INDENTATION):
             break
-        outline = fingertip.outline(np.asarray(history["fingertip"])[rows])
+        outline = fingertip.outline(history["fingertip"][rows])
         under = compute_underside(*compute_forms(outline), basis)
         part = np.ix_(rows, cells)
         deepest[rows] = np.max(height[part] - under, axis=1, where=felt[part], initial=0.0)
