@@ -17,7 +17,7 @@ from ..base.arrays import Floats, any_true
 from ..model.delay import Queue
 from ..model.interfaces import Movement, Segment
 from ..model.physics import Cell, Speeds, find_contact_force, find_speeds
-from .bernoulli import BernoulliExponential, BernoulliPlan
+from .bernoulli import BernoulliExponential, BernoulliPlan, divide_segments
 from .richardson import bound
 
 #: A working block, the map to the fingertip's underside at the instants of a level's steps, and the
@@ -64,10 +64,9 @@ class Adaptive:
     def plan(self, cell: Cell, queue: Queue, segments: tuple[Segment, ...]) -> AdaptivePlan:
         """Compute once what all periods share."""
         closed_form = BernoulliExponential()
-        count = segments[-1].nodes[-1] + 1
         levels, between = [], []
         for level in range(FINEST + 1):
-            parts, rows = _divided(segments, 2**level, count)
+            parts, rows = divide_segments(segments, 2**level)
             levels.append(closed_form.plan(cell, queue, parts))
             between.append(rows)
         allowed = 3.0 * self.tolerance
@@ -131,28 +130,3 @@ def _advance_copy(bound: Bound, start: Floats, under: Floats) -> Floats:
     block[:] = start
     advance(np.dot(between, under))
     return block
-
-
-def _divided(
-    segments: tuple[Segment, ...], parts: int, count: int
-) -> tuple[tuple[Segment, ...], Floats]:
-    """Return segments cut into equal parts, and the map from instants to their ends and middles."""
-    cut: list[Segment] = []
-    rows: list[Floats] = []
-    for segment in segments:
-        for i in range(parts):
-            at, length = 2 * len(cut), segment.length / parts
-            cut.append(Segment(segment.start + i * length, length, (at, at + 1, at + 2)))
-            rows += [_parabola(segment, (i + part) / parts, count) for part in (0.0, 0.5)]
-    return tuple(cut), np.array([*rows, _parabola(segments[-1], 1.0, count)])
-
-
-def _parabola(segment: Segment, part: float, count: int) -> Floats:
-    """Return the weights of the period's instants in the parabola through a segment's three."""
-    row = np.zeros(count)
-    row[list(segment.nodes)] = (
-        (1 - part) * (1 - 2 * part),
-        4 * part * (1 - part),
-        part * (2 * part - 1),
-    )
-    return row

@@ -182,6 +182,30 @@ def _propagator(pulp: Pulp, step: float, unit: float, share: float) -> Floats:
     return np.insert(both, [-3, -3], 0.0, axis=1)
 
 
+def divide_segments(
+    segments: tuple[Segment, ...], parts: int
+) -> tuple[tuple[Segment, ...], Floats]:
+    """Return segments cut into equal parts, and the map from a period's instants to their ends and middles.
+
+    Between its instants a segment's path is the polynomial through them.
+    """
+    cut: list[Segment] = []
+    between = np.zeros((2 * parts * len(segments) + 1, segments[-1].nodes[-1] + 1))
+    between[-1, -1] = 1.0
+    for number, segment in enumerate(segments):
+        count, length = len(segment.nodes), segment.length / parts
+        powers = np.arange(count)
+        to_powers = np.linalg.inv(np.linspace(0.0, 1.0, count)[:, None] ** powers)
+        at = np.arange(2 * parts)[:, None] / (2 * parts)
+        rows = slice(2 * parts * number, 2 * parts * (number + 1))
+        between[rows, segment.nodes] = at**powers @ to_powers
+        for part in range(parts):
+            first = 2 * len(cut)
+            nodes = first, first + 1, first + 2
+            cut.append(Segment(segment.start + part * length, length, nodes))
+    return tuple(cut), between
+
+
 class BernoulliExponential(Alike):
     """Second order, stable at any step and stiffness, without iteration."""
 

@@ -21,7 +21,7 @@ from ..model.contact import LARGEST_EXPONENT
 from ..model.delay import Queue
 from ..model.interfaces import Segment
 from ..model.physics import Cell
-from .bernoulli import LARGEST_DEVIATION, BernoulliExponential, BernoulliPlan
+from .bernoulli import LARGEST_DEVIATION, BernoulliExponential, BernoulliPlan, divide_segments
 from .closed_form import LARGE, TINY, StepStart, find_loaded_path
 
 #: Parts of a physics step, within which different fingertips may press.
@@ -181,32 +181,16 @@ def plan_together(
     cells: Sequence[Cell], queue: Queue, segments: tuple[Segment, ...]
 ) -> TogetherPlan:
     """Compute once what all periods share, for the cells of all fingers."""
-    count = segments[-1].nodes[-1] + 1
-    parts: list[Segment] = []
-    rows: list[Floats] = []
+    parts, between = divide_segments(segments, PARTS)
+    last = segments[-1].nodes[-1]
     beside: list[tuple[int, int]] = []
     for segment in segments:
-        # A polynomial through the underside at the instants of a step.
-        nodes = np.linspace(0.0, 1.0, len(segment.nodes))
-        powers = np.arange(len(nodes))
-        to_powers = np.linalg.inv(nodes[:, None] ** powers)
-        for part in range(PARTS):
-            first = len(rows)
-            at = (part + np.array([0.0, 0.5, 1.0])) / PARTS
-            for row in (at[:, None] ** powers) @ to_powers:
-                rows.append(np.zeros(count))
-                rows[-1][list(segment.nodes)] = row
-            for instant in at * (len(nodes) - 1):
-                before, after = math.floor(instant), math.ceil(instant)
-                beside.append((segment.nodes[before], segment.nodes[after]))
-            length = segment.length / PARTS
-            parts.append(
-                Segment(segment.start + part * length, length, (first, first + 1, first + 2))
-            )
+        for place in np.arange(2 * PARTS) * (len(segment.nodes) - 1) / (2 * PARTS):
+            before, after = math.floor(place), math.ceil(place)
+            beside.append((segment.nodes[before], segment.nodes[after]))
+    beside.append((last, last))
     stepper = BernoulliExponential()
     plans: dict[int, BernoulliPlan] = {}
     for cell in cells:
-        plans[id(cell)] = plans.get(id(cell)) or stepper.plan(cell, queue, tuple(parts))
-    return TogetherPlan(
-        tuple(plans[id(cell)] for cell in cells), np.array(rows), np.array(beside).T
-    )
+        plans[id(cell)] = plans.get(id(cell)) or stepper.plan(cell, queue, parts)
+    return TogetherPlan(tuple(plans[id(cell)] for cell in cells), between, np.array(beside).T)
