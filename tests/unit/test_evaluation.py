@@ -13,9 +13,7 @@ from digiclay.commands.cluster import evaluate_on_worker, open_cluster
 from digiclay.commands.evaluator import submit
 from digiclay.core.base.arrays import MOST_SHAPES, Constants, any_true, count_true
 from digiclay.core.base.errors import OutputError
-from digiclay.core.batch.columns import begin, make_batch
-from digiclay.core.batch.play import extend_path
-from digiclay.core.engine.simulation import simulate_period
+from digiclay.core.batch.play import begin_play, play_all
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.scene_source import Setting, find
 from digiclay.core.session.run_scene import run
@@ -35,7 +33,7 @@ from distributed import Client, LocalCluster
 from tests.assemble import table
 from tests.other_process import finish as finish
 from tests.other_process import start
-from tests.scene_files import left, read_json, timeless
+from tests.scene_files import call, left, read_json, timeless
 from tests.timeouts import wait_until
 
 pytestmark = pytest.mark.usefixtures("here")
@@ -83,23 +81,20 @@ def indices(parts):
 
 def calls(count):
     """Return how many functions of numpy and others each control period of so many taps calls."""
-    scenes = [point.scene for point in some(f"control.force_gain=1:6:{count}", settings=[])]
-    systems = [assemble(scene) for scene in scenes if scene]
-    stack = make_batch(systems)
-    state = begin(stack)
-    ways = [scene.section("trajectory").trajectory() for scene in scenes if scene]
+    points = some(f"control.force_gain=1:6:{count}", settings=[])
+    scenes = {point.index: point.scene for point in points}
+    play = begin_play(scenes, {run: assemble(scene) for run, scene in scenes.items()})
     made, counted = [0], []
 
     def count_one(frame, event, argument):
         made[0] += event == "c_call"
 
-    fingers = extend_path(None, systems, ways, 0)
-    assert fingers
-    for period in range(100):
+    periods = play_all(play, dict.fromkeys(scenes, 101), None)
+    for _ in range(100):
         made[0] = 0
         sys.setprofile(count_one)
         try:
-            state = simulate_period(stack, state, fingers.at(period))
+            next(periods)
         finally:
             sys.setprofile(None)
         counted.append(made[0])
@@ -259,6 +254,9 @@ def test_a_bundle_comes_to_the_figures_of_its_points_and_can_be_stopped(errors):
         assert own == pytest.approx(other, rel=1e-9, abs=1e-15)
 
 
+TAPS = "sweep tap --vary control.force_gain=1:5:4 --metric rfd --set simulation.duration=0.1"
+
+
 def break_stacks(monkeypatch, error):
     def faulty(*given, **known):
         raise error
@@ -273,8 +271,7 @@ def test_a_fault_in_a_stack_is_not_passed_over(here, monkeypatch, capsys):
         records = evaluate_bundle(some("control.force_gain=1,5"))
     assert [record and record["alone"] for record in records] == ["ZeroDivisionError: by zero"] * 2
     break_stacks(monkeypatch, MemoryError())
-    line = "sweep tap --vary control.force_gain=1:5:4 --set simulation.duration=0.1 --workers 1"
-    assert main([*line.split(), "--out", "out"]) == 0
+    assert call(f"{TAPS} --out out") == 0
     assert (
         "\n4 points one at a time: there is not enough memory for a batch\n"
         in capsys.readouterr().out
@@ -286,22 +283,14 @@ def test_a_fault_in_a_stack_is_not_passed_over(here, monkeypatch, capsys):
 def test_a_sweep_says_how_its_points_were_run_and_one_done_again_comes_to_the_same_bits(
     here, capsys
 ):
-    sweep = [
-        "sweep",
-        "tap",
-        "--vary",
-        "control.force_gain=1:6:4",
-        "--set",
-        "simulation.duration=0.1",
-    ]
-    main([*sweep, "--out", "out"])
+    call(f"{TAPS} --out out")
     assert "4 points\n4 points run in 1 batch\n" in capsys.readouterr().out
     file, figures = here / "out" / "points" / "000003.json", []
     for _ in range(2):
         kept = read_json(file)["figures"]
         figures.append({name: value for name, value in kept.items() if name not in TIMES})
         file.unlink()
-        main([*sweep, "--out", "out", "--quiet"])
+        call(f"{TAPS} --out out --quiet")
     assert figures[0] == figures[1]
 
 

@@ -81,7 +81,7 @@ def test_a_folder_that_is_being_written_is_refused_at_once_by_every_command(refu
 
 
 @pytest.mark.parametrize(
-    "line", ["sweep my.toml --vary layout.rows=3,4 --workers 1", "batch jobs.toml"]
+    "line", ["sweep my.toml --vary layout.rows=3,4 --metric rfd --workers 1", "batch jobs.toml"]
 )
 def test_a_second_series_in_one_folder_is_refused_at_once(line, refused):
     write_jobs()

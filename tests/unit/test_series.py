@@ -136,15 +136,14 @@ def test_a_link_that_leads_out_of_the_batchs_folder_is_refused(folder, here, ref
 
 
 def test_a_link_in_a_sweeps_folder_is_refused_and_a_link_to_the_folder_is_not(here, refused):
-    sweep = command("sweep my.toml --vary layout.rows=3,4 --workers 1 --out o --quiet")
     (here / "away").mkdir()
     (here / "o").symlink_to(here / "away")
-    assert main(sweep) == 0
+    assert main(SWEEP) == 0
     assert len(list((here / "away" / "points").iterdir())) == 2
     shutil.rmtree(here / "away" / "points")
     (here / "else").mkdir()
     (here / "away" / "points").symlink_to(here / "else")
-    refused(sweep, "points leads out of o")
+    refused(SWEEP, "points leads out of o")
     assert list((here / "else").iterdir()) == []
 
 
@@ -183,7 +182,7 @@ def test_a_run_of_a_folder_by_an_odd_path_has_the_folders_name(word):
     assert not os.path.lexists("metrics.json")
 
 
-SWEEP = command("sweep my.toml --vary layout.rows=3,4 --workers 1 --out o --quiet")
+SWEEP = command("sweep my.toml --vary layout.rows=3,4 --metric rfd --workers 1 --out o --quiet")
 BATCH = command("batch jobs.toml --prepare --out o --quiet")
 COMMANDS = {"sweep": SWEEP, "batch": BATCH}
 KIND = Kind("series", "series.json", ("parts",))
