@@ -248,12 +248,15 @@ def run(scene: Scene, progress: Callable[[int, int], None] | None, *, errors: bo
 def load(folder: object) -> Result:
     """Read a run's folder; warn where the method of this process is not that of the run."""
     path = read_path(folder)
-    found = Result(**vars(finished_run.read_result(path)))
-    origin = found.metrics.get("versions", {}).get("method")
-    if found.scene.method in list_added() and describe_origin(found.scene).get("method") != origin:
-        rule = f"was not run with the code of {found.scene.method} that is loaded, or with a class in memory"
+    result = Result(**vars(finished_run.read_result(path)))
+    origin = result.metrics.get("versions", {}).get("method")
+    if (
+        result.scene.method in list_added()
+        and describe_origin(result.scene).get("method") != origin
+    ):
+        rule = f"was not run with the code of {result.scene.method} that is loaded, or with a class in memory"
         warnings.warn(f"{path} {rule}: its scene may give another run.", stacklevel=3)
-    return found
+    return result
 
 
 def sweep(

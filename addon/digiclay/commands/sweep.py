@@ -67,11 +67,11 @@ def carry_out(arguments: argparse.Namespace) -> int:
         rows = [records[point.index] for point in points]
         table = format_table([(column.key, column.unit) for column in columns], values, rows, names)
         write_whole(arguments.out / "sweep.csv", table.encode("utf-8"))
-        notes = _draw_pictures(arguments.out, columns, axes, records, names)
+        pictures = _draw_pictures(arguments.out, columns, axes, records, names)
         failed = require_any(rows)
         tail = f", {len(failed)} of them failed: see the column error" if failed else ""
-        ways = [*bundles.describe(), *explain_failed_batches(records), describe_effort(records)]
-        return [f"{len(points)} points{tail}", *ways, *notes, f"written to {arguments.out}"]
+        notes = [*bundles.describe(), *explain_failed_batches(records), describe_effort(records)]
+        return [f"{len(points)} points{tail}", *notes, *pictures, f"written to {arguments.out}"]
 
     keys = [axis.key for axis in axes]
     opened = open_sweep(arguments.out, points, axes, __version__)

@@ -105,9 +105,9 @@ def measure(arguments: Namespace, members: Members, result: Result, stop: Stop) 
         speeds = _search_speeds(arguments, members, result, stop)
         if not speeds:
             return None
-        *found, own = (speed.get("figures", {}) for speed in speeds)
-        nominal |= own
-        for row, figures in zip(rows, found, strict=True):
+        *searched, scene_speeds = (speed.get("figures", {}) for speed in speeds)
+        nominal |= scene_speeds
+        for row, figures in zip(rows, searched, strict=True):
             row["figures"] = row.get("figures", {}) | figures
         notes += _note_failed(speeds[:-1], "have no largest speeds")
     bands = find_bands(nominal, [row["figures"] for row in rows if "figures" in row])

@@ -309,5 +309,5 @@ def find_file(word: str, samples: Mapping[str, Path], kind: str) -> Path:
     if Path(word).suffix or Path(word).name != word:
         raise SceneError(f"{shown}: there is no such file.")
     close = find_nearest_name(word, list(samples))
-    known = f". Did you mean {close}?" if close else f" ({', '.join(samples)})."
-    raise SceneError(f"{shown or repr(word)} is neither a file nor a {kind}{known}")
+    hint = f". Did you mean {close}?" if close else f" ({', '.join(samples)})."
+    raise SceneError(f"{shown or repr(word)} is neither a file nor a {kind}{hint}")

@@ -41,8 +41,8 @@ def pack_bodies(scene: Scene, knots: Sequence[Knot]) -> dict[str, Array]:
     ]
     placed = [body for body in given if isinstance(body, PlacedMesh)]
     meshes = list({id(body.mesh): body.mesh for body in placed}.values())
-    known = {id(mesh): number for number, mesh in enumerate(meshes)}
-    numbers = [known[id(body.mesh)] if isinstance(body, PlacedMesh) else NONE for body in given]
+    number_of = {id(mesh): number for number, mesh in enumerate(meshes)}
+    numbers = [number_of[id(body.mesh)] if isinstance(body, PlacedMesh) else NONE for body in given]
     return {
         BODIES: np.frombuffer(parameters.encode(), np.uint8),
         KNOTS: np.array([period for period, _ in knots], np.int64),
@@ -64,7 +64,7 @@ def place_bodies(scene: Scene, periods: Sequence[int]) -> tuple[Scene, tuple[Kno
         mesh = mesh._replace(vertices=mesh.vertices.astype("<f4").astype(np.float64))
         poses = each.trajectory.trajectory().poses(times)
         places = np.concatenate([make_matrices(poses[:, 3:]), poses[:, :3, None]], axis=2)
-        columns.append([PlacedMesh(mesh, place) for place in places.astype(np.float32)])
+        columns.append([PlacedMesh(mesh, matrix) for matrix in places.astype(np.float32)])
         pressers.append(replace(each, body=each.body.without_mesh()))
     given = replace(scene, bodies=tuple(pressers))
     return given, tuple(zip(periods, zip(*columns, strict=True), strict=True))

@@ -397,9 +397,9 @@ def _lead_bodies(session: Session, count: int) -> tuple[Session, list[Knot]]:
     given.give(unders)
     recording = session.recording
     if recording:
-        known = recording.knots or knots[:1]
-        knots = [(period, given.condense(bodies, known[0][1])) for period, bodies in knots]
-        last, bodies = known[-1]
+        former = recording.knots or knots[:1]
+        knots = [(period, given.condense(bodies, former[0][1])) for period, bodies in knots]
+        last, bodies = former[-1]
         goes_on = bool(recording.knots) and last == first and all(map(is_, bodies, knots[0][1]))
         recording = replace(recording, knots=(*recording.knots, *knots[goes_on:]))
     return replace(session, reached=aim, recording=recording), unders

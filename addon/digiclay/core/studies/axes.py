@@ -240,7 +240,7 @@ def _find_parts(scene: Scene, key: str) -> tuple[list[Any], str, str]:
     section = rest.pop(0) if chosen else first
     parts = enumerate(scene.list_parts(section), 1)
     name, _, number = ".".join(rest).partition(".")
-    return [part for place, part in parts if chosen in ("", str(place))], name, number
+    return [part for finger, part in parts if chosen in ("", str(finger))], name, number
 
 
 def find_quantity(scene: Scene, key: str) -> Quantity | None:
@@ -257,7 +257,7 @@ def find_numbers(scene: Scene, key: str) -> list[float]:
     if number:
         lists = [value for value in values if isinstance(value, tuple)]
         values = [
-            value for each in lists for place, value in enumerate(each, 1) if str(place) == number
+            value for each in lists for index, value in enumerate(each, 1) if str(index) == number
         ]
     return [
         value

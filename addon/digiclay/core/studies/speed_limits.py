@@ -115,8 +115,8 @@ class Stroke(Drag):
         turned = []
         for point in path.waypoints:
             along, _, height = point.position
-            place = self.x + along * math.cos(turn), self.y + along * math.sin(turn), height
-            turned.append(replace(point, position=place))
+            position = self.x + along * math.cos(turn), self.y + along * math.sin(turn), height
+            turned.append(replace(point, position=position))
         return replace(path, waypoints=tuple(turned)), start, end
 
 
