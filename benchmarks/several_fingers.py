@@ -62,14 +62,10 @@ def meet(apart: float, far: float, lifted: float) -> Iterator[Way]:
 #: Two fingertips near each other: their ways by name, with the least distance, mm.
 CASES: dict[str, list[Way]] = {
     **{
-        f"parallel, {d}": [press_and_drag(-20, -d / 2, 20, -d / 2), press_and_drag(-20, d / 2, 20, d / 2)]
-        for d in (25, 18, 15, 12)
-    },
-    **{
-        f"up beside down, {d}": [
-            press_and_drag(-20, -d / 2, 20, -d / 2), press_and_drag(-20, d / 2, 20, d / 2, DOWN)
+        f"{name}, {d}": [
+            press_and_drag(-20, -d / 2, 20, -d / 2), press_and_drag(-20, d / 2, 20, d / 2, height)
         ]
-        for d in (25, 18, 15, 12)
+        for name, height in (("parallel", UP), ("up beside down", DOWN)) for d in (25, 18, 15, 12)
     },
     **{
         f"sinks beside a drag, {d}": [

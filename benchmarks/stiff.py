@@ -74,19 +74,9 @@ DEEP = (
     (0.3, 1e-3, -15e-3),
     (0.5, 3e-3, 3e-3),
 )
-JUMP = (
-    (0.0, 0.0, 48e-3),
-    (0.1995, 0.0, 48e-3),
-    (0.2, 0.0, -2e-3),
-    (0.35, 0.0, -2e-3),
-    (0.5, 3e-3, 3e-3),
-)
-THROUGH = (
-    (0.0, 0.0, 2e-3),
-    (0.1995, 0.0, 2e-3),
-    (0.2, 0.0, -60e-3),
-    (0.35, 0.0, -60e-3),
-    (0.5, 3e-3, 3e-3),
+JUMP, THROUGH = (
+    ((0.0, 0.0, up), (0.1995, 0.0, up), (0.2, 0.0, low), (0.35, 0.0, low), (0.5, 3e-3, 3e-3))
+    for up, low in ((48e-3, -2e-3), (2e-3, -60e-3))
 )
 #: Jumps of 100 mm to and fro within 1, 5, 20 and 50 ms, at a depth of 4 mm: when they begin and
 #: end, s, and whether the finger is away then; from the third on if it is there first.

@@ -3,8 +3,8 @@
 `core/studies/nominal_relief.py` states what is asked for.
 """
 
-from collections.abc import Iterator
-from typing import NamedTuple
+from collections.abc import Iterator, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 from digiclay.core.base.arrays import Floats
@@ -121,13 +121,22 @@ def sections(session: Session) -> Iterator[Section]:
     for name, part, cells, where, middle in lines:
         if np.any(cells) and np.any(middle):
             sign = -1.0 if part == "valley" else 1.0
-            high, wanted = (float(np.median(sign * heights[middle])) for heights in (formed, asked))
-            scale = high / wanted if wanted else 1.0
-            rim = float((sign * formed)[cells].max()) - high
-            drawn, pins = scale * asked[cells], float((sign * formed)[parts[part]].max()) - high
-            yield Section(
-                name, part, where[cells], formed[cells], drawn, high - wanted, wanted, rim, pins
-            )
+            yield _cut((name, part), (formed, asked, where), (cells, middle, parts[part]), sign)
+
+
+def _cut(
+    names: tuple[str, str], over: tuple[Floats, ...], cells: Sequence[Any], sign: float
+) -> Section:
+    """Return the section of a name and a part of the bed; `sign`: -1 of a crease.
+
+    `over`: heights formed and asked for, and places along the line, (n,) each, m; `cells`: those on
+    the section, in its middle, and of the whole part.
+    """
+    (formed, asked, where), (line, middle, whole) = over, cells
+    high, wanted = (float(np.median(sign * heights[middle])) for heights in (formed, asked))
+    rim, pins = (float((sign * formed[some]).max()) - high for some in (line, whole))
+    drawn = asked[line] * (high / wanted if wanted else 1.0)
+    return Section(*names, where[line], formed[line], drawn, high - wanted, wanted, rim, pins)
 
 
 def blister_section(done: Result) -> Section:
@@ -135,15 +144,11 @@ def blister_section(done: Result) -> Section:
     history, scene = done.history, done.scene
     assert scene.blister is not None  # both methods have one
     place, rest = history["position"], scene.actuator.rest_height
-    tip, row = history["fingertip"][-1], np.abs(history["position"][:, 1]) < ON
+    tip, line = history["fingertip"][-1], np.abs(place[:, 1]) < ON
     following = np.count_nonzero(history["mode"][-1:] == Mode.FORCE_FOLLOW, axis=1)
-    distance = np.hypot(*(place - tip[:2]).T) - measure_reach(scene, place, following)
-    wanted, sign = float(tip[2]) - rest, 1.0 if tip[2] > rest else -1.0
-    formed, middle = history["height"][-1] - rest, int(np.argmin(np.hypot(*(place - tip[:2]).T)))
-    asked = evaluate_share(scene.blister, distance)[row] * formed[middle]
-    high = sign * float(formed[middle])
-    rim, pins = (float((sign * cells).max()) - high for cells in (formed[row], formed))
-    level, wanted = high - sign * wanted, sign * wanted
-    return Section(
-        "blister", "blister", place[row, 0], formed[row], asked, level, wanted, rim, pins
-    )
+    away = np.hypot(*(place - tip[:2]).T)
+    share = evaluate_share(scene.blister, away - measure_reach(scene, place, following))
+    formed, asked = history["height"][-1] - rest, share * (float(tip[2]) - rest)
+    cells = line, away == away.min(), slice(None)
+    sign = 1.0 if tip[2] > rest else -1.0
+    return _cut(("blister", "blister"), (formed, asked, place[:, 0]), cells, sign)

@@ -74,27 +74,17 @@ def draw_front(
     followed, lost = trials[sound[1:]], trials[~sound[1:]]
     lost = lost[np.isfinite(shown[lost]).all(axis=1)]
     edge = {"edgecolors": INK, "linewidths": 0.8, "zorder": 4}
-    marks: list[tuple[Any, dict[str, Any]]] = [
-        (
-            followed,
-            {"marker": "o", "color": "#B9C7D3", "s": 22, "label": f"{len(followed)} trials"},
-        ),
-        (
-            lost,
-            {
-                "marker": "x",
-                "color": "#D9C3B5",
-                "s": 24,
-                "label": f"{len(lost)} without the fingertip",
-            },
-        ),
-        ([0], {"marker": "D", "color": LINES[1], "s": 75, "label": "unchanged scene", **edge}),
-        ([chosen], {"marker": "*", "color": LINES[2], "s": 260, "label": "chosen", **edge}),
-    ]
+    marks: tuple[tuple[Any, str, str, int, str, dict[str, Any]], ...] = (
+        (followed, "o", "#B9C7D3", 22, f"{len(followed)} trials", {}),
+        (lost, "x", "#D9C3B5", 24, f"{len(lost)} without the fingertip", {}),
+        ([0], "D", LINES[1], 75, "unchanged scene", edge),
+        ([chosen], "*", LINES[2], 260, "chosen", edge),
+    )
     with panels(title, 9.0, 6.2, 1, 1) as (figure, (axes,)):
-        for rows, look in marks:
+        for rows, marker, color, size, label, look in marks:
             if len(rows):
-                axes.scatter(shown[rows, 1], shown[rows, 0], **look)
+                places = shown[rows, 1], shown[rows, 0]
+                axes.scatter(*places, size, color, marker=marker, label=label, **look)
         axes.plot(shown[front, 1], shown[front, 0], "o-", color=LINES[0], zorder=3, label="front")
         outside = _frame(axes, shown, np.append(front, 0), trials)
         note = f"\n{outside} trials are outside the axes" if outside else ""
@@ -146,14 +136,9 @@ def draw_indices(keys: Sequence[str], outputs: Mapping[str, Indices | None], tit
                 values, interval = (
                     (part[order] for part in indices[each]) if indices else (rows * 0.0, None)
                 )
-                look = {
-                    "color": color,
-                    "hatch": hatch,
-                    "edgecolor": "white",
-                    "linewidth": 0.0,
-                    "label": label,
-                }
-                panel.barh(rows + side * BAR, values, BAR, xerr=interval, error_kw=whisker, **look)
+                look = {"hatch": hatch, "edgecolor": "white", "linewidth": 0.0, "label": label}
+                places = {"y": rows + side * BAR, "height": BAR, "color": color}
+                panel.barh(width=values, xerr=interval, error_kw=whisker, **places, **look)
             if indices is None:
                 panel.text(
                     0.5, 0.5, "does not vary", transform=panel.transAxes, ha="center", va="center"
@@ -185,11 +170,16 @@ PANELS = (
 )
 
 
+def look_of(number: int) -> dict[str, Any]:
+    """Return color and marker of a method or a variant."""
+    return {"color": LINES[number % len(LINES)], "marker": MARKS[number % len(MARKS)]}
+
+
 def mark(
     axes: Any, row: float, mean: Interval, number: int, factor: float, **more: Any
 ) -> dict[str, Any]:
     """Mark the mean of a method in a row, with its interval; return the look of the method's marks."""
-    look = {"color": LINES[number % len(LINES)], "marker": MARKS[number % len(MARKS)]}
+    look = look_of(number)
     half = (mean.half or 0.0) * factor
     axes.errorbar(
         mean.mean * factor, row, xerr=half, linestyle="", markersize=8, capsize=4, **look, **more
@@ -285,8 +275,8 @@ def draw_limits(
         for column, (panel, (metric, most)) in enumerate(zip(axes, limits.items(), strict=True), 1):
             for number, (name, curve) in enumerate(curves.items()):
                 rows = curve[np.isfinite(curve[:, column])]
-                look = {"color": LINES[number % len(LINES)], "marker": MARKS[number % len(MARKS)]}
-                panel.plot(rows[:, 0], metric.factor * rows[:, column], label=name, **look)
+                values = metric.factor * rows[:, column]
+                panel.plot(rows[:, 0], values, label=name, **look_of(number))
             limit = metric.factor * most
             panel.axhline(limit, color=INK, linestyle=DASHES, linewidth=1.2, label="limit")
             panel.set(xlabel=minimized, ylabel=metric.title, yscale="log")

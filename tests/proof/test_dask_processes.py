@@ -1,6 +1,5 @@
 """Sweeps whose processes die: those of this machine, a cluster's worker, its scheduler; other versions."""
 
-import json
 import os
 import signal
 import subprocess
@@ -12,12 +11,13 @@ from digiclay.cli import main
 from digiclay.commands.cluster import open_cluster
 from digiclay.commands.evaluator import submit
 from digiclay.core.files.run_folder import read_json
-from digiclay.core.studies.series import finish
+from digiclay.core.studies.series import finish as finish_series
 from distributed import Client
 
+from tests.other_process import finish
 from tests.own_methods import forgotten, write_method
 from tests.package_copy import copy_package
-from tests.scene_files import SMALL_BLISTER, TOUCH, folder_with, scene_text, timeless
+from tests.scene_files import SCENE, command, folder_with, timeless
 from tests.timeouts import TIMEOUT, wait_until
 
 ADDON = Path(__file__).parents[2] / "addon"
@@ -27,12 +27,14 @@ LIBRARIES = Path(pytest.__file__).parents[1]
 AXES = ["control.force_gain=1,2", "control.dead_band=1e-5,2e-5", "layout.rows=20:31:12"]
 SWEEP = ["sweep", "my.toml", *(word for axis in AXES for word in ("--vary", axis)), "--quiet"]
 SWEEP += ["--set", "simulation.duration=2"]
+#: Makes hours of each point.
+HOURS = command("--set simulation.duration=1e5 --set recorder.every=1000")
 
 
 @pytest.fixture(autouse=True)
 def here(tmp_path, monkeypatch):
     """Work in an empty folder with one scene, my.toml."""
-    return folder_with(scene_text(3, 4, *TOUCH, parts=SMALL_BLISTER), tmp_path, monkeypatch)
+    return folder_with(SCENE, tmp_path, monkeypatch)
 
 
 @pytest.fixture
@@ -59,30 +61,15 @@ def start(here):
 def start_scheduler(start, folder, port="0", **settings):
     file = folder / "scheduler.json"
     file.unlink(missing_ok=True)
-    arguments = [
-        "--host",
-        "127.0.0.1",
-        "--port",
-        port,
-        "--no-dashboard",
-        "--scheduler-file",
-        str(file),
-    ]
-    process = start("distributed.cli.dask_scheduler", *arguments, **settings)
+    words = command(f"--host 127.0.0.1 --port {port} --no-dashboard --scheduler-file")
+    process = start("distributed.cli.dask_scheduler", *words, str(file), **settings)
     wait_until(lambda: read_json(file) is not None)
     return process, read_json(file)["address"]
 
 
 def start_worker(start, address, *arguments, **settings):
-    return start(
-        "distributed.cli.dask_worker",
-        address,
-        "--nthreads",
-        "1",
-        "--no-dashboard",
-        *arguments,
-        **settings,
-    )
+    words = command(f"distributed.cli.dask_worker {address} --nthreads 1 --no-dashboard")
+    return start(*words, *arguments, **settings)
 
 
 def points(folder):
@@ -91,29 +78,16 @@ def points(folder):
 
 def read_figures(point):
     """Return what stands in the file of a finished point."""
-    figures = json.loads(point.read_text(encoding="utf-8"))["figures"]
-    return figures
+    return read_json(point)["figures"]
 
 
 def test_a_point_that_no_process_of_this_machine_survives_fails_alone(here):
     resource = pytest.importorskip("resource", reason="Windows does not limit processor time")
-    axes = ["layout.rows=3,4", "simulation.duration=0.1,1e5", "control.dead_band=1e-5"]
-    varied = [word for axis in axes for word in ("--vary", axis)]
+    line = "sweep my.toml --vary layout.rows=3,4 --vary simulation.duration=0.1,1e5 --out o"
     # The system kills a process that has run for so many seconds: a point of hours, each time it is
     # begun.
     done = subprocess.run(
-        [
-            sys.executable,
-            "-m",
-            "digiclay",
-            "sweep",
-            "my.toml",
-            *varied,
-            "--workers",
-            "2",
-            "--out",
-            "o",
-        ],
+        [sys.executable, "-m", "digiclay", *command(f"{line} --workers 2")],
         capture_output=True,
         encoding="utf-8",
         check=False,
@@ -133,29 +107,27 @@ def test_a_killed_worker_and_a_killed_scheduler_change_no_bit_of_the_table(here,
     assert main([*SWEEP, "--workers", "2", "--out", "own"]) == 0
     scheduler, address = start_scheduler(start, here)
     workers = [start_worker(start, address, "--no-nanny") for _ in range(2)]
-    command = ["digiclay", *SWEEP, "--scheduler", address, "--out", "far"]
+    words = ["digiclay", *SWEEP, "--scheduler", address, "--out", "far"]
 
-    sweep = start(*command)
+    sweep = start(*words)
     wait_until(lambda: points(here / "far"))
     workers[0].send_signal(signal.SIGKILL)
     done = len(points(here / "far"))
     wait_until(lambda: len(points(here / "far")) > done)  # the other one goes on
     assert sweep.poll() is None
     scheduler.send_signal(signal.SIGKILL)
-    _, said = sweep.communicate(timeout=TIMEOUT)
+    code, _, said = finish(sweep)
     rule = "Finished work is kept, and the same command continues."
     lines = [line for line in said.splitlines() if "no workers yet" not in line]
-    assert (sweep.returncode, lines) == (2, [f"The scheduler {address} is gone. {rule}"])
+    assert (code, lines) == (2, [f"The scheduler {address} is gone. {rule}"])
     kept = {path: read_figures(path) for path in points(here / "far")}
     assert 8 <= len(kept) < 48
-    workers[1].communicate(timeout=TIMEOUT)  # a worker ends with its scheduler
+    finish(workers[1])  # a worker ends with its scheduler
 
     _, again = start_scheduler(start, here, address.rpartition(":")[2])
     assert again == address
     start_worker(start, address)
-    sweep = start(*command)
-    sweep.communicate(timeout=TIMEOUT)
-    assert sweep.returncode == 0
+    assert finish(start(*words))[0] == 0
     # None is run again, for its run time stands; those at the ends of what varies get their errors.
     for path, figures in kept.items():
         assert "run_time" in figures
@@ -169,9 +141,8 @@ def test_a_piece_that_no_worker_survives_fails_alone(here, start):
     done = {}
     with open_cluster(address, lambda: False, lambda note: None) as cluster:
         pieces = ["1 + 1", "__import__('os')._exit(1)", "2 + 2"]
-        finish(
-            submit(cluster, eval, pieces, stopped=lambda: False), done.__setitem__, done.__setitem__
-        )
+        evaluated = submit(cluster, eval, pieces, stopped=lambda: False)
+        finish_series(evaluated, done.__setitem__, done.__setitem__)
     assert [done[piece] for piece in pieces[::2]] == [2, 4]
     assert done[pieces[1]].startswith("2 workers died of this, the last one tcp://127.0.0.1:")
 
@@ -183,10 +154,8 @@ def test_a_worker_that_dies_when_it_is_asked_for_its_versions_changes_nothing(he
     workers = [start_worker(start, address, "--no-nanny", addon=addon) for addon in (other, ADDON)]
     with Client(address, set_as_default=False) as client:
         wait_until(lambda: len(client.scheduler_info()["workers"]) == 2)
-    short = ["sweep", "my.toml", "--vary", "control.force_gain=1,2", "--quiet"]
-    sweep = start("digiclay", *short, "--scheduler", address, "--out", "far")
-    _, said = sweep.communicate(timeout=TIMEOUT)
-    assert (sweep.returncode, said) == (0, "")
+    line = f"digiclay sweep my.toml --vary control.force_gain=1,2 --quiet --scheduler {address}"
+    assert finish(start(*command(line), "--out", "far")) == (0, None, "")
     assert [worker.poll() for worker in workers] == [1, None]
     assert len(points(here / "far")) == 2
 
@@ -198,23 +167,21 @@ def test_a_worker_of_another_version_is_named_at_once_and_when_it_joins(here, st
     front.write_text(text.replace('__version__ = "', '__version__ = "9.'), encoding="utf-8")
     _, address = start_scheduler(start, here)
     first = start_worker(start, address, "--no-nanny")
-    hours = ["--set", "simulation.duration=1e5", "--set", "recorder.every=1000"]
-    command = ["digiclay", *SWEEP, *hours, "--scheduler", address, "--out", "far"]
-    sweep = start(*command)
+    words = ["digiclay", *SWEEP, *HOURS, "--scheduler", address, "--out", "far"]
+    sweep = start(*words)
     with Client(address, set_as_default=False) as client:
         wait_until(lambda: any(client.processing().values()))
     start_worker(start, address, "--no-nanny", addon=other)
-    _, said = sweep.communicate(timeout=TIMEOUT)
-    assert sweep.returncode == 2
+    code, _, said = finish(sweep)
+    assert code == 2
     line = said.splitlines()[-1]
     assert line.startswith("Worker tcp://127.0.0.1:")
     assert " has digiclay 9." in line
     assert "; here it is digiclay 0" in line
     assert first.poll() is None
 
-    sweep = start(*command)
-    _, said = sweep.communicate(timeout=TIMEOUT)
-    assert sweep.returncode == 2
+    code, _, said = finish(start(*words))
+    assert code == 2
     assert " has digiclay 9." in said
     assert said.endswith("Install the same there.\n")
 
@@ -231,15 +198,14 @@ def test_a_place_without_digiclay_is_named_in_one_line(place, line, here, start)
     bare = {"addon": LIBRARIES, "bare": True}
     _, address = start_scheduler(start, here, **(bare if place == "scheduler" else {}))
     start_worker(start, address, "--no-nanny", **(bare if place == "worker" else {}))
-    hours = ["--set", "simulation.duration=1e5", "--set", "recorder.every=1000"]
-    sweep = start("digiclay", *SWEEP, *hours, "--scheduler", address, "--out", "far")
+    sweep = start("digiclay", *SWEEP, *HOURS, "--scheduler", address, "--out", "far")
     if place == "late worker":
         with Client(address, set_as_default=False) as client:
             wait_until(lambda: any(client.processing().values()))
         start_worker(start, address, "--no-nanny", **bare)
-    _, said = sweep.communicate(timeout=TIMEOUT)
+    code, _, said = finish(sweep)
     (told,) = [each for each in said.splitlines() if " has no workers" not in each]
-    assert (sweep.returncode, told.startswith(line.format(address))) == (2, True)
+    assert (code, told.startswith(line.format(address))) == (2, True)
     assert " lacks digiclay" in told
 
 
