@@ -96,18 +96,12 @@ def measure(arguments: argparse.Namespace, steps: Steps) -> Report:
                 differences = _compare(file, folders[REFERENCE] / file.name)
                 rows.append({"kernel": name, "run": names[int(file.stem)], **differences})
                 file.unlink()
-    kinds = [
-        [row for row in rows if row["kernel"] == name] for name in kernels if name != REFERENCE
-    ]
-    shown = [
-        {
-            "kernel": kernel[0]["kernel"],
-            "runs": len(kernel),
-            **{key: max(row[key] for row in kernel) for key in ("height", "force", "modes")},
-            "run": max(kernel, key=lambda row: row["height"])["run"],
-        }
-        for kernel in kinds
-    ]
+    shown = []
+    for kernel in dict.fromkeys(row["kernel"] for row in rows):
+        runs = [row for row in rows if row["kernel"] == kernel]
+        farthest = max(runs, key=lambda row: row["height"])
+        largest = {key: max(row[key] for row in runs) for key in ("force", "modes")}
+        shown.append({**farthest, **largest, "runs": len(runs)})
     columns = {
         "kernel": "kernel",
         "runs": "runs",

@@ -30,7 +30,7 @@ MM = 1e3
 ONE, TWO = METHODS
 SHORT = {name: NAMES[name].split(",")[0] for name in METHODS}
 #: Ends of the searches for a largest speed, m/s.
-FASTEST = {speeds[1] for one in (FULL, QUICK) for speeds in (one.drags, one.lifts)}
+FASTEST = {speeds[1] for extent in (FULL, QUICK) for speeds in (extent.drags, extent.lifts)}
 Value = TypeVar("Value")
 
 
@@ -77,9 +77,11 @@ def relief(results: Results) -> Evidence:
     """Whether ridge, mound and valley have the sections asked for."""
     evidence, missed = Evidence(), []
     for method in METHODS:
-        for one in sections(results.session[method]):
-            evidence.add(f"{SHORT[method]}, {one.name}", _write_section(one), one.meets(LIMITS))
-            missed += [one.name] if method == TWO and not one.meets(LIMITS) else []
+        for section in sections(results.session[method]):
+            evidence.add(
+                f"{SHORT[method]}, {section.name}", _write_section(section), section.meets(LIMITS)
+            )
+            missed += [section.name] if method == TWO and not section.meets(LIMITS) else []
     evidence.why = (
         f"A section holds when its shape is {LIMITS}. Nominal is the method's own blister carried along "
         "the fingertip's path, at the level that was formed."
@@ -92,25 +94,28 @@ def relief(results: Results) -> Evidence:
     return evidence
 
 
-def _write_section(one: Section) -> str:
-    rim = f", rim {one.rim * MM:.1f} mm over its middle, {one.pins * MM:.1f} mm by all pins of the {one.part}"
-    rim = rim if max(one.rim, one.pins) > LIMITS.rim * one.relief else ""
-    low = abs(one.level) > LIMITS.level * one.middle
-    level = f", its middle {one.level * MM:+.1f} mm from {one.middle * MM:.1f} mm" if low else ""
-    holds = "" if one.meets(LIMITS) else " (missed)"
-    size = f"rms {one.rms * MM:.1f}, at most {one.largest * MM:.1f} of {one.relief * MM:.1f} mm"
-    return f"{size}{rim}{level}{holds}"
+def _write_section(section: Section) -> str:
+    rim = (
+        f", rim {section.rim * MM:.1f} mm over its middle, {section.pins * MM:.1f} mm by all pins "
+        f"of the {section.part}"
+    )
+    rim = rim if max(section.rim, section.pins) > LIMITS.rim * section.relief else ""
+    low = abs(section.level) > LIMITS.level * section.middle
+    middle = f", its middle {section.level * MM:+.1f} mm from {section.middle * MM:.1f} mm"
+    holds = "" if section.meets(LIMITS) else " (missed)"
+    size = f"{section.largest * MM:.1f} of {section.relief * MM:.1f} mm"
+    return f"rms {section.rms * MM:.1f}, at most {size}{rim}{middle if low else ''}{holds}"
 
 
 def tracking(results: Results) -> Evidence:
     """Both methods on the simple trajectories."""
     evidence = Evidence()
-    for method, name, one in _of_paper(results.simple):
-        lost = f"lost {one.losses} times, {one.loss_share:.0%} of the time without contact"
-        if one.losses == 0 and one.loss_share == 0.0:
+    for method, name, follows in _of_paper(results.simple):
+        lost = f"lost {follows.losses} times, {follows.loss_share:.0%} of the time without contact"
+        if follows.losses == 0 and follows.loss_share == 0.0:
             lost = "never lost"
-        text = f"{lost}, lag ≤ {one.lag * MM:.1f} mm, RFD {one.rfd:.3f} N"
-        evidence.add(f"{SHORT[method]}, {name}", text, one.meets(results.criterion))
+        text = f"{lost}, lag ≤ {follows.lag * MM:.1f} mm, RFD {follows.rfd:.3f} N"
+        evidence.add(f"{SHORT[method]}, {name}", text, follows.meets(results.criterion))
     evidence.why = f"Not followed: {'; '.join(evidence.missed)}." if evidence.missed else ""
     return evidence
 
@@ -230,11 +235,11 @@ def _sets_in(swings: list[Swing]) -> str:
     calm, first = onset_among(swings)
     if first is None:
         return f"none up to K_f = {calm or 0.0:g} 1/N"
-    by_gain = {one.gain: one for one in swings}
-    one = by_gain[first]
-    pace = "" if one.frequency is None else f", {one.frequency:.0f} Hz"
+    by_gain = {swing.gain: swing for swing in swings}
+    swing = by_gain[first]
+    pace = "" if swing.frequency is None else f", {swing.frequency:.0f} Hz"
     below = "at" if calm is None else f"above {calm:g} ({by_gain[calm].amplitude:.3f} N left), at"
-    return f"{below} {first:g} 1/N (amplitude {one.amplitude:.3f} N{pace})"
+    return f"{below} {first:g} 1/N (amplitude {swing.amplitude:.3f} N{pace})"
 
 
 def trade(results: Results) -> Evidence:
@@ -262,24 +267,24 @@ def trade(results: Results) -> Evidence:
     return evidence
 
 
+HIGH = {"convex": "high", "concave": "deep"}
+
+
 def blister(results: Results) -> Evidence:
     """Whether blisters have the sections asked for."""
     evidence = Evidence()
     for (method, shape, profile), done in results.blisters.items():
         if method in METHODS:
-            one = blister_section(done)
-            high = "high" if shape == "convex" else "deep"
-            rim = (
-                f", rim {one.pins * MM:.1f} mm beyond it"
-                if one.pins > LIMITS.rim * one.relief
-                else ""
-            )
+            section = blister_section(done)
+            rim = f", rim {section.pins * MM:.1f} mm beyond it"
+            rim = rim if section.pins > LIMITS.rim * section.relief else ""
             text = (
-                f"{one.relief * MM:.1f} mm {high} in the middle{rim}, section rms {one.rms * MM:.1f}, "
-                f"at most {one.largest * MM:.1f} mm from its profile"
-                f"{'' if one.meets(LIMITS) else ' (missed)'}"
+                f"{section.relief * MM:.1f} mm {HIGH[shape]} in the middle{rim}, "
+                f"section rms {section.rms * MM:.1f}, "
+                f"at most {section.largest * MM:.1f} mm from its profile"
+                f"{'' if section.meets(LIMITS) else ' (missed)'}"
             )
-            evidence.add(f"{SHORT[method]}, {shape}, {profile}", text, one.meets(LIMITS))
+            evidence.add(f"{SHORT[method]}, {shape}, {profile}", text, section.meets(LIMITS))
     forms = {method: results.blisters[method, "convex", "cone"].scene.blister for method in METHODS}
     size = ", ".join(
         f"{SHORT[method]} {form.radius * MM:g} mm" for method, form in forms.items() if form
@@ -372,20 +377,24 @@ def ahead(results: Results) -> Evidence:
         why=f"It holds where they are lowered by {LOWERED:.0%} of the fingertip's depth or more. "
         f"{SHORT[TWO]} is there for comparison: its blister stands higher by the rise."
     )
-    for method, name, one, _ in _list_drags(results, AS_IT_IS):
-        if method in METHODS and name in DEPTH and one.ahead is not None:
-            lowered = [-one.ahead > LOWERED * DEPTH[name]] if method == ONE else []
+    for method, name, drag, _ in _list_drags(results, AS_IT_IS):
+        if method in METHODS and name in DEPTH and drag.ahead is not None:
+            lowered = [-drag.ahead > LOWERED * DEPTH[name]] if method == ONE else []
             depth = f"{DEPTH[name] * MM:g} mm deep"
-            evidence.add(f"{SHORT[method]}, {name}, {depth}", f"{one.ahead * MM:+.2f} mm", *lowered)
+            evidence.add(
+                f"{SHORT[method]}, {name}, {depth}", f"{drag.ahead * MM:+.2f} mm", *lowered
+            )
     return evidence
 
 
 def escape(results: Results) -> Evidence:
     """Whether Method II stays clear of the oscillation of Method I."""
     evidence, row = Evidence(), sorted(results.cell_swings)
-    for one in row:
-        pace = f" at {one.frequency:.0f} Hz" if one.sustained and one.frequency else ""
-        evidence.add(f"K_FF = {one.gain:g} 1/N", f"{one.amplitude:.3f} N{pace}", not one.sustained)
+    for swing in row:
+        pace = f" at {swing.frequency:.0f} Hz" if swing.sustained and swing.frequency else ""
+        evidence.add(
+            f"K_FF = {swing.gain:g} 1/N", f"{swing.amplitude:.3f} N{pace}", not swing.sustained
+        )
     calm, first = onset_among(row)
     own = results.printed[TWO].gain("force_gain")
     evidence.why = f"Its own gain is {own:g} 1/N."
@@ -399,7 +408,7 @@ def escape(results: Results) -> Evidence:
 
 def find_radius(results: Results) -> float:
     """Return r_VM, m."""
-    return min((one.radius for one in results.located), default=0.0)
+    return min((finger.radius for finger in results.located), default=0.0)
 
 
 def radius(results: Results) -> Evidence:
@@ -454,10 +463,10 @@ def varied(variant: str, results: Results) -> Evidence:
 staggered, gaussian = (partial(varied, variant) for variant in (STAGGERED, GAUSSIAN))
 
 
-def _write_drag(one: Dragged) -> str:
-    return f"{one.follows.lag * MM:.1f} mm, {one.follows.rfd:.3f} N{_write_losses(one)}"
+def _write_drag(drag: Dragged) -> str:
+    return f"{drag.follows.lag * MM:.1f} mm, {drag.follows.rfd:.3f} N{_write_losses(drag)}"
 
 
-def _write_losses(one: Dragged) -> str:
-    lost = one.follows.losses
+def _write_losses(drag: Dragged) -> str:
+    lost = drag.follows.losses
     return f" (finger lost {lost} time{'' if lost == 1 else 's'})" if lost else ""

@@ -8,6 +8,7 @@ import re
 import subprocess
 import tomllib
 from pathlib import Path
+from typing import Any
 
 VERSION_FILE = "addon/digiclay/core/version.py"
 MANIFEST = "addon/digiclay/blender_manifest.toml"
@@ -41,21 +42,27 @@ def read_versions(root: Path) -> dict[str, str]:
         (root / VERSION_FILE).read_text(encoding="utf-8"),
         re.MULTILINE,
     )
-    manifest = tomllib.loads((root / MANIFEST).read_text(encoding="utf-8"))
-    heading = HEADING.search((root / CHANGELOG).read_text(encoding="utf-8"))
     return {
         VERSION_FILE: version[1] if version else "",
-        MANIFEST: str(manifest.get("version", "")),
-        CHANGELOG: heading[1].split(" ")[0] if heading else "",
+        MANIFEST: str(read_manifest(root).get("version", "")),
+        CHANGELOG: read_section(root)[0].split(" ")[0],
     }
+
+
+def read_manifest(root: Path) -> dict[str, Any]:
+    """Return the manifest of the extension."""
+    return tomllib.loads((root / MANIFEST).read_text(encoding="utf-8"))
+
+
+def read_section(root: Path) -> tuple[str, str]:
+    """Return heading and text of the newest section of the changelog, both empty without one."""
+    _, *sections = HEADING.split((root / CHANGELOG).read_text(encoding="utf-8"))
+    return (sections[0], sections[1]) if sections else ("", "")
 
 
 def read_notes(root: Path) -> str:
     """Return the newest section of the changelog without its heading, links to pages as their text alone."""
-    text = (root / CHANGELOG).read_text(encoding="utf-8")
-    sections = HEADING.split(text)
-    notes = sections[2] if len(sections) > 2 else ""
-    return LINK.sub(r"\1", notes).strip()
+    return LINK.sub(r"\1", read_section(root)[1]).strip()
 
 
 def _find_in_files(root: Path, version: str) -> list[str]:
@@ -65,8 +72,7 @@ def _find_in_files(root: Path, version: str) -> list[str]:
         for path, found in read_versions(root).items()
         if found != version
     ]
-    heading = HEADING.search((root / CHANGELOG).read_text(encoding="utf-8"))
-    day = re.fullmatch(r"\S+ - (\d{4}-\d\d-\d\d)", heading[1]) if heading else None
+    day = re.fullmatch(r"\S+ - (\d{4}-\d\d-\d\d)", read_section(root)[0])
     try:
         dated = datetime.date.fromisoformat(day[1]) if day else None
     except ValueError:
@@ -79,7 +85,7 @@ def _find_in_files(root: Path, version: str) -> list[str]:
         wrong.append(
             f"{CHANGELOG}: the section of {version} is empty, and the notes are taken from it."
         )
-    manifest = tomllib.loads((root / MANIFEST).read_text(encoding="utf-8"))
+    manifest = read_manifest(root)
     page = f"https://extensions.blender.org/add-ons/{manifest.get('id')}/"
     if manifest.get("website") != page:
         wrong.append(f"{MANIFEST}: website must be {page}, the page of this id.")

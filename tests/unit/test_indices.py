@@ -48,8 +48,7 @@ def analyze_ishigami(samples, seed, *, second):
     """Have Ishigami's function sampled and analyzed."""
     x, y, z = np.pi * (2.0 * sample_shares(samples, 3, seed, second=second) - 1.0).T
     values = np.sin(x) + A * np.sin(y) ** 2 + B * z**4 * np.sin(x)
-    indices = compute_indices(values, 3, seed, second=second)
-    return indices
+    return compute_indices(values, 3, seed, second=second)
 
 
 def is_within(found, order, wanted, part=slice(None)):
@@ -97,14 +96,9 @@ def test_points_that_no_worker_survives_are_told_and_tried_again(tmp_path):
 
 
 def test_a_design_has_a_block_of_points_a_sample_and_depends_on_its_seed_alone():
-    assert (
-        sample_shares(8, 3, 1, second=False).shape
-        == (count_points(8, 3, second=False), 3)
-        == (40, 3)
-    )
-    assert (
-        sample_shares(8, 3, 1, second=True).shape == (count_points(8, 3, second=True), 3) == (64, 3)
-    )
+    for second, points in ((False, 40), (True, 64)):
+        shape = sample_shares(8, 3, 1, second=second).shape
+        assert shape == (count_points(8, 3, second=second), 3) == (points, 3)
     one, same, other = (sample_shares(16, 2, seed, second=False) for seed in (3, 3, 4))
     assert np.array_equal(one, same)
     assert not np.array_equal(one, other)
