@@ -301,9 +301,9 @@ def commands_of(name: str) -> Floats:
     )
 
 
-def live(name: str, stepper: str, step: float) -> Floats:
-    """Run a case with its controller at a physics step, s, and return the heights, (t, n)."""
-    return _run(*_prepare(name, stepper, step, period_of(step)))[0]
+def live(name: str, step: float) -> Floats:
+    """Run a case with its controller by the default stepper at a physics step, s; return heights, (t, n)."""
+    return _run(*_prepare(name, "bernoulli", step, period_of(step)))[0]
 
 
 def _prepare(
@@ -422,7 +422,7 @@ def _list_broken(name: str, outcomes: list[Outcome], off: float) -> Iterator[str
     for step in STEPS:
         try:
             with strict():
-                live(name, "bernoulli", step)
+                live(name, step)
         except (DivergenceError, FloatingPointError, Warning, AssertionError) as wrong:
             yield f"{name}, live, {step * 1e3:g} ms: {wrong}"
 

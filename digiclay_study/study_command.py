@@ -264,15 +264,11 @@ def format_index_table(findings: Findings) -> str:
     for name, indices in findings.indices.items():
         for order in ("first", "total"):
             for i, key in enumerate(keys):
-                pair = (
-                    ["", ""]
-                    if indices is None
-                    else [repr(float(part[i])) for part in indices[order]]
-                )
+                pair = [part[i] for part in indices[order]] if indices else ["", ""]
                 rows.append([name, order, key, "", *pair])
         if indices and "second" in indices:
             for i, j in zip(*np.triu_indices(len(keys), 1), strict=True):
-                pair = [repr(float(part[i, j])) for part in indices["second"]]
+                pair = [part[i, j] for part in indices["second"]]
                 rows.append([name, "second", keys[i], keys[j], *pair])
     return format_csv(rows)
 

@@ -43,9 +43,9 @@ def name_rows(axes: Any, names: Sequence[str]) -> None:
     axes.set_ylim(-len(names) + 0.4, 0.6)
 
 
-def put_legend_above(axes: Any, columns: int = 6) -> None:
+def put_legend_above(axes: Any) -> None:
     """Put the legend above the panel."""
-    axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=columns, columnspacing=1.2)
+    axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=6, columnspacing=1.2)
 
 
 #: The largest value shown over the least one from which on an axis is logarithmic.

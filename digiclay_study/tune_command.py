@@ -198,12 +198,9 @@ def find_front(values: Floats) -> Cells:
     """
     valid = np.flatnonzero(~np.isnan(values).any(axis=1))
     order = valid[np.lexsort((values[valid, 1], values[valid, 0]))]
-    front, least = [], np.inf
-    for point in order:
-        if values[point, 1] < least:
-            least = values[point, 1]
-            front.append(point)
-    return np.array(front, dtype=np.intp)
+    second = values[order, 1]
+    front: Cells = order[second < np.append(np.inf, np.minimum.accumulate(second)[:-1])]
+    return front
 
 
 def find_knee(front: Floats) -> int:

@@ -95,8 +95,8 @@ def refused(capsys, *arguments):
     return said
 
 
-def bad(body, fields=""):
-    inner = "\n".join(f"    {line}" for line in (*fields.splitlines(), *body.splitlines()))
+def bad(body):
+    inner = "\n".join(f"    {line}" for line in body.splitlines())
     return f"{HEAD}\n@dataclass(frozen=True)\nclass Bad(OwnMethod):\n{inner}\n"
 
 

@@ -54,7 +54,7 @@ def test_the_default_stepper_does_not_blow_up(name, step):
     # it.
     assert np.isfinite(replayed(name, step)).all()
     with stiff.strict():
-        heights = stiff.live(name, "bernoulli", step)  # under its own controller
+        heights = stiff.live(name, step)  # under its own controller
     assert np.isfinite(heights).all()
 
 

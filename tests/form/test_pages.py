@@ -105,13 +105,13 @@ def _definitions() -> dict[str, set[str]]:
 
 
 @functools.cache
-def _parameters() -> dict[tuple[str, str], Quantity]:
-    return {
-        (section, name): quantity
+def _parameters() -> list[tuple[str, str, Quantity]]:
+    return [
+        (section, name, quantity)
         for section in (*SECTIONS, "body")
         for method in METHODS
         for name, quantity in list_quantities(import_parameters(section, method)).items()
-    }
+    ]
 
 
 def find_undated(page: Path, text: str) -> list[str]:
@@ -153,10 +153,11 @@ def find_absent_modules(page: Path, text: str) -> list[str]:
 def find_absent_names(page: Path, text: str) -> list[str]:
     """Return ``module.name`` where a page names what the module does not define."""
     endings = {"py", "md", "csv", "png", "jpg", "svg", "toml", "json", "npz", "stl", "obj", "html"}
+    parameters = {(section, name) for section, name, _ in _parameters()}
     return [
         f"{module}.{name}"
         for module, name in re.findall(r"`(?!bpy)(?:[\w.]+\.)?([a-z_]+)\.([A-Za-z]\w*)", text)
-        if module in _definitions() and name not in endings and (module, name) not in _parameters()
+        if module in _definitions() and name not in endings and (module, name) not in parameters
         if name not in _definitions()[module] and name not in _definitions()
     ]
 
@@ -206,9 +207,7 @@ def test_all_fourteen_equations_have_a_row_and_places_that_exist() -> None:
 
 def test_every_parameter_says_where_it_comes_from() -> None:
     page = (ROOT / "docs" / "nomenclature.md").read_text(encoding="utf-8")
-    sources = {
-        source for quantity in _parameters().values() for source in quantity.source.split(", ")
-    }
+    sources = {source for *_, quantity in _parameters() for source in quantity.source.split(", ")}
     # The paper, derived, chosen; or a reference of the page, and none without a value.
     assert sources - {"P", "D", "C"} == set(re.findall(r"^- \*\*(.+?)\*\*:", page, re.MULTILINE))
 
@@ -279,12 +278,7 @@ def read_prose(path: Path) -> str:
 def test_every_symbol_of_pages_and_of_the_paper_is_declared() -> None:
     """A parameter whose symbol has changed leaves its former one behind."""
     page = (ROOT / "docs" / "nomenclature.md").read_text(encoding="utf-8")
-    declared = {
-        quantity.symbol
-        for section in (*SECTIONS, "body")
-        for method in METHODS
-        for quantity in list_quantities(import_parameters(section, method)).values()
-    }
+    declared = {quantity.symbol for *_, quantity in _parameters()}
     variables = set(
         re.findall(r"[^\s|,]+", " ".join(re.findall(r"^\| ([^|]+) \|", page, re.MULTILINE)))
     )

@@ -62,12 +62,12 @@ def release_command(folder, version=__version__):
     return [sys.executable, str(folder / "tools" / "make_release.py"), version]
 
 
-def run_release(folder, version=__version__, umask=18, **added):
+def run_release(folder, version=__version__, **added):
     return subprocess.run(
         release_command(folder, version),
         cwd=folder.parent,
         env=ENVIRONMENT | added,
-        umask=umask,
+        umask=0o022,
         capture_output=True,
         encoding="utf-8",
         timeout=TIMEOUT,

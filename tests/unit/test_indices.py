@@ -44,9 +44,9 @@ def evaluate_with(task, folder, bundles):
     return evaluation
 
 
-def analyze_ishigami(samples, seed, *, second):
+def analyze_ishigami(seed, *, second):
     """Have Ishigami's function sampled and analyzed."""
-    x, y, z = np.pi * (2.0 * sample_shares(samples, 3, seed, second=second) - 1.0).T
+    x, y, z = np.pi * (2.0 * sample_shares(128, 3, seed, second=second) - 1.0).T
     values = np.sin(x) + A * np.sin(y) ** 2 + B * z**4 * np.sin(x)
     return compute_indices(values, 3, seed, second=second)
 
@@ -59,13 +59,13 @@ def is_within(found, order, wanted, part=slice(None)):
 
 def test_the_indices_of_ishigami_are_within_their_intervals():
     # 95 % intervals: with these seeds each index is within its own.
-    found = analyze_ishigami(128, 1, second=True)
+    found = analyze_ishigami(1, second=True)
     assert is_within(found, "first", FIRST)
     assert is_within(found, "total", TOTAL)
     assert is_within(
         found, "second", np.array([0.0, BY_PAIR, 0.0]) / VARIANCE, np.triu_indices(3, 1)
     )
-    alone = analyze_ishigami(128, 2, second=False)
+    alone = analyze_ishigami(2, second=False)
     assert list(alone) == ["first", "total"]
     assert is_within(alone, "first", FIRST)
     assert is_within(alone, "total", TOTAL)

@@ -59,8 +59,8 @@ def results(*swings, **bad):
     return Results(simple=simple, swings=list(swings), printed={FIRST: session_of(resolve({}))})
 
 
-def swing(gain, amplitude, settling, position_gain=500.0):
-    return Swing(gain, position_gain, amplitude, None if settling else 10.0, settling)
+def swing(gain, amplitude, settling):
+    return Swing(gain, 500.0, amplitude, None if settling else 10.0, settling)
 
 
 CALM_THEN_WILD = (swing(2.0, 0.001, 1.0), swing(5.0, 0.001, 0.2), swing(50.0, 0.2, None))
