@@ -22,7 +22,7 @@ from .blister import Blister
 from .device_info import DeviceInfo, check_floor, suppress_noise
 from .finger_sections import WHOLE, Whole
 from .servo import Tracking, check_order, lock_overloaded, mark_formed
-from .travel import Heading, Rim, measure_lead, measure_square, update_heading
+from .travel import Heading, Rim, measure_offsets, measure_square, update_heading
 
 VIRTUAL_SPRING = (Mode.REST, Mode.HOLD, Mode.SPRING, Mode.EDGE)
 
@@ -301,11 +301,10 @@ class CellStatesControl:
         np.less(nearest, blister.radius * (1.0 - RELATIVE_TOLERANCE), out=in_blister)
         np.less(nearest, blister.edge_radius * (1.0 - RELATIVE_TOLERANCE), out=at_edge)
         at_edge ^= in_blister
-        ahead = measure_lead(memory.heading, memory.x, memory.y, basis)
+        from_patch, ahead = measure_offsets(memory.x, memory.y, *memory.heading[2:], basis)
         facing = height[at_edge & (ahead >= -TIE)]
         if facing.size:
             memory = memory._replace(edge=float(facing.mean()))
-        from_patch = np.sqrt(measure_square(memory.x, memory.y, basis))
         np.less(ahead, self.parameters.behind * from_patch - TIE, out=left_behind)
         left_behind &= nearest > blister.flat_radius * (1.0 - RELATIVE_TOLERANCE)
         left_behind &= in_blister

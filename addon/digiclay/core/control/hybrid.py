@@ -21,6 +21,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..base.arrays import TIE, Constants, Floats
+from ..base.modes import FORCE_FOLLOW
 from ..model.contact import Contact
 from ..model.control_interface import Commands, Measurement, Memory
 from ..model.fingertip import Fingertip
@@ -40,6 +41,7 @@ from .finger_observer import (
 )
 from .finger_sections import SHARED, WHOLE, Whole
 from .flow_servo import FlowServo, make_flow_servo
+from .ground import EdgeGround, raise_blister
 from .hybrid_parameters import Hybrid
 from .led_blister import SLOWEST, Follower, LeadProfile, LedBlister, Region
 from .pulp_estimate import PulpEstimate, Reach, find_tops, lead_heights
@@ -67,6 +69,8 @@ DOUBTED, PERIODS = 0.4, 20.0
 OVER = 0.45
 
 
+#: Surface from which the blister rises.
+GROUND = EdgeGround()
 #: Height of a blister's top, m, and the total force predicted for it, N.
 Top = tuple[float, float]
 
@@ -211,7 +215,9 @@ class HybridControl:
             region = self.surface.survey(memories, seen.quadratic_basis, left, sections)
             memories = self._follow_force(memories, seen, region, coasting, sections)
             edge, top = sections.spread([(memory.edge, memory.top) for memory in memories])
-            left = self.surface.leave((edge, top), seen, left, region.cells, mode)
+            form = edge, top, FORCE_FOLLOW, False
+            before = seen._replace(target=left)
+            left = raise_blister(self.surface.rule, GROUND, region.cells, before, form, mode)
             target = lead_heights(left, top, region.drop, sections.spread(region.raised))
             np.maximum(target, lowest, out=target)
             np.minimum(target, highest, out=target)

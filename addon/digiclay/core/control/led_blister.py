@@ -8,14 +8,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..base.arrays import TIE, Floats, Modes
-from ..base.modes import FORCE_FOLLOW
-from ..model.control_interface import Measurement
+from ..base.arrays import TIE, Floats
 from ..model.layout import Disc, enclose_discs
 from .blister import BlisterCells, BlisterRule
 from .finger_estimate import STATES, Aim, Estimate
 from .finger_sections import WHOLE, Whole
-from .ground import EdgeGround, raise_blister
 from .travel import Heading
 from .virtual_master import IDLE, Master, Phase
 
@@ -93,8 +90,6 @@ class Follower(NamedTuple):
         return x, y
 
 
-#: Surface from which the blister rises.
-GROUND = EdgeGround()
 #: Margin of the disc of led pins around the estimated position and reach, m.
 MARGIN = 2e-3
 
@@ -150,24 +145,3 @@ class LedBlister:
         slopes = [find(speed, raised=up) for speed, up in zip(speeds, raised, strict=True)]
         drop = self.profile.find_drop(cells.distance, cells.ahead, *sections.spread(slopes))
         return Region(edges, raised, aims, speeds, cells, drop)
-
-    def leave(
-        self,
-        heights: tuple[Any, Any],
-        seen: Measurement,
-        left: Floats,
-        cells: BlisterCells,
-        mode: Modes,
-    ) -> Floats:
-        """Return the heights at which pins are left by fingertips, m; modes, (m,), are set in place.
-
-        `heights`: surface and top, m, numbers or (m,).
-        """
-        return raise_blister(
-            self.rule,
-            GROUND,
-            cells,
-            seen._replace(target=left),
-            (*heights, FORCE_FOLLOW, False),
-            mode,
-        )

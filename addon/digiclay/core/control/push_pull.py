@@ -106,11 +106,7 @@ class PushPullControl:
     def command(self, memory: Listening, seen: Measurement) -> tuple[Listening, Commands]:
         """Drag commanded heights along, and move every pin up or down; see `Controller`."""
         speeds, target = self.parameters, seen.target
-        limit = (
-            memory.radius * memory.radius * (1.0 + RELATIVE_TOLERANCE)
-            if memory.radius >= 0.0
-            else -1.0
-        )
+        limit = memory.radius * abs(memory.radius) * (1.0 + RELATIVE_TOLERANCE)
         listening = measure_square(memory.x, memory.y, seen.quadratic_basis) <= limit
         rising = memory.period % CYCLE == 0
         if rising:  # a whole cycle is over: the remaining error is no ripple

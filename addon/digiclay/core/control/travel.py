@@ -73,12 +73,6 @@ def update_heading(
     return Heading(x, y, dx / gone, dy / gone)
 
 
-def measure_lead(heading: Heading, x: float, y: float, basis: Floats) -> Floats:
-    """Return the distances of cells (6, m) ahead of a point, m; negative behind it, 0 before any travel."""
-    _, _, toward_x, toward_y = heading
-    return np.dot([-x * toward_x - y * toward_y, toward_x, toward_y], basis[:3])
-
-
 def measure_offsets(
     x: Any, y: Any, toward_x: Any, toward_y: Any, basis: Floats
 ) -> tuple[Floats, Floats]:
