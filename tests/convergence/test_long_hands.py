@@ -11,12 +11,12 @@ def test_hands_at_30_hz_from_beside_the_bed_with_places_that_are_none_shape_soft
 
 
 def test_without_a_part_tracked_hands_are_no_fingers():
-    # With all parts it shapes from 2.3 s on, as deep as it then is.
-    times = {"clutch": 2.9, "cutoff": 2.3}
+    # With all parts it shapes from 1.3 s on, as deep as it then is.
+    times = {"clutch": 1.9, "cutoff": 1.3}
     found = {
         part: shaped(WORSE, replace(HANDS, **{part: 0.0}), lasts) for part, lasts in times.items()
     }
-    found["coupling"] = shaped(WORSE, lasts=1.5, coupling=0.0)
+    found["coupling"] = shaped(WORSE, lasts=1.0, coupling=0.0)
     # Off by 7 mm, a hand touches nothing, or presses as much deeper.
     assert not found["clutch"].shaping[:, 0].any()
     # The spring makes 50 mN of a tremor of 1 mm.

@@ -39,7 +39,7 @@ pytestmark = pytest.mark.skipif(
 def server(tmp_path_factory):
     """One server for all clients; it must be alive in the end, and have its take whole."""
     folder = tmp_path_factory.mktemp("served")
-    with serve(folder, "--out", "recorded") as one:
+    with serve(folder, "--out", "recorded", rate=100) as one:
         yield one
         report = one.stop(signal.SIGHUP)
         assert "doors that did not answer" not in report["counts"]
@@ -125,7 +125,7 @@ def test_hands_of_a_quest_are_recorded_and_played_into_a_server(tmp_path):
     numbers = ", ".join(["0.01"] * 63)
     lines = f"Left wrist:, 0, 1, 0, 0, 0, 0, 1\nLeft landmarks:, {numbers}\n".encode()
     environment = {**os.environ, "PYTHONPATH": PACKAGES, "DIGICLAY_SERVE_TOKEN": TOKEN}
-    with serve(tmp_path, "--fingers", "5") as one, one.connect("?rate=200") as client:
+    with serve(tmp_path, "--fingers", "5", rate=50) as one, one.connect("?rate=200") as client:
         command = [sys.executable, "-m", "digiclay", "hands", "--to", f"ws://127.0.0.1:{one.port}"]
         with socket.socket() as free:
             free.bind(("127.0.0.1", 0))

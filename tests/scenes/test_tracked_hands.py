@@ -19,13 +19,13 @@ HANDS, COUPLING = Tracking(0.1, 10e-3, 1.0), 50.0
 BIAS, JITTER, DELAY = 11e-3, 1e-3, 45e-3
 #: Set point of Method I, N.
 WANTED = 0.4
-LASTS, PERIOD = 5.5, 5e-3
+LASTS, PERIOD = 4.5, 5e-3
 
 
 def shape(time, side):
     """Return where a hand is: it comes down, presses, lifts a ridge, draws it along, and leaves; m."""
-    height = np.interp(time, [0.0, 0.3, 2.36, 4.36, 5.0, 5.3], [60, 48, 36, 41, 41, 90])
-    along = np.interp(time, [4.36, 5.0], [-12, -8])
+    height = np.interp(time, [0.0, 0.3, 1.36, 3.36, 4.0, 4.3], [60, 48, 36, 41, 41, 90])
+    along = np.interp(time, [3.36, 4.0], [-12, -8])
     return 1e-3 * np.array([28.0 * side, along, height])
 
 
@@ -125,10 +125,10 @@ def shaped(stream, tracking=HANDS, lasts=LASTS, coupling=COUPLING):
 
 #: Another identity after a dropout of 60 ms, then in the next message; then they are exchanged.
 WORSE = Stream(
-    gone=(2.8, 2.86),
-    renamed=(2.86, 3.2),
-    silent=(3.5, 3.56),
-    exchanged=(3.8, 4.3),
+    gone=(1.8, 1.86),
+    renamed=(1.86, 2.2),
+    silent=(2.5, 2.56),
+    exchanged=(2.8, 3.3),
     hostile=True,
 )
 
@@ -155,8 +155,8 @@ def test_hands_with_dropouts_other_identities_and_hostile_fingers_shape_softly()
 
 
 def test_nobody_presses_on_after_a_dropout():
-    gone, silent = (2.6, 2.9), (3.1, 3.4)
-    seen = shaped(Stream(gone=gone, silent=silent), lasts=3.6)
+    gone, silent = (1.6, 1.9), (2.1, 2.4)
+    seen = shaped(Stream(gone=gone, silent=silent), lasts=2.6)
     for hand, (start, end) in ((1, gone), (0, silent)):
         # 50 ms at 250 mm/s are 12 mm.
         out = (seen.time > start + HANDS.lift + 0.05) & (seen.time < end)

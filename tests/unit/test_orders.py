@@ -207,10 +207,8 @@ def test_pins_are_placed_within_a_micrometer_and_stay_there_whatever_the_method(
     "table, longest, error, swing",
     {
         "paper": ({}, 0.4, 1e-6, 0.1e-6),
-        "fast": ({"preset": "fast"}, 0.25, 1e-6, 0.2e-6),
         "pins four times as fast": (STIFF, 0.15, 1e-6, 0.5e-6),
         "slow control": ({"simulation": {"control_period": 20e-3}}, 0.6, 1e-6, 0.5e-6),
-        "fast control": ({"simulation": {"control_period": 1e-3}}, 0.4, 1e-6, 0.5e-6),
         "dead time": ({"delay": {"dead_time": 20e-3}}, 0.6, 1e-6, 0.5e-6),
         "slow valve": ({"valve_lag": {"time_constant": 50e-3}}, 1.1, 1e-6, 4e-6),
         "ideal valve": ({"valve_lag": "absent", "delay": "absent"}, 0.4, 1e-6, 0.5e-6),
@@ -355,7 +353,6 @@ def test_orders_of_another_shape_are_found(shape):
     {
         "paper, random": (3e-3, 8e-3, 0.0),
         "paper, 6 mm": (3e-3, 8e-3, 6e-3),
-        "design, random": (1.5e-3, 4e-3, 0.0),
         "design, 3 mm": (1.5e-3, 4e-3, 3e-3),
         "fine, random": (1e-3, 8e-3 / 3.0, 0.0),
     },

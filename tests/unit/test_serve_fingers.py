@@ -333,11 +333,9 @@ GOES_BACK = "line 3: a time must be finite and not before that of the line above
     [
         (["1", "2", "3"], ""),
         (["1", "1", "1"], ""),
-        (["1", "2", "7200"], ""),
         (["-5", "-4", "0"], ""),
         (["1", "2", "1.9"], GOES_BACK),
         (["1", "2", "NaN"], GOES_BACK),
-        (["1", "2", "-Infinity"], GOES_BACK),
         (["1", "2", "1e999"], GOES_BACK),
         (["1", "2", "9" * 400], "line 3: "),
         (["1", "2", '"a"'], "line 3: "),
@@ -354,9 +352,6 @@ def test_a_recording_has_every_packet_in_the_order_of_its_times_or_is_refused_wi
         packets = [(float(at), str(row).encode()) for row, at in enumerate(times)]
         assert list(read_packets(path)) == packets
         return
-    with pytest.raises(OutputError) as caught:
+    with refused_in_a_line(OutputError, said) as caught:
         read_packets(path)
-    message = str(caught.value)
-    assert said in message
-    assert "\n" not in message
-    assert len(message.replace(str(path), "")) <= 400
+    assert len(str(caught.value).replace(str(path), "")) <= 400
