@@ -117,16 +117,14 @@ def test_a_batch_has_no_more_active_cells_than_one_of_its_runs_alone(method):
 
 
 CHANGES = {
-    "control": "control.force_gain=2|8 control.position_gain=200|800 control.loss_time=0.01|0.1"
-    " control.travel=1e-3|4e-3",
-    "blister": "blister.radius=12e-3|15e-3|16e-3",
+    "all at once": "control.force_gain=2|8 control.position_gain=200|800 control.loss_time=0.01|0.1"
+    " control.travel=1e-3|4e-3 blister.radius=12e-3|16e-3 fingertip.length=8e-3|12e-3"
+    " contact.stiffness=150|400 relaxation.times=[2e-3,0.1,1.0]|[4e-3,0.07,1.4]"
+    " actuator.bore=1.8e-3|2e-3 actuator.rest_height=39.8e-3|40e-3 supply.high=0.4e5|0.6e5"
+    " valve.stroke=25e-6|40e-6 valve_lag.time_constant=1e-3|3e-3 delay.dead_time=1e-3|1.2e-3"
+    " fluid.viscosity=1e-6|3e-6",
     "gaussian": "blister.sigma=6e-3|9e-3 blister.profile=gaussian|gaussian",
-    "finger": "fingertip.length=8e-3|12e-3 contact.stiffness=150|400"
-    " relaxation.times=[2e-3,0.1,1.0]|[4e-3,0.07,1.4]",
-    "cylinder": "actuator.bore=1.8e-3|2e-3 actuator.rest_height=39.8e-3|40e-3",
     "the load makes the flow turbulent": "actuator.bore=0.2e-3|0.3e-3",
-    "valve and fluid": "supply.high=0.4e5|0.6e5 valve.stroke=25e-6|40e-6 valve_lag.time_constant=1e-3|3e-3"
-    " delay.dead_time=1e-3|1.2e-3 fluid.viscosity=1e-6|3e-6",
     "the flow is turbulent": "fluid.viscosity=1.6e-9|2e-9",
     "sensors": "sensors.height_step=5e-6|20e-6 sensors.force_step=5e-6|20e-6",
     "period": "simulation.control_period=4.4e-3|4.8e-3",
