@@ -90,33 +90,25 @@ def name_fingers(tracks: Tracks, named: Sequence[tuple[int, Sequence[float]]]) -
     A known identity keeps its fingertip, a new one gets that of one gone from its place, or the
     first that is free; without any it waits. What is elsewhere all at once counts as not named.
     """
-    given = np.array([pose for _, pose in named]).reshape(-1, 7)
-    given[:, :3] = given[:, :3].clip(-FAR, FAR)
+    poses = np.array([pose for _, pose in named]).reshape(-1, 7)
+    poses[:, :3] = poses[:, :3].clip(-FAR, FAR)
     rows, ids = {identity: row for row, (identity, _) in enumerate(named)}, tracks.identities.copy()
     unnamed, tracked, fresh = tracks.unnamed.copy(), tracks.tracked.copy(), np.zeros(len(ids), bool)
     most = np.minimum(JUMP + PACE * unnamed, APART)
-    _put_back_exchanged(ids, tracked, rows, given)
-    _hand_over(ids, tracked, rows, given, most)
-    slots_of = {identity: slot for slot, identity in enumerate(ids.tolist())}
+    _put_back_exchanged(ids, tracked, rows, poses)
+    _hand_over(ids, tracked, rows, poses, most)
+    slots = {identity: slot for slot, identity in enumerate(ids.tolist())}
     free = iter(np.flatnonzero(ids < 0).tolist())
-    taken = {
-        identity: slots_of[identity] if identity in slots_of else next(free, None)
-        for identity in rows
-    }
-    here, there = given[:, :2].tolist(), tracked[:, :2].tolist()
-    found = {
-        identity: slot
-        for identity, slot in taken.items()
-        if slot is not None
-        and (identity not in slots_of or math.dist(here[rows[identity]], there[slot]) <= most[slot])
-    }
-    slots = [*found.values()]
-    fresh[slots] = ids[slots] < 0
-    ids[slots], unnamed[slots], tracked[slots] = (
-        [*found],
-        0.0,
-        given[[rows[identity] for identity in found]],
-    )
+    for identity, row in rows.items():
+        slot = slots.get(identity)
+        if slot is None:
+            slot = next(free, None)
+            if slot is None:
+                continue
+            fresh[slot] = True
+        elif math.dist(poses[row, :2], tracked[slot, :2]) > most[slot]:
+            continue
+        ids[slot], unnamed[slot], tracked[slot] = identity, 0.0, poses[row]
     was = fresh[:, None]
     return replace(
         tracks,
@@ -132,48 +124,41 @@ def name_fingers(tracks: Tracks, named: Sequence[tuple[int, Sequence[float]]]) -
 
 
 def _put_back_exchanged(
-    ids: Indices, tracked: Floats, rows: Mapping[int, int], given: Floats
+    ids: Indices, tracked: Floats, rows: Mapping[int, int], poses: Floats
 ) -> None:
-    """Put back identities (f,) that have changed places in a message: their rows in what is given."""
-    named_slots = np.array(
-        [slot for slot, identity in enumerate(ids.tolist()) if identity in rows], np.intp
-    )
-    now = given[[rows[identity] for identity in ids[named_slots].tolist()], :3]
-    moved = np.linalg.norm(now - tracked[named_slots, :3], axis=1)
-    if moved.max(initial=0.0) <= JUMP:
-        return
-    distance = np.linalg.norm(now[:, None] - tracked[named_slots, :3], axis=2)
+    """Put back identities (f,) that have changed places in a message, which has their poses in rows."""
+    named = np.array([identity in rows for identity in ids.tolist()]).nonzero()[0]
+    now = poses[[rows[identity] for identity in ids[named].tolist()], :3]
+    distance = np.linalg.norm(now[:, None] - tracked[named, :3], axis=2)
+    moved = distance.diagonal()
     # Fingers go on where they were: what is far nearer to another's place has its name. Those that
     # go around in a ring of such places have exchanged theirs.
-    nearest = np.where(
-        (2.0 * distance.min(1) < moved) & (moved > JUMP),
-        distance.argmin(1),
-        np.arange(named_slots.size),
-    )
+    nearest = np.arange(named.size)
+    for finger in (moved > JUMP).nonzero()[0]:
+        if 2.0 * distance[finger].min() < moved[finger]:
+            nearest[finger] = distance[finger].argmin()
     ring = nearest
     for _ in nearest:
         ring = nearest[ring]
-    ids[named_slots[nearest[ring]]] = ids[named_slots[ring]]
+    ids[named[nearest[ring]]] = ids[named[ring]]
 
 
 def _hand_over(
-    ids: Indices, tracked: Floats, rows: Mapping[int, int], given: Floats, most: Floats
+    ids: Indices, tracked: Floats, rows: Mapping[int, int], poses: Floats, most: Floats
 ) -> None:
     """Give identities (f,) that are not named to new ones that are nearest to them, `most` (f,) m away."""
     held = np.flatnonzero(ids >= 0)
-    named = set(ids.tolist())
-    new = [identity for identity in rows if identity not in named]
+    new = [identity for identity in rows if identity not in set(ids.tolist())]
     if not (new and held.size):
         return
-    distance = np.linalg.norm(
-        given[[rows[identity] for identity in new], None, :3] - tracked[held, :3], axis=2
-    )
-    for row, nearest in enumerate(distance.argmin(axis=1).tolist()):
+    now = poses[[rows[identity] for identity in new], :3]
+    distance = np.linalg.norm(now[:, None] - tracked[held, :3], axis=2)
+    for identity, apart in zip(new, distance, strict=True):
+        nearest = int(apart.argmin())
         slot = held[nearest]
-        if int(ids[slot]) not in rows and distance[row, nearest] <= min(
-            most[slot], distance[:, nearest].min()
-        ):
-            ids[slot] = new[row]
+        near = apart[nearest] <= min(most[slot], distance[:, nearest].min())
+        if near and int(ids[slot]) not in rows:
+            ids[slot] = identity
 
 
 def advance(tracks: Tracks, tracking: Tracking, felt: Felt, time: float) -> tuple[Tracks, Floats]:
