@@ -182,7 +182,7 @@ def test_a_film_or_frame_that_lost_its_end_is_known(tmp_path, history):
         film.is_whole_film(data[:count]) for count in (0, 8, 100, len(data) // 2, len(data) - 1)
     )
     path = still.render_still(
-        Instant.of(history), tmp_path / "still.png", Still(width=32, height=20, samples=1)
+        Instant.of(history), tmp_path / "still.png", Still(width=32, height=20, engine="workbench")
     )
     picture = path.read_bytes()
     assert is_whole_picture(picture)
@@ -277,8 +277,7 @@ settings.short.simulation.duration = 0.3
 [still]
 width = 160
 height = 100
-engine = "cycles"
-samples = 1
+engine = "workbench"
 [turntable]
 width = 64
 height = 40

@@ -47,7 +47,7 @@ def go_on(name, x):
     found, clock = bed(name), Clock()
     assert tick.start(bpy.context, found) == []
     clock.tick()
-    press(found, clock, x)
+    press(found, clock, x, pressed=8, lifted=20)
     tick.stop(found.session_uid)
 
 

@@ -42,19 +42,25 @@ def bed_in(mode):
     return Instant(rest.position, rest.height, np.full(64, mode), rest.force, far)
 
 
-@pytest.mark.parametrize("mode", [Mode.HOLD, Mode.FROZEN])
-def test_a_still_has_the_size_asked_for_and_its_pins_the_color_of_their_mode(mode, tmp_path):
-    look = Still(width=WIDTH, height=HEIGHT, samples=2, color="mode")
-    out = still.render_still(bed_in(mode), tmp_path / "pins.png", look)
-    assert out.read_bytes().startswith(b"\x89PNG")
-    pixels = read_picture(out)
-    assert pixels.shape == (HEIGHT, WIDTH, 3)
-    # The pins stand in the middle of what the legend leaves free; 8 x 8 of them cover far more than
-    # this.
-    pins = pixels[:, int(stage.MARGINS[0] * WIDTH) :]
-    other = Mode.FROZEN if mode is Mode.HOLD else Mode.HOLD
-    assert of_the_hue(pins, COLORS[mode]) > 500
-    assert of_the_hue(pins, COLORS[other]) < 20
+def test_a_still_has_its_size_and_pins_and_a_legend_in_the_palette_that_the_open_file_wears(
+    tmp_path,
+):
+    usual, other = COLORS[Mode.HOLD], palettes.PALETTES["tol_muted"][Mode.HOLD]
+    for engine, seen, unseen in (("cycles", usual, other), ("workbench", other, usual)):
+        look = Still(width=WIDTH, height=HEIGHT, samples=2, engine=engine, color="mode")
+        out = still.render_still(bed_in(Mode.HOLD), tmp_path / "pins.png", look)
+        assert out.read_bytes().startswith(b"\x89PNG")
+        pixels = read_picture(out)
+        assert pixels.shape == (HEIGHT, WIDTH, 3)
+        # The pins stand in the middle of what the legend leaves free; 8 x 8 of them cover far more
+        # than this.
+        legend, pins = pixels[:, : WIDTH // 5], pixels[:, int(stage.MARGINS[0] * WIDTH) :]
+        for part, least in ((legend, 20), (pins, 500)):
+            assert of_the_hue(part, seen) > least
+            assert of_the_hue(part, unseen) < 20
+            assert of_the_hue(part, COLORS[Mode.FROZEN]) < 20
+        view.build(bed_in(Mode.HOLD), bpy.context.collection)
+        palettes.set_palette("tol_muted")
 
 
 def test_a_still_is_neutral_by_default_without_a_legend_and_the_bed_in_its_middle(tmp_path):
@@ -66,28 +72,14 @@ def test_a_still_is_neutral_by_default_without_a_legend_and_the_bed_in_its_middl
     assert dark[0] == pytest.approx(WIDTH - 1 - dark[-1], abs=3)
 
 
-def test_the_legend_names_the_modes_present_in_the_palette_that_the_open_file_wears(tmp_path):
-    other = palettes.PALETTES["tol_muted"][Mode.HOLD]
-    for seen, unseen in ((COLORS[Mode.HOLD], other), (other, COLORS[Mode.HOLD])):
-        look = Still(width=WIDTH, height=HEIGHT, samples=2, color="mode")
-        legend = read_picture(still.render_still(bed_in(Mode.HOLD), tmp_path / "pins.png", look))[
-            :, : WIDTH // 5
-        ]
-        assert of_the_hue(legend, seen) > 20
-        assert of_the_hue(legend, unseen) < 20
-        view.build(bed_in(Mode.HOLD), bpy.context.collection)
-        palettes.set_palette("tol_muted")
-
-
 def test_a_still_leaves_the_users_file_as_it_was_and_a_failed_one_no_file(tmp_path, formed):
     scene, before = bpy.context.scene, inventory()
     active = bpy.context.view_layer.objects.active
-    still.render_still(formed, tmp_path / "pins.png", Still(width=40, height=25, samples=1))
+    look = Still(width=40, height=25, engine="workbench")
+    still.render_still(formed, tmp_path / "pins.png", look)
     (tmp_path / "taken" / "pins.png").mkdir(parents=True)
     with pytest.raises(OutputError, match=r"pins\.png cannot be written"):
-        still.render_still(
-            formed, tmp_path / "taken/pins.png", Still(width=40, height=25, samples=1)
-        )
+        still.render_still(formed, tmp_path / "taken/pins.png", look)
     assert inventory() == before
     assert (bpy.context.scene, bpy.context.view_layer.objects.active) == (scene, active)
     assert [path.name for path in (tmp_path / "taken").iterdir()] == ["pins.png"]

@@ -49,7 +49,8 @@ def main():
     command = part("command_line").run
     run = FOLDER / "a tap"
     seen["describe"] = command(["describe", "tap"])
-    seen["run"] = command(["run", "tap", "--out", str(run)])
+    short = ["--set", "simulation.duration=0.3", "--no-errors", "--quiet"]
+    seen["run"] = command(["run", "tap", "--out", str(run), *short])
     seen["export"] = command(["export", str(run), "--out", str(FOLDER), "--format", "stl"])
     still = ["--out", str(FOLDER / "still.png"), "--size", "160x100", "--engine", "workbench"]
     seen["render"] = command(["render", str(run), *still])
@@ -64,7 +65,7 @@ def main():
     seen["own method"] = part("settings.properties").scene_of(bed).method
     own = f"{FOLDER / 'own' / 'mine.py'}:Mine"
     own_run = ["run", "tap", "--method", own, "--out", str(FOLDER / "own run")]
-    seen["own run"] = command([*own_run, "--quiet", "--no-errors"])
+    seen["own run"] = command([*own_run, *short])
     known = part("core.control.methods").list_added
     addon_utils.disable(EXTENSION)  # the preferences stay, as at the end of Blender
     seen["own methods"] = [list(known())]

@@ -58,10 +58,11 @@ def move(bed, clock, places):
     return notes
 
 
-def press(bed, clock, x=0.0):
-    """Press at a place and lift off."""
+def press(bed, clock, x=0.0, pressed=4, lifted=4):
+    """Press at a place and lift off, by default in 24 ticks, which are whole periods."""
     down = [(x, z) for z in np.linspace(46, 37, 8)]
-    assert move(bed, clock, [*down, *[(x, 37.0)] * 8, *down[::-1], *[(x, 46.0)] * 20]) == []
+    path = [*down, *[(x, 37.0)] * pressed, *down[::-1], *[(x, 46.0)] * lifted]
+    assert move(bed, clock, path) == []
 
 
 def only_session():

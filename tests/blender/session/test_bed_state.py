@@ -111,7 +111,7 @@ def test_a_file_of_a_session_goes_on_bit_for_bit(bed, clock, tmp_path, recovered
 @pytest.mark.parametrize("linked", [False, True])
 def test_a_duplicate_carries_its_own_state_and_gets_a_fingertip(bed, clock, linked):
     started(bed)
-    press(bed, clock)
+    press(bed, clock, lifted=22)
     kept = beds.read_snapshot(bed)
     bpy.ops.object.duplicate(linked=linked)
     copy = bpy.context.object

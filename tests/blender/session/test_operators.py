@@ -26,7 +26,7 @@ from tests.hand import let_go
 
 def test_rewinding_puts_bed_and_fingertip_back(bed, clock):
     started(bed)
-    press(bed, clock, -6.0)
+    press(bed, clock, -6.0, lifted=22)
     formed = exact(bed)
     press(bed, clock, 6.0)
     assert bpy.ops.digiclay.session_rewind() == {"FINISHED"}
