@@ -5,10 +5,13 @@ from pathlib import Path
 
 import bpy
 import numpy as np
+from digiclay import operators
 from digiclay.compat import strips
 from digiclay.device import part_watch
 from digiclay.roles import BALL, FINGER, HOUSING, OWNED, ROLE, fingertip_of, is_bed
 
+#: Names of all operators.
+OPERATORS = [kind.bl_idname for kind in operators.CLASSES if issubclass(kind, bpy.types.Operator)]
 #: Files with a bed each, by how it was added.
 FILES = tempfile.TemporaryDirectory(prefix="digiclay-beds-")
 
@@ -127,6 +130,20 @@ def delete(*things):
     done("Delete")
 
 
+def fetch(file, name, how):
+    """Append an object of a file, or link it and make it local, as a user does."""
+    source = {"directory": str(file / "Object") + "/", "filename": name}
+    if how == "link":
+        bpy.ops.wm.link(**source)
+        done("Link")
+        assert (len(bpy.context.scene.objects), housings()) == (1, 1)
+        select(bpy.context.scene.objects[0])
+        bpy.ops.object.make_local(type="ALL")
+        done("Make Local")
+    else:
+        bpy.ops.wm.append(**source)
+
+
 def save_and_open(file):
     bpy.ops.wm.save_as_mainfile(filepath=str(file))
     bpy.ops.wm.open_mainfile(filepath=str(file))
@@ -143,6 +160,11 @@ def whole(*found):
     parts = {*found, *tips, *balls}
     of_balls = [ball.parent for ball in balls] == tips
     return len(parts) == 3 * len(found) and of_balls and set(bpy.context.scene.objects) == parts
+
+
+def evaluate(bed):
+    """Return the mesh that Blender draws a bed as."""
+    return bed.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
 
 
 def instances(bed):

@@ -21,7 +21,7 @@ from digiclay.settings import own_presets, properties
 from digiclay.settings.devices import BEDS, make_scene
 
 from tests.assemble import replayed
-from tests.blender.at_hand import new_bed
+from tests.blender.at_hand import evaluate, new_bed
 
 pytestmark = pytest.mark.usefixtures("extension")
 
@@ -108,7 +108,7 @@ def test_a_bed_of_any_scale_stands_on_the_cursor_with_its_fingertip_above(scale)
     bed = add(rows=6, columns=6, scale=scale)
     assert bpy.context.selected_objects == [bed]
     bpy.context.view_layer.update()
-    shown = bed.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    shown = evaluate(bed)
     # float32 at 3 units.
     assert min((bed.matrix_world @ point.co).z for point in shown.vertices) == pytest.approx(
         3.0, abs=1e-5

@@ -6,7 +6,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 import pytest
-from digiclay import bridge, operators
+from digiclay import bridge
 from digiclay.compat import read_stored
 from digiclay.core.base.errors import DigiclayError
 from digiclay.exchange import formed_bed
@@ -18,7 +18,7 @@ from digiclay.roles import fingertip_of, is_bed
 from digiclay.sessions import running
 from digiclay.settings import own_presets, properties
 
-from tests.blender.at_hand import activate, beds, done, in_the_view, new_bed, select
+from tests.blender.at_hand import OPERATORS, activate, beds, done, in_the_view, new_bed, select
 
 #: What an operator does: it adds a bed, or reads data or pins of one, or changes its settings and
 #: parts, or forms and displays something with its pins.
@@ -359,8 +359,7 @@ def test_an_operator_works_or_says_in_a_line_why_it_does_not(folder, state, capf
 
 
 def test_the_table_has_every_operator():
-    every = {kind.bl_idname for kind in operators.CLASSES if issubclass(kind, bpy.types.Operator)}
-    assert CALLS.keys() | ELSEWHERE == every
+    assert CALLS.keys() | ELSEWHERE == {*OPERATORS}
     assert not CALLS.keys() & ELSEWHERE
 
 

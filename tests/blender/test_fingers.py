@@ -19,6 +19,7 @@ from tests.blender.at_hand import (
     delete,
     done,
     duplicate,
+    fetch,
     looked,
     redone,
     select,
@@ -342,14 +343,7 @@ def test_a_bed_of_another_file_comes_with_its_hand(tmp_path, how):
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "bed.blend"))
     bpy.ops.wm.read_homefile(use_empty=True)
     looked()
-    source = {"directory": str(tmp_path / "bed.blend" / "Object") + "/", "filename": name}
-    if how == "append":
-        bpy.ops.wm.append(**source)
-    else:
-        bpy.ops.wm.link(**source)
-        done("Link")
-        select(bpy.context.scene.objects[0])
-        bpy.ops.object.make_local(type="ALL")
+    fetch(tmp_path / "bed.blend", name, how)
     done("Append")
     (bed,) = beds()
     assert sound(bed, *range(1, 7))

@@ -23,7 +23,7 @@ from digiclay.settings.declared import read
 from digiclay.settings.shown_units import unit_of
 
 from tests.assemble import assert_near
-from tests.blender.at_hand import instances, new_bed
+from tests.blender.at_hand import evaluate, instances, new_bed
 
 pytestmark = pytest.mark.usefixtures("extension")
 
@@ -190,8 +190,7 @@ def test_a_rebuilt_bed_is_the_same_with_its_new_pins_at_rest_where_its_layout_sa
     assert set(cells["mode"]) == {Mode.REST}
     assert (identity(bed), beds.read_snapshot(bed), len([*instances(bed)])) == (before, None, 180)
     # The housing is about all of them.
-    shown = bed.evaluated_get(bpy.context.evaluated_depsgraph_get())
-    housing, pins = (max(vertex.co.x for vertex in one.data.vertices) for one in (shown, bed))
+    housing, pins = (bridge.read_points(mesh)[:, 0].max() for mesh in (evaluate(bed), bed.data))
     assert housing > pins
     bpy.data.objects.remove(fingertip_of(bed))
     bpy.ops.digiclay.rebuild()

@@ -22,6 +22,7 @@ from tests.blender.at_hand import (
     delete,
     done,
     duplicate,
+    fetch,
     housings,
     looked,
     older,
@@ -60,18 +61,8 @@ def test_a_bed_of_another_file_comes_with_its_fingertip_and_nothing_else(tmp_pat
     at, name = bridge.pose(fingertip_of(bed)), bed.name
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "bed.blend"))
     reset_to_empty()
-    source = {"directory": str(tmp_path / "bed.blend" / "Object") + "/", "filename": name}
-    if how == "link":
-        bpy.ops.wm.link(**source)
-        done("Link")
-        assert (len(bpy.context.scene.objects), housings()) == (1, 1)
-        select(bpy.context.scene.objects[0])
-        bpy.ops.object.make_local(type="ALL")
-        done("Make Local")
-        assert whole(*beds())
-        return
-    bpy.ops.wm.append(**source)
-    # As Blender leaves it, without any help.
+    fetch(tmp_path / "bed.blend", name, how)
+    # An appended one as Blender leaves it, without any help.
     assert whole(*beds())
     assert len(bpy.context.scene.collection.children) == 0
     done("Append")
@@ -354,7 +345,7 @@ def test_a_bed_appended_from_an_older_file_is_made_whole_and_its_helpers_put_awa
     name = bed.name
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "older.blend"))
     reset_to_empty()
-    bpy.ops.wm.append(directory=str(tmp_path / "older.blend" / "Object") + "/", filename=name)
+    fetch(tmp_path / "older.blend", name, "append")
     assert len(bpy.context.scene.objects) == 1 + 28
     done("Append")
     assert (whole(*beds()), housings()) == (True, 1)

@@ -29,7 +29,7 @@ from digiclay.sessions import running, sculpting
 from digiclay.settings import properties
 
 from tests.assemble import assert_near
-from tests.blender.at_hand import instances, new_bed, open_bed
+from tests.blender.at_hand import evaluate, instances, new_bed, open_bed
 
 #: Attributes are float32: 24 bits of at most 0.1 m, drawn ten times as large.
 FLOAT32 = 0.1 * 2.0**-23
@@ -104,9 +104,8 @@ def test_every_rod_reaches_down_to_the_deck_of_the_housing(bed, formed):
         for item in instances(bed)
     ]
     assert len(feet) == 48
-    housing = bed.evaluated_get(bpy.context.evaluated_depsgraph_get())
     # The housing is drawn from its underside to the deck inside.
-    deck = housing.data.vertices[-1].co.z
+    deck = evaluate(bed).vertices[-1].co.z
     # float32 on lengths below one unit.
     assert_near(feet, deck, 1e-6)
     assert deck / bridge.SCALE < formed.height.min()

@@ -35,14 +35,13 @@ def measure_pitch(to_clip: Floats, to_view: Floats, pitch: float, height: float)
 
 def follow() -> None:
     """Have every bed of the scenes in view drawn as its size in the views asks for."""
-    for bed, pitch in _sizes():
-        if choose_far(pitch, view.is_far(bed)) != view.is_far(bed):
-            view.write_setting(bed, FAR, not view.is_far(bed))
+    for bed in _list_changed():
+        view.write_setting(bed, FAR, not view.is_far(bed))
 
 
-def _sizes() -> Iterator[tuple[Object, float]]:
-    """Give the beds shown as "automatic", with the pitch in the view that shows them largest, pixels."""
-    sizes: dict[Object, float] = {}
+def _list_changed() -> list[Object]:
+    """Return the beds shown as "automatic" that are to be drawn otherwise from now on."""
+    sizes: dict[Object, float] = {}  # the pitch in the view that shows a bed largest, pixels
     scale = bpy.context.preferences.system.ui_scale or 1.0  # 0 without a window
     for window in bpy.context.window_manager.windows:
         beds = [thing for thing in window.scene.objects if is_bed(thing) and _is_automatic(thing)]
@@ -53,7 +52,7 @@ def _sizes() -> Iterator[tuple[Object, float]]:
                 pitch = _pitch(bed) * bed.matrix_world.median_scale
                 size = measure_pitch(to_clip, lens, pitch, region.height) / scale
                 sizes[bed] = max(size, sizes.get(bed, 0.0))
-    yield from sizes.items()
+    return [bed for bed in sizes if choose_far(sizes[bed], view.is_far(bed)) != view.is_far(bed)]
 
 
 def _regions(window: Window) -> Iterator[tuple[Region, RegionView3D]]:
@@ -80,10 +79,7 @@ def _pitch(bed: Object) -> float:
 
 def _look() -> None:
     """Have the beds follow once the drawing under way is done: while Blender draws, data must not change."""
-    changes = any(
-        choose_far(pitch, view.is_far(bed)) != view.is_far(bed) for bed, pitch in _sizes()
-    )
-    if changes and not bpy.app.timers.is_registered(follow):
+    if _list_changed() and not bpy.app.timers.is_registered(follow):
         bpy.app.timers.register(follow, first_interval=0.0)
 
 

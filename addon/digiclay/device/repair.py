@@ -296,9 +296,14 @@ def _adopt(tip: Object, bed: Object) -> None:
     parts.hold_fingertip(bed, number, tip)
     if tip.name.startswith(parts.FINGERTIP_NAME):
         tip.name = parts.name_fingertip(number)
+    suit_fingertip(bed, number, tip)
+    view.hold_parts(bed)
+
+
+def suit_fingertip(bed: Object, number: int, tip: Object) -> None:
+    """Give a further fingertip the settings of the first one, unless it has its own, and its color."""
     devices.give_settings(bed, tip)
     parts.color_fingertip(tip, number, clear=bool(view.read_setting(bed, ARROWS, False)))
-    view.hold_parts(bed)
 
 
 def _copy(owner: Object, held: str, parent: Object | None = None) -> None:

@@ -3,8 +3,10 @@
 The handlers are there only while a session runs.
 """
 
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from ..compat import bpy, connect, disconnect
 from ..core.base.errors import DigiclayError
@@ -171,13 +173,18 @@ def end_with_file(how: str) -> None:
         running.set_message(f"{running.last_message()}. {save_copy()}")
 
 
+def _open_keymaps() -> Iterator[tuple[Any, str, str, dict[str, bool]]]:
+    """Give the items of the keymap of each key, with its operator, key and modifier keys."""
+    configuration = bpy.context.window_manager.keyconfigs.addon
+    for (name, space), *key in KEYS if configuration else ():
+        yield configuration.keymaps.new(name=name, space_type=space).keymap_items, *key
+
+
 def register() -> None:
     """Add the keys; handlers follow with the first session. Without a window there are no keymaps."""
     if not bpy.app.background:
         connect(LEFT)
-    configuration = bpy.context.window_manager.keyconfigs.addon
-    for (name, space), operator, key, modifiers in KEYS if configuration else ():
-        items = configuration.keymaps.new(name=name, space_type=space).keymap_items
+    for items, operator, key, modifiers in _open_keymaps():
         item = items.new(operator, key, "PRESS", head=True, **modifiers)
         if operator == "digiclay.session_reset":
             item.properties.running_only = True
@@ -189,8 +196,6 @@ def unregister() -> None:
     disconnect(LEFT)
     if bpy.app.timers.is_registered(form_left):
         bpy.app.timers.unregister(form_left)
-    configuration = bpy.context.window_manager.keyconfigs.addon
-    for (name, space), operator, *_ in KEYS if configuration else ():
-        items = configuration.keymaps.new(name=name, space_type=space).keymap_items
+    for items, operator, *_ in _open_keymaps():
         for item in [item for item in items if item.idname == operator]:
             items.remove(item)

@@ -17,7 +17,7 @@ from ..core.model.trajectory import sample_poses
 from ..core.scene.assembly import assemble
 from ..core.scene.scene_source import DISPLAY_SAMPLES, SAMPLES, find, load
 from ..core.scene.schema import Scene
-from ..core.scene.toml_table import PRESETS, resolve
+from ..core.scene.toml_table import resolve
 from ..core.session.plate import list_cautions
 from ..core.shapes.body import read_bodies
 from ..core.shapes.fitting import list_shapes
@@ -39,7 +39,7 @@ from ..sessions import running
 from ..settings import own_presets, properties
 from ..settings.declared import choice, flag, integer, number, title
 from ..settings.devices import BEDS, FIRST, UNNAMED, make_scene
-from ..settings.groups import PRESET_WORDS, method_items
+from ..settings.groups import PRESET_ITEMS, method_items
 from ..settings.shown_units import to_si
 from ..ui_text import localize
 from .action import Action, FileAction, Result, action, file_of, inform, millimeters
@@ -56,8 +56,8 @@ OFFERED: list[tuple[str, str, str]] = []
 
 def offered(operator: Operator, context: Context) -> list[tuple[str, str, str]]:
     """Return the core's presets and the user's own."""
-    OFFERED[:] = [(name, title(name), PRESET_WORDS.get(name, "")) for name in PRESETS]
-    OFFERED.extend((name, name, "A preset of your own") for name in own_presets.names())
+    own = [(name, name, "A preset of your own") for name in own_presets.names()]
+    OFFERED[:] = PRESET_ITEMS + own
     return OFFERED
 
 

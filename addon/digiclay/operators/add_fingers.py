@@ -6,9 +6,8 @@ from .. import bridge
 from ..compat import Context, Menu, Object, Operator
 from ..core.base.arrays import Floats
 from ..core.base.errors import DigiclayError
-from ..device import parts, view
+from ..device import parts, repair, view
 from ..device.instant import CLEARANCE
-from ..device.node_tree import ARROWS
 from ..overlay.ready_view import reveal
 from ..roles import BALL, FINGERS, PALM, bed_of, fingertips_of, owner_of
 from ..settings import devices
@@ -98,8 +97,7 @@ def _add(bed: Object, places: Floats, palm: Object | None = None) -> list[Object
     for x, y, heading in places:
         number = parts.find_free_number(bed)
         tip = parts.make_fingertip(bed, number, palm)
-        devices.give_settings(bed, tip)
-        parts.color_fingertip(tip, number, clear=bool(view.read_setting(bed, ARROWS, False)))
+        repair.suit_fingertip(bed, number, tip)
         tip.location = (
             np.array([x, y, top + devices.read_finger(tip.digiclay).height]) * bridge.SCALE
         )

@@ -1,5 +1,6 @@
 """Formed surface as mesh objects, as a mesh file, and as a list of features."""
 
+from collections.abc import Mapping
 from itertools import count
 from pathlib import Path
 from typing import Any
@@ -39,6 +40,11 @@ def sentence(text: str) -> str:
     return text[:1].upper() + text[1:]
 
 
+def list_items(words: Mapping[str, str]) -> list[tuple[str, str, str]]:
+    """Return names and their meanings as items of a choice."""
+    return [(name, sentence(name), sentence(meaning)) for name, meaning in words.items()]
+
+
 class FindingOptions(Action):
     """Criteria of a feature."""
 
@@ -72,13 +78,13 @@ class SurfaceOptions(FindingOptions):
     kind: choice(
         "Mesh",
         "Kind of mesh made of the formed surface",
-        items=[(name, sentence(name), sentence(words)) for name, words in KINDS.items()],
+        items=list_items(KINDS),
         default=Model().kind,
     )
     skin: choice(
         "Skin",
         "Interpolation of the surface between the pins",
-        items=[(name, sentence(name), sentence(words)) for name, words in SKINS.items()],
+        items=list_items(SKINS),
         default=Model().skin,
     )
     resolution: integer(

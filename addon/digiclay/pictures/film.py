@@ -174,7 +174,6 @@ def stage_turntable(instant: Instant, looks: Turntable) -> Iterator[Shots]:
 def _visible_points(bed: Object, history: Mapping[str, Array], rows: Cells, sizes: Table) -> Floats:
     """Return what must be in the frame, (k, 3), Blender units: all pins, the fingertips that are near."""
     used = slice(int(rows[0]), int(rows[-1]) + 1)
-    instant = Instant.of(history, int(rows[0]), **sizes)
     position, height = np.asarray(history["position"]), history["height"][used]
     poses = history["fingertip"][rows]
     places = poses.reshape(-1, 7)[:, :3]  # of all fingertips, a row a pose
@@ -191,7 +190,6 @@ def _visible_points(bed: Object, history: Mapping[str, Array], rows: Cells, size
         extreme = Instant.of(history, int(rows[at]), **sizes)
         stage.show(bed, replace(extreme, fingertip=poses[at]))
         clouds.append(stage.outline(bed))
-    stage.show(bed, instant)
     return np.concatenate(clouds)
 
 

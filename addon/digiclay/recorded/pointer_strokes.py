@@ -57,6 +57,11 @@ Move = tuple[float, float, float]
 LAYS = {"line": lay_line, "ring": lay_ring}
 
 
+def _size() -> float:
+    """Declare a size of the fingertip."""
+    return quantity(0.0, "of the fingertip; 0: the bed's", unit="m", at_least=0.0, at_most=0.2)
+
+
 @dataclass(frozen=True)
 class PointerStroke(Parameters):
     """Stroke of the pointer, and the settings of the Press tool during it."""
@@ -123,15 +128,9 @@ class PointerStroke(Parameters):
     stabilizer: float = quantity(
         0.0, "lag behind the pointer", unit="m", at_least=0.0, at_most=50e-3
     )
-    length: float = quantity(
-        0.0, "of the fingertip; 0: the bed's", unit="m", at_least=0.0, at_most=0.2
-    )
-    width: float = quantity(
-        0.0, "of the fingertip; 0: the bed's", unit="m", at_least=0.0, at_most=0.2
-    )
-    thickness: float = quantity(
-        0.0, "of the fingertip; 0: the bed's", unit="m", at_least=0.0, at_most=0.2
-    )
+    length: float = _size()
+    width: float = _size()
+    thickness: float = _size()
     moves: tuple[Move, ...] = quantity(((0.0, 0.0, 0.0),), "time, s, and place, m, of the pointer")
 
     def check(self) -> None:

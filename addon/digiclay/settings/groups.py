@@ -92,6 +92,9 @@ PRESET_WORDS = {
 }
 
 
+PRESET_ITEMS = [(name, title(name), PRESET_WORDS.get(name, "")) for name in PRESETS]
+
+
 def take_preset(settings: PropertyGroup, context: Context) -> None:
     """Set what the chosen preset, or another one, changes of the defaults."""
     for section in sorted({section for preset in PRESETS.values() for section in preset}):
@@ -202,7 +205,7 @@ SETTINGS = make_group(
         "preset": choice(
             "Preset",
             "Fluid and valves; a choice sets their parameters",
-            items=[(name, title(name), PRESET_WORDS.get(name, "")) for name in PRESETS],
+            items=PRESET_ITEMS,
             update=take_preset,
         ),
         "method": choice(

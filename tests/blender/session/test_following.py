@@ -72,7 +72,7 @@ def test_the_bed_follows_a_fingertip_moved_by_other_means(bed, clock, how):
 #: then, the first frame, and settings of the scene's time.
 PLAYBACKS = {
     "in time": (TICK, 1.25, 1, 1, {}),
-    "at a tenth of the speed, ticks between": (TICK, 12.5, 1, 1, {}),
+    "at a fifth of the speed, ticks between": (TICK, 6.25, 1, 1, {}),
     "five of six frames left out": (6.0 / 24.0, 1.0, 6, 1, {}),
     "of 29.97 frames a second": (TICK, 1.0, 1, 1, {"fps": 30, "fps_base": 1.001}),
     "from before frame 0 on": (

@@ -135,10 +135,10 @@ def test_without_a_session_nothing_goes_on_and_blender_lists_modal_operators():
 @pytest.mark.usefixtures("machine")
 def test_a_script_finishes_strokes_at_once_and_what_was_in_haste_is_shown(bed, clock):
     started(bed)
-    across = [(-6e-3, 0.0), (6e-3, 0.0)]
+    across = [(-3e-3, 0.0), (3e-3, 0.0)]
     for number in (1, 2):
         assert bpy.ops.digiclay.finish_strokes.poll() == (number > 1)
-        queue(bed, start(0, -6e-3, 0.0, 4e-3))
+        queue(bed, start(0, -3e-3, 0.0, 4e-3))
         assert bpy.ops.digiclay.finish_strokes.poll() == (number > 1)  # the hand still draws
         running.put(change_stroke(running.find(bed), number, partial(lay_path, points=across)))
     running.put(change_stroke(running.find(bed), 1, partial(replace, held=True)))

@@ -2,14 +2,12 @@
 
 import bpy
 import pytest
-from digiclay import operators
 from digiclay.live import tick
 from digiclay.roles import fingertip_of
 
-from tests.blender.at_hand import activate
+from tests.blender.at_hand import OPERATORS, activate
 from tests.blender.session.live import press, started
 
-NAMES = sorted(kind.bl_idname for kind in operators.CLASSES if issubclass(kind, bpy.types.Operator))
 #: What Blender says of an operator that says nothing.
 NOTHING = "failed, context is incorrect"
 #: What is said of a bed at rest in the background, and of one with a session that has formed
@@ -63,7 +61,7 @@ def refused(name):
 
 def declining():
     """Return what every operator that declines says."""
-    return {name: words for name in NAMES if (words := refused(name))}
+    return {name: words for name in OPERATORS if (words := refused(name))}
 
 
 def test_the_reasons_at_rest_name_what_is_missing(bed):
@@ -85,7 +83,7 @@ def test_in_edit_mode_and_without_a_bed_nothing_can_be_changed(bed, clock):
     assert bpy.context.mode == "OBJECT"
     assert refused("digiclay.session_reset") == "Go back to Object Mode first"
     activate(bed)
-    assert set(NAMES) - declining().keys() == IN_EDIT_MODE
+    assert set(OPERATORS) - declining().keys() == IN_EDIT_MODE
     bpy.ops.object.mode_set(mode="OBJECT")
     bpy.data.objects.remove(bed)
-    assert set(NAMES) - declining().keys() == WITHOUT_A_BED
+    assert set(OPERATORS) - declining().keys() == WITHOUT_A_BED
