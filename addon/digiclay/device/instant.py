@@ -104,6 +104,11 @@ def find_ellipsoid(scene: Scene) -> Fingertip:
     return find_ellipsoids(scene)[0]
 
 
+def make_rest(scene: Scene) -> Instant:
+    """Return the bed of a scene that nobody has touched yet."""
+    return Instant.at_rest(scene.layout, scene.actuator, find_ellipsoids(scene))
+
+
 def read(path: Path, index: int = -1) -> Instant:
     """Read an instant of a finished run."""
     if path.name != "history.npz":

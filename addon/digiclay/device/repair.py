@@ -35,7 +35,7 @@ from ..roles import (
 )
 from ..settings import devices, properties
 from . import parts, view
-from .instant import Instant, find_ellipsoids
+from .instant import make_rest
 from .node_tree import ARROWS, list_sources
 
 #: Marks what was hidden along with what it belongs to: only that is shown along with it again.
@@ -133,7 +133,7 @@ def give_fingertip(bed: Object, scene: Scene) -> str:
         _stand(bed, tip)
         return f"{bed.name} got its fingertip back"
     parts.make_fingertip(bed)
-    rest = Instant.at_rest(scene.layout, scene.actuator, find_ellipsoids(scene)[:1])
+    rest = make_rest(scene)
     bridge.place_fingertips(bed, rest.fingertip, rest.finger)
     view.hold_parts(bed)
     return f"{bed.name} got a new fingertip"
@@ -261,9 +261,7 @@ def _complete(owner: Object) -> None:
     give_fingertip(bed, scene)
     if view.is_drawn(bed) and view.housing_of(bed) is None:
         # In an older file the housing is an object.
-        view.add_modifier(
-            bed, Instant.at_rest(scene.layout, scene.actuator, find_ellipsoids(scene)[:1])
-        )
+        view.add_modifier(bed, make_rest(scene))
     view.hold_parts(bed)
 
 

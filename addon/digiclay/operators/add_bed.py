@@ -24,7 +24,7 @@ from ..core.shapes.fitting import list_shapes
 from ..core.shapes.request import Shape
 from ..core.studies.job_table import embed_heights
 from ..device import palettes, repair, view
-from ..device.instant import Instant, find_ellipsoids, read
+from ..device.instant import Instant, find_ellipsoids, make_rest, read
 from ..device.node_tree import list_sources
 from ..device.pressers import make_presser
 from ..exchange import shape_show
@@ -229,9 +229,7 @@ def rebuild_bed(operator: Operator, context: Context) -> None:
 
 def add(context: Context, scene: Scene) -> Object:
     """Add the device of a scene, at rest, in the context's collection; return its bed."""
-    return add_shown(
-        context, scene, Instant.at_rest(scene.layout, scene.actuator, find_ellipsoids(scene))
-    )
+    return add_shown(context, scene, make_rest(scene))
 
 
 def add_shown(context: Context, scene: Scene, instant: Instant) -> Object:
@@ -255,7 +253,7 @@ def select_only(context: Context, bed: Object) -> None:
 def rebuild(bed: Object) -> Scene:
     """Make a bed anew, at rest, by its settings; its place, fingertip and children stay."""
     scene = properties.read_scene(bed)
-    instant = Instant.at_rest(scene.layout, scene.actuator, find_ellipsoids(scene))
+    instant = make_rest(scene)
     mesh, drawing = bed.data, view.find_modifier(bed)
     bed.data = view.make_cells(instant)
     if drawing is not None:

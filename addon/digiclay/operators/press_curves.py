@@ -20,6 +20,7 @@ from ..compat import (
 from ..core.base.arrays import Floats
 from ..core.base.errors import ParameterError, one_line
 from ..core.shapes.mesh_relief import ShapeMesh
+from ..device.node_tree import finish, new_tree, node
 from ..exchange.shape_show import read_relief
 from ..live import beds
 from ..press import aim, brush, tool
@@ -98,18 +99,15 @@ def _bare(curve: ID) -> None:
 
 def _make_tree(thing: Object) -> NodeTree:
     """Return geometry nodes that make edges of an object's lines, in the space of what they are on."""
-    tree = bpy.data.node_groups.new("Lines", "GeometryNodeTree")
-    tree.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
-    source = tree.nodes.new("GeometryNodeObjectInfo")
-    source.transform_space = "RELATIVE"
-    source.inputs["Object"].default_value = thing
+    tree = new_tree("Lines")
+    source = node(tree, "GeometryNodeObjectInfo", {"Object": thing}, transform_space="RELATIVE")
     last = source.outputs["Geometry"]
     first = ["GeometryNodeGreasePencilToCurves"] if thing.type == "GREASEPENCIL" else []
     for kind in (*first, "GeometryNodeRealizeInstances", "GeometryNodeCurveToMesh"):
-        node = tree.nodes.new(kind)
-        tree.links.new(last, node.inputs[0])
-        last = node.outputs[0]
-    tree.links.new(last, tree.nodes.new("NodeGroupOutput").inputs[0])
+        step = node(tree, kind)
+        tree.links.new(last, step.inputs[0])
+        last = step.outputs[0]
+    finish(tree, last)
     return tree
 
 

@@ -6,7 +6,7 @@ hand was.
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
@@ -16,7 +16,6 @@ from ..core.base.quantity import Parameters, quantity
 from ..core.files.tables import Table, read_part, refuse_unknown, show_value
 from ..core.model.fingertip import Fingertip
 from ..core.scene.scene_source import read_table
-from ..core.scene.schema import Scene
 from ..device.instant import find_ellipsoid
 from ..sessions.running import Running, find_stroke
 from ..sessions.sculpting import change_scene, follow_finger, queue_stroke
@@ -243,25 +242,21 @@ def play_strokes(running: Running, strokes: tuple[PointerStroke, ...]) -> Iterat
     """Play strokes in a session, as fast as the machine can; yield the session after each tick."""
     usual = running.scene
     for number, stroke in enumerate(strokes, 1):
-        running = _take_finger(running, usual, stroke.size_finger(find_ellipsoid(usual)))
+        tip = find_ellipsoid(usual)
+        running, _ = change_scene(running, change_finger(usual, tip, stroke.size_finger(tip)))
         needed = needs_blister(stroke.kind, stroke.shape)
         if needed and find_tracking(running.scene, running.system) is None:
             raise StateError(
                 f"Stroke {number} ({stroke.kind.value.lower()}) needs a method with a blister."
             )
-        for after in _play(running, stroke, number):
-            running = after
-            yield running
+        running = yield from _play(running, stroke, number)
     last, _ = change_scene(running, usual)
     yield last
 
 
-def _take_finger(running: Running, usual: Scene, finger: Fingertip) -> Running:
-    """Return the session with a fingertip of another size, and a blister in proportion."""
-    return change_scene(running, change_finger(usual, find_ellipsoid(usual), finger))[0]
-
-
-def _play(running: Running, stroke: PointerStroke, number: int) -> Iterator[Running]:
+def _play(
+    running: Running, stroke: PointerStroke, number: int
+) -> Generator[Running, None, Running]:
     """Draw a stroke, and continue the session until it is formed; yield it after each tick."""
     places = [(x, y) for _, x, y in stroke.moves]
     lagged = places[:1]
@@ -271,9 +266,13 @@ def _play(running: Running, stroke: PointerStroke, number: int) -> Iterator[Runn
         lagged.append(pull(lagged[-1], place, string))
     path = LAYS[stroke.path](places[0], places[-1]) if stroke.path in LAYS else lagged
     stamp = load_stamp(stroke.stamp) if stroke.kind in STAMPS else None
-    begun = start(0, *places[0], stroke.amount, stroke.images, stroke.kind, stroke.strength)
-    begun = replace(
-        begun,
+    begun = start(
+        0,
+        *places[0],
+        stroke.amount,
+        stroke.images,
+        stroke.kind,
+        stroke.strength,
         accumulate=stroke.accumulate,
         stamp=stamp,
         falloff=stroke.shape,
@@ -282,17 +281,12 @@ def _play(running: Running, stroke: PointerStroke, number: int) -> Iterator[Runn
         as_left=stroke.finish == "as_left",
     )
     running, queued = queue_stroke(running, lay_path(begun, path))
-    first = running.state.period
+    first, count = running.state.period, max(1, round(1.0 / (RATE * running.system.period)))
     while find_stroke(running, queued) is not None:
-        running = _tick(running)
+        running = follow_finger(replace(running, tick=running.tick + 1), running.pose, count)
         yield running
         if (running.state.period - first) * running.system.period > PATIENCE:
             raise StateError(
                 f"The fingertip has not finished stroke {number} after {PATIENCE:g} s."
             )
-
-
-def _tick(running: Running) -> Running:
-    """Simulate the control periods of a tick, whatever time they take."""
-    count = max(1, round(1.0 / (RATE * running.system.period)))
-    return follow_finger(replace(running, tick=running.tick + 1), running.pose, count)
+    return running

@@ -32,13 +32,13 @@ def path(name: str) -> Path:
     plain = name.strip()
     if not plain or len(plain) > LONGEST or plain.startswith("."):
         rule = f"must be a name of 1 to {LONGEST} letters that does not start with a dot"
-        raise OutputError(f"The preset's name {rule} (got {name!r}).")
-    if not plain.isprintable() or set(plain) & FORBIDDEN or plain.endswith("."):
+    elif not plain.isprintable() or set(plain) & FORBIDDEN or plain.endswith("."):
         rule = "must be of letters that a file's name can have on every system"
-        raise OutputError(f"The preset's name {rule} (got {name!r}).")
-    if plain.casefold() in PRESETS:
-        raise OutputError(f"The preset's name must not be {', '.join(PRESETS)} (got {name!r}).")
-    return folder() / f"{plain}.toml"
+    elif plain.casefold() in PRESETS:
+        rule = f"must not be {', '.join(PRESETS)}"
+    else:
+        return folder() / f"{plain}.toml"
+    raise OutputError(f"The preset's name {rule} (got {name!r}).")
 
 
 def save(name: str, scene: Scene) -> Path:
