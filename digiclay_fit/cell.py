@@ -104,7 +104,7 @@ class CellModel(Model):
             HIGH: scene.supply.high,
             LOW: scene.supply.low,
             LAG: scene.valve_lag.time_constant if scene.valve_lag else absent,
-            DELAY: scene.delay.dead_time if scene.delay else 0.0,
+            DELAY: scene.dead_time,
         }
         #: Logarithm of knee times conductance: that of a stroke, at any diameter.
         self.knee = math.log(orifice.knee * orifice.laminar)

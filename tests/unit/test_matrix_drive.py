@@ -183,6 +183,16 @@ def test_the_error_is_that_of_the_commands_that_acted():
     assert result.estimate_errors().metrics["height_error"] < 0.15e-3
 
 
+def assert_goes_on(made, before, after):
+    """Assert that a session goes on from a state kept after some control periods as if it had not stopped."""
+    system, paths = assemble(made), made.trajectories()
+    *_, half = periods(system, paths, begin(system), before)
+    data = snapshot.dump(system, half)
+    *_, end = periods(system, paths, half, after)
+    *_, again = periods(system, paths, snapshot.load(system, data), after)
+    assert snapshot.dump(system, again) == snapshot.dump(system, end)
+
+
 #: Beds on which a drive serves: sections of the scene.
 BEDS = {
     "of Method III": {"control": {"method": "hybrid"}},
@@ -208,12 +218,7 @@ DRIVE = {"sections": 3, "slot": 15e-3, "share": True}
 def test_a_bed_is_driven_goes_on_from_a_kept_state_and_knows_its_error(tables):
     tables = {key: part for key, part in {"trajectory": WAY, **tables}.items() if part is not None}
     made = resolve({**BED, **tables, "drive": DRIVE})
-    system, paths = assemble(made), made.trajectories()
-    *_, half = periods(system, paths, begin(system), 40)  # in mid-slot
-    data = snapshot.dump(system, half)
-    *_, end = periods(system, paths, half, 30)
-    *_, again = periods(system, paths, snapshot.load(system, data), 30)
-    assert snapshot.dump(system, again) == snapshot.dump(system, end)
+    assert_goes_on(made, 40, 30)  # in mid-slot
     result = run(made)
     served, command = result.history["served"], result.history["command"]
     assert served.shape == command.shape

@@ -28,6 +28,7 @@ from tests.assemble import (
     table,
 )
 from tests.own_methods import forgotten
+from tests.unit.test_matrix_drive import assert_goes_on
 
 PERIOD = 5e-3
 MOTOR = {"valve": {"law": "motor", "hold": "braked", "free_speed": 0.2}, "conduit": "absent"}
@@ -116,14 +117,7 @@ def test_pins_follow_a_shape_after_the_method_has_commanded_them_and_a_state_kee
     )
     assert np.ptp(plain) > 1e-3
     assert np.abs(driven - plain).max() < 20e-6
-    system = assemble(scene)
-    *_, state = periods(system, scene.trajectories(), begin(system), 33)
-    again = snapshot.load(system, snapshot.dump(system, state))
-    ends = [
-        [after.row(0) for after in periods(system, scene.trajectories(), one.copy(), 50)][-1]
-        for one in (state, again)
-    ]
-    assert np.array_equal(*ends)
+    assert_goes_on(scene, 33, 50)
     assert resolve(tomllib.loads(format_scene(scene))) == scene
     assert "sections" not in format_scene(scene)
 

@@ -89,8 +89,7 @@ def assemble(scene: Scene) -> System:
     rows = Rows(cell.rows, motion.line.length, controller.rows, sensors.rows)
     fastest = float(find_speeds(cell).rise)
     noisy = scene.sensors and scene.sensors.noisy
-    latency = scene.delay.dead_time if scene.delay else 0.0
-    latency += scene.valve_lag.time_constant if scene.valve_lag else 0.0
+    latency = scene.dead_time + (scene.valve_lag.time_constant if scene.valve_lag else 0.0)
     system = System(
         grid=bed,
         cell=cell,
@@ -128,8 +127,7 @@ def _add_gates(scene: Scene, motion: Motion, system: System) -> System:
     drive, lag, period = scene.drive, scene.valve_lag, system.period
     assert drive
     assert lag
-    dead_time = (scene.delay.dead_time if scene.delay else 0.0) + drive.overlap
-    queue = split_delay(Delay(dead_time), period)
+    queue = split_delay(Delay(scene.dead_time + drive.overlap), period)
     power = scene.valve.flow_law(scene.fluid, scene.actuator.area).power
     compliance = drive.trapped_volume / drive.bulk_modulus
     packet = compliance / float(motion.cell.flow.laminar_conductance(1.0))
@@ -370,9 +368,8 @@ def _make_controller(scene: Scene, bed: Grid, cells: tuple[Cell, ...]) -> Contro
 
     sensing = scene.sensors
     floors = (sensing.force_floor, sensing.height_floor) if sensing else (0.0, 0.0)
-    dead_time = scene.delay.dead_time if scene.delay else 0.0
     device = DeviceInfo(
-        bed, cell, scene.simulation.control_period, scene.blister, None, *floors, dead_time
+        bed, cell, scene.simulation.control_period, scene.blister, None, *floors, scene.dead_time
     )
     if scene.drive:
         device = replace(device, commands_wait=True, servos=scene.drive.kind == "servo")

@@ -254,8 +254,7 @@ class Scene(Described):
             rule = f"must be at most {MOST_STEPS} control periods, {longest:g} s"
             raise ParameterError("delay", "dead_time", rule, f"{self.delay.dead_time:g} s")
         if self.drive:
-            dead_time = self.delay.dead_time if self.delay else 0.0
-            self.drive.check_device(plan, self.simulation.control_period, dead_time)
+            self.drive.check_device(plan, self.simulation.control_period, self.dead_time)
             if self.drive.line_lag:
                 self._refuse_beside_gates()
             if self.drive.kind == "servo" and self.control and find_method(self.method).by_speed:
@@ -350,6 +349,11 @@ class Scene(Described):
             "time": f"{time.duration:g} s, {self.periods} periods of {time.control_period * 1e3:g} ms",
             "absent": ", ".join(absent) or "nothing",
         }
+
+    @property
+    def dead_time(self) -> float:
+        """Dead time between controller and valves, s."""
+        return self.delay.dead_time if self.delay else 0.0
 
     @property
     def lasting(self) -> float:
