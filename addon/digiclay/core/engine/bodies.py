@@ -299,8 +299,8 @@ class BodySelection(HandSelection):
         """Return a state, in the same arrays, whose active cells include all that can change in a period."""
         active, height = state.active, state.row(0)
         near = finger.near(height + float(self.period * self.fastest))
-        known = active.under if state.period < active.until else None
-        if known is not None and not any_true(near & ~known[-len(near) :]):
+        present = active.under if state.period < active.until else None
+        if present is not None and not any_true(near & ~present[-len(near) :]):
             return super().update(state, finger, control)
         under = np.zeros((self.rows.fingers, self.grid.count), np.bool_)
         under[-len(near) :] = near | (

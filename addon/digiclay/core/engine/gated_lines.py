@@ -140,8 +140,8 @@ class GatedDrive:
         """Move idle cells, of rows (r, n), in place, up to a control period."""
         height, filled = rows[0], rows[self.filled]
         line, column = self.find_gates(np.arange(height.size))
-        own = state.cells[0] - state.cells[0, -1]
-        height += own[line] + own[column] + (period - state.aged) * self.creep
+        risen = state.cells[0] - state.cells[0, -1]
+        height += risen[line] + risen[column] + (period - state.aged) * self.creep
         left, new = (state.cells[self.filled, gates] for gates in (line, column))
         supply = self.cell.supply
         excess = np.abs(filled) * supply.pressure(filled) - supply.high

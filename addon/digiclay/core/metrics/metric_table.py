@@ -234,13 +234,13 @@ METHOD: dict[str, Metric] = {
 
 def describe_losses(metrics: Mapping[str, Any]) -> str:
     """Return how often each finger of a run was lost, and how long it was without contact, or ``""``."""
-    each = metrics.get("lost", ())
-    return "; ".join(
-        f"{f'finger {number} ' if len(each) > 1 else ''}lost {'once' if count == 1 else f'{count} times'}, "
-        f"{one['time']:.2g} s without contact"
-        for number, one in enumerate(each, 1)
-        if (count := one["losses"])
-    )
+    fingers, lines = metrics.get("lost", ()), []
+    for number, finger in enumerate(fingers, 1):
+        if finger["losses"]:
+            name = f"finger {number} " if len(fingers) > 1 else ""
+            often = "once" if finger["losses"] == 1 else f"{finger['losses']} times"
+            lines.append(f"{name}lost {often}, {finger['time']:.2g} s without contact")
+    return "; ".join(lines)
 
 
 def describe_time(metrics: Mapping[str, Any]) -> str:

@@ -50,8 +50,8 @@ def measure_overshoot(values: Floats, target: float) -> float | None:
     """
     if not len(values) or values[0] == target:
         return None
-    way = target - float(values[0])
-    return max(0.0, float(np.max((values - target) / way)))
+    distance = target - float(values[0])
+    return max(0.0, float(np.max((values - target) / distance)))
 
 
 def measure_settling_time(time: Floats, values: Floats, target: float, band: float) -> float | None:

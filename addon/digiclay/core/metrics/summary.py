@@ -276,8 +276,8 @@ def split_fingers(history: Mapping[str, Any]) -> Iterator[Mapping[str, Any]]:
     cells = np.flatnonzero(felt.any(axis=0))  # of a large bed they are few
     tips, (x, y) = history["fingertip"], history["position"][cells].T
     tips = tips.reshape(len(tips), -1, 7)
-    given, low = history["force"][:, cells], history["height"][:, cells] - BALL
-    pressed, least = given > 0.0, np.full(given.shape, np.inf)
+    force, low = history["force"][:, cells], history["height"][:, cells] - BALL
+    pressed, least = force > 0.0, np.full(force.shape, np.inf)
 
     def square(finger: int) -> Floats:
         beside, along, above = tips[:, finger, :3].T[:, :, None]
@@ -286,17 +286,19 @@ def split_fingers(history: Mapping[str, Any]) -> Iterator[Mapping[str, Any]]:
     for finger in range(tips.shape[1]):
         np.minimum(least, square(finger), out=least)
     for finger, total in enumerate(history["finger_force"].reshape(len(tips), -1).T):
-        own = square(finger) <= least
-        lacking = np.flatnonzero((total > 0.0) & pressed.any(axis=1) & ~(own & pressed).any(axis=1))
+        nearest = square(finger) <= least
+        lacking = np.flatnonzero(
+            (total > 0.0) & pressed.any(axis=1) & ~(nearest & pressed).any(axis=1)
+        )
         if lacking.size:
             away = np.where(pressed[lacking], square(finger)[lacking], np.inf)
-            own[lacking, away.argmin(axis=1)] = True
-        found = (own * given).sum(axis=1)
+            nearest[lacking, away.argmin(axis=1)] = True
+        assigned = (nearest * force).sum(axis=1)
         # All of a finger together are exact.
-        scale = np.divide(total, found, out=np.zeros_like(total), where=found > 0.0)[:, None]
+        scale = np.divide(total, assigned, out=np.zeros_like(total), where=assigned > 0.0)[:, None]
         rows = {name: np.zeros_like(history[name]) for name in ("force", "mode")}  # at rest
-        rows["force"][:, cells] = own * given * scale
-        rows["mode"][:, cells] = own * history["mode"][:, cells]
+        rows["force"][:, cells] = nearest * force * scale
+        rows["mode"][:, cells] = nearest * history["mode"][:, cells]
         yield {**common, **rows, "total_force": total, "fingertip": tips[:, finger]}
 
 
@@ -316,7 +318,7 @@ def take_worst(each: Sequence[Mapping[str, float | None]]) -> dict[str, float | 
     """Return the worst of each metric of the fingers: a sum would hide that one is lost."""
     worst: dict[str, float | None] = {}
     for name in each[0]:
-        values = [value for one in each if (value := one[name]) is not None]
+        values = [value for metrics in each if (value := metrics[name]) is not None]
         worse = METRICS[name].worse
         pick = min if worse == "lower" else max
         lacking = worse == "absent" and len(values) < len(each)
@@ -327,9 +329,9 @@ def take_worst(each: Sequence[Mapping[str, float | None]]) -> dict[str, float | 
 def find_worst_finger(history: Mapping[str, Any], set_point: SetPoint | None) -> Mapping[str, Any]:
     """Return the history of the finger with the largest RFD, or, without any, force."""
 
-    def judge(own: Mapping[str, Any]) -> tuple[float, float]:
-        found = compute_metrics(own, set_point)
-        return found["rfd"] or 0.0, found["max_total_force"] or 0.0
+    def judge(finger: Mapping[str, Any]) -> tuple[float, float]:
+        metrics = compute_metrics(finger, set_point)
+        return metrics["rfd"] or 0.0, metrics["max_total_force"] or 0.0
 
     return max(split_fingers(history), key=judge)
 
@@ -356,7 +358,7 @@ def compute_metrics(
     ParameterError when the history has no rows.
     """
     if "finger_force" in history:
-        return take_worst([compute_metrics(own, set_point) for own in split_fingers(history)])
+        return take_worst([compute_metrics(finger, set_point) for finger in split_fingers(history)])
     time = history["time"]
     if not len(time):
         raise ParameterError("History", "time", "must have at least one row", "none")

@@ -55,17 +55,19 @@ class Gates:
             (1, 1, self.column, queue),
             (1, 2, self.column, queue),
         )
-        for gate, command, lag, own in gates:
-            given = lag.response(own, times)
+        for gate, command, lag, commands in gates:
+            openings = lag.response(commands, times)
             rows = slice(gate, 2 * len(times), 2)
-            response[rows, gate] = given[:, 0]
-            response[rows, self.rows + 3 * (length - own.length) + command :: 3] = given[:, 1:]
+            response[rows, gate] = openings[:, 0]
+            response[rows, self.rows + 3 * (length - commands.length) + command :: 3] = openings[
+                :, 1:
+            ]
         return response
 
     def list_cuts(self, queue: Queue) -> tuple[float, ...]:
         """Return when a gate changes to its next command in a period, and times of its lag after that, s."""
         gates = (self.queue, self.line), (queue, self.column)
-        cuts = {own.cut + n * lag.time_constant for own, lag in gates for n in LAGS}
+        cuts = {commands.cut + n * lag.time_constant for commands, lag in gates for n in LAGS}
         return tuple(sorted(cuts))
 
     def join(self, raw: Floats, steps: Floats) -> Floats:
@@ -81,11 +83,11 @@ class Gates:
             both = line_gate + column_gate + TINY
             source = np.copysign(column_gate / both, column)
             change = -np.expm1(-2.0 / self.packet * steps[:, None] * both)
-            given = self.packet / steps[:, None] * line_gate / both
+            share = self.packet / steps[:, None] * line_gate / both
             for i in range(len(steps)):
                 lost = change[i] * (raw[-1] - source[i])
                 raw[-1] -= lost
-                lift[i] += given[i] * lost
+                lift[i] += share[i] * lost
         return np.copysign(np.abs(lift) ** (1.0 / self.power), lift)
 
     def command(self, opening: Floats) -> Floats:

@@ -299,8 +299,8 @@ class MatrixAddressing:
     def find_common(self, table: Floats, served: Flags) -> Floats:
         """Return the column commands of each set, (k, m): what all its addressed lines command at least."""
         sections = self.parameters.sections
-        own = (table[first::sections][served[first::sections]] for first in range(sections))
-        return np.array([np.clip(0.0, lines.min(axis=0), lines.max(axis=0)) for lines in own])
+        by_set = (table[first::sections][served[first::sections]] for first in range(sections))
+        return np.array([np.clip(0.0, lines.min(axis=0), lines.max(axis=0)) for lines in by_set])
 
 
 def make_addressing(
