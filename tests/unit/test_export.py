@@ -63,26 +63,22 @@ def test_meshio_reads_back_the_triangles_in_millimeters(solid, tmp_path, kind):
 
 
 @pytest.mark.parametrize("unit", ["mm", "m"])
-def test_a_glb_is_in_meters_and_y_up_whatever_the_unit(solid, tmp_path, unit):
-    content = mesh_writer.write(solid, tmp_path / "surface.glb", unit=unit).read_bytes()
-    assert content[:4] == b"glTF"
-    description = json.loads(content[20 : 20 + struct.unpack("<I", content[12:16])[0]])
-    position = description["meshes"][0]["primitives"][0]["attributes"]["POSITION"]
-    found = description["accessors"][position]
-    low, high = solid[0].vertices.min(axis=0), solid[0].vertices.max(axis=0)
-    # x stays, up is y, and the bed's y runs toward the viewer's back: minus z. float32 keeps 4e-9 m
-    # of 50 mm.
-    assert_near(found["min"], [low[0], low[2], -high[1]], 4e-9)
-    assert_near(found["max"], [high[0], high[2], -low[1]], 4e-9)
-
-
-def test_a_glb_has_a_named_node_for_each_feature(formed, tmp_path):
+def test_a_glb_is_in_meters_and_y_up_whatever_the_unit_with_a_named_node_for_each_feature(
+    formed, tmp_path, unit
+):
     made = make_bodies(formed, Model(kind="features"), Finding(smallest=1))
-    scene = trimesh.load_scene(mesh_writer.write(made, tmp_path / "features.glb"))
+    path = mesh_writer.write(made, tmp_path / "features.glb", unit=unit)
+    scene, content = trimesh.load_scene(path), path.read_bytes()
     assert len(made) > 2
     assert set(scene.graph.nodes_geometry) == {body.name for body in made}
     # 1e-6: each vertex is off by 1e-7 of its coordinates at most; a mirrored one is negative.
     assert scene.volume == pytest.approx(sum(mesh(body).volume for body in made), rel=1e-6)
+    tree = json.loads(content[20 : 20 + struct.unpack("<I", content[12:16])[0]])
+    places = [accessor for accessor in tree["accessors"] if accessor["type"] == "VEC3"]
+    for body, found in zip(made, places, strict=True):
+        x, y, z = body.vertices.T
+        upright = np.column_stack([x, z, -y])  # float32 keeps 4e-9 m of 50 mm
+        assert_near([found["min"], found["max"]], [upright.min(axis=0), upright.max(axis=0)], 4e-9)
 
 
 def test_a_3mf_names_its_unit_has_an_object_for_each_feature_and_says_what_is_an_open_surface(
@@ -92,17 +88,15 @@ def test_a_3mf_names_its_unit_has_an_object_for_each_feature_and_says_what_is_an
     with zipfile.ZipFile(path) as archive:
         assert b'type="surface"' in archive.read("3D/3dmodel.model")
     made = make_bodies(formed, Model(kind="features"), Finding(smallest=1))
-    for unit, factor in (("mm", 1e3), ("m", 1.0)):
+    meters, millimeters = lib3mf.ModelUnit.Meter, lib3mf.ModelUnit.MilliMeter
+    for unit, factor, named in (("mm", 1e3, millimeters), ("m", 1.0, meters)):
         path = mesh_writer.write(made, tmp_path / "features.3mf", unit=unit)
         model = lib3mf.Wrapper().CreateModel()
         reader = model.QueryReader("3mf")
         reader.SetStrictModeActive(True)
         reader.ReadFromFile(str(path))
         assert reader.GetWarningCount() == 0
-        assert (
-            model.GetUnit()
-            == {"mm": lib3mf.ModelUnit.MilliMeter, "m": lib3mf.ModelUnit.Meter}[unit]
-        )
+        assert model.GetUnit() == named
         objects = model.GetMeshObjects()
         for body in made:
             assert objects.MoveNext()

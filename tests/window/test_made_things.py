@@ -4,7 +4,6 @@ import csv
 import math
 from dataclasses import replace
 from functools import partial
-from itertools import product
 
 import numpy as np
 import pytest
@@ -13,6 +12,7 @@ from digiclay.sessions.running import find_stroke
 from digiclay.sessions.sculpting import change_stroke, follow_finger, queue_stroke
 from digiclay.strokes.stroke import draw, lay_ring, start
 
+from tests.assemble import assert_near
 from tests.window.hand_strokes import DRAWN
 from tests.window.intended import THINGS, find_distance
 from tests.window.made import begin, make, make_bed, move, play
@@ -136,58 +136,45 @@ def draw_by_hand(scene, stroke, rate, moves):
     return np.asarray(session.state.row(0) - scene.actuator.rest_height)
 
 
-def list_reliefs():
-    """Yield how even each kind of stroke is along each path, m, and its spikes, m."""
-    for (kind, amount), (name, path) in product(KINDS.items(), PATHS.items()):
-        for angle, shift in TURNS:
-            made = play(
-                make_bed(side=SIDE),
-                move((PointerStroke(**amount, **path),), math.radians(angle), shift),
-            )
-            formed = measure_unevenness(made)
-            yield {
-                "case": f"{name}, {kind}, at {angle:g} degrees",
-                "rms": math.sqrt(np.mean(formed**2)),
-                "most": np.abs(formed).max(),
-                "spike": find_spikes(made).max(),
-            }
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("path", PATHS)
+def test_strokes_are_even_and_leave_no_spikes(kind, path):
+    stroke = PointerStroke(**KINDS[kind], **PATHS[path])
+    for angle, shift in TURNS:
+        made = play(make_bed(side=SIDE), move((stroke,), math.radians(angle), shift))
+        formed = measure_unevenness(made)
+        assert math.sqrt(np.mean(formed**2)) <= 0.1e-3, angle
+        assert np.abs(formed).max() <= 0.3e-3, angle
+        assert find_spikes(made).max() <= 0.2e-3, angle
 
 
-def list_differences():
-    """Yield how far apart strokes are that are to be alike, and from the depth or height asked for, m."""
-    for kind, amount in KINDS.items():
-        free = PointerStroke(**amount, **PATHS["free"])
-        shifted = move((free,), 0.5 * math.pi, (14e-3, 0.0))[0]
-        mirrored = replace(shifted, moves=tuple((t, -x, y) for t, x, y in shifted.moves))
-        first, other, both = (
-            play(make_bed(side=SIDE), (one,)).formed.reshape(SIDE, SIDE)
-            for one in (shifted, mirrored, replace(shifted, symmetry="x"))
-        )
-        yield _differ(f"{kind}: its mirror image in one stroke", both - both[:, ::-1])
-        yield _differ(f"{kind}: drawn mirrored", first - other[:, ::-1])
-        usual = play(make_bed(side=SIDE), (free,)).formed
-        for rate, moves in HANDS:
-            drawn = draw_by_hand(make_bed(side=SIDE), free, rate, moves)
-            yield _differ(
-                f"{kind}: drawn by {moves} moves a tick, {rate:g} ticks a second", drawn - usual
-            )
-    for brush, asked in product(("lower", "raise"), AMOUNTS):
-        line = PointerStroke(brush=brush, depth=asked, height=asked, **PATHS["line"])
-        made = play(make_bed(side=SIDE), (line,))
-        core = np.abs(made.formed[measure_distances(made) < CORE])
-        yield _differ(f"{brush} {1e3 * asked:g} mm", core - asked)
+def assert_alike(height, other):
+    # The band of the valves is half a micrometer, on either side.
+    assert_near(height, other, 1.0e-6)
 
 
-def _differ(case, difference):
-    """Return the row of a case: the greatest difference, m."""
-    return {"case": case, "difference": float(np.abs(difference).max())}
+def form(stroke):
+    """Return what a stroke leaves on a bed at rest, rows by columns, m."""
+    return play(make_bed(side=SIDE), (stroke,)).formed.reshape(SIDE, SIDE)
 
 
-def test_strokes_are_even_leave_no_spikes_and_come_out_alike_where_they_are_drawn_alike():
-    for case in list_reliefs():
-        assert case["rms"] <= 0.1e-3, case
-        assert case["most"] <= 0.3e-3, case
-        assert case["spike"] <= 0.2e-3, case
-    for case in list_differences():
-        # The band of the valves is half a micrometer, on either side.
-        assert case["difference"] <= 1.0e-6, case
+@pytest.mark.parametrize("kind", KINDS)
+def test_strokes_that_are_drawn_alike_come_out_alike(kind):
+    free = PointerStroke(**KINDS[kind], **PATHS["free"])
+    (shifted,) = move((free,), 0.5 * math.pi, (14e-3, 0.0))
+    mirrored = replace(shifted, moves=tuple((t, -x, y) for t, x, y in shifted.moves))
+    both = form(replace(shifted, symmetry="x"))
+    assert_alike(both, both[:, ::-1])
+    assert_alike(form(shifted), form(mirrored)[:, ::-1])
+    usual = form(free)
+    for rate, moves in HANDS:
+        drawn = draw_by_hand(make_bed(side=SIDE), free, rate, moves)
+        assert_alike(drawn.reshape(SIDE, SIDE), usual)
+
+
+@pytest.mark.parametrize("brush", ["lower", "raise"])
+@pytest.mark.parametrize("asked", AMOUNTS)
+def test_a_line_has_the_depth_or_height_that_is_asked_for(brush, asked):
+    line = PointerStroke(brush=brush, depth=asked, height=asked, **PATHS["line"])
+    made = play(make_bed(side=SIDE), (line,))
+    assert_alike(np.abs(made.formed[measure_distances(made) < CORE]), asked)

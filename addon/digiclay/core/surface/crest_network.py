@@ -29,7 +29,7 @@ class Branch:
     @property
     def length(self) -> float:
         """In plan, m."""
-        return float(settle(measure_length(self.points)))
+        return float(settle(measure_run(self.points)[-1]))
 
 
 #: A branch's end: its number, and 0 for the first point or 1 for the last.
@@ -138,11 +138,6 @@ def normalize(vector: Floats) -> Floats:
     return vector / max(float(np.hypot(*vector)), 1e-12)
 
 
-def measure_length(points: Floats) -> float:
-    """Return the length of a line in plan, m."""
-    return float(np.hypot(*np.diff(points, axis=0).T).sum())
-
-
 def measure_run(points: Floats) -> Floats:
     """Return the distance of each point of a line (m, 2) from its start, along it in plan, (m,), m."""
     return np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
@@ -205,7 +200,7 @@ def find_chains(
 
 def reaches_out(points: Floats, half: float, pitch: float) -> bool:
     """Return whether a free branch is longer than the flank of the line it stands on."""
-    return measure_length(points) > FLANK * half + 0.5 * pitch
+    return bool(measure_run(points)[-1] > FLANK * half + 0.5 * pitch)
 
 
 def _merge(network: Network) -> None:
