@@ -13,6 +13,7 @@ from digiclay.live import tick
 from digiclay.recorded import takes
 from digiclay.roles import fingertip_of
 
+from tests.assemble import assert_near
 from tests.blender.at_hand import open_bed
 
 #: float32 at 60 mm, through a few matrices.
@@ -116,7 +117,7 @@ def test_a_take_comes_back_with_the_heights_of_its_run_in_every_frame(
     still = bpy.app.version < (4, 3) and path.suffix == ".usda" and kind == "pins"
     for pins, wanted in zip(found, heights, strict=True):
         # Blender 4.2 reads an instancer at its first frame alone.
-        assert np.abs(pins - (heights[0] if still else wanted)).max() < NEAR
+        assert_near(pins, heights[0] if still else wanted, NEAR)
 
 
 def test_a_bake_goes_before_a_recording_and_that_before_the_last_take(bed, tmp_path):
@@ -138,7 +139,7 @@ def test_a_bake_goes_before_a_recording_and_that_before_the_last_take(bed, tmp_p
     assert written(take="2") == recording
     written()
     found = list(bring_back(tmp_path / "any.glb", "pins", len(heights)))
-    assert np.abs(np.array(found) - heights).max() < NEAR
+    assert_near(np.array(found), heights, NEAR)
 
 
 @pytest.mark.parametrize(

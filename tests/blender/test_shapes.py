@@ -16,6 +16,7 @@ from digiclay.roles import fingertip_of, is_bed
 from digiclay.settings import properties
 
 from tests import pictures
+from tests.assemble import assert_near
 from tests.blender.at_hand import beds, new_bed, select
 
 pytestmark = pytest.mark.usefixtures("extension")
@@ -58,14 +59,14 @@ def test_an_object_is_displayed_by_the_physics_and_kept_in_the_bed():
     raised = wanted > scene.actuator.rest_height + 6e-3
     assert raised.sum() in (36, 49)
     assert wanted.max() == pytest.approx(52e-3, abs=4e-9)
-    assert np.abs(heights(made) - wanted).max() <= SHOWN
+    assert_near(heights(made), wanted, SHOWN)
     bpy.context.view_layer.update()
     assert bridge.pose(fingertip_of(made))[2] > wanted.max()  # the finger is lifted out of it
     # A session goes on from there: its state is in the bed, and the method has taken over.
     system = assemble(scene)
     state = snapshot.load(system, read_snapshot(made))
     assert system.controller.is_displayed(state.memory)
-    assert np.abs(state.row(0) - wanted).max() <= SHOWN
+    assert_near(state.row(0), wanted, SHOWN)
 
 
 def test_an_object_where_it_is_is_displayed_where_it_is():
@@ -88,7 +89,7 @@ def test_modifiers_of_the_object_count_and_a_text_object_has_a_surface_too():
     thing.modifiers.new("Back", "MIRROR").use_axis = (False, True, False)
     bpy.ops.digiclay.shape_from_object()
     table = heights(made).reshape(13, 13)
-    assert np.abs(table - table[::-1]).max() <= 2 * SHOWN
+    assert_near(table, table[::-1], 2 * SHOWN)
     made = bed()
     bpy.ops.object.text_add()
     text = bpy.context.object
@@ -124,7 +125,7 @@ def test_what_is_formed_becomes_the_shape_and_goes_again_and_its_mesh_is_the_sam
     shown = heights(made)
     bpy.ops.digiclay.shape_keep()
     scene = properties.scene_of(made)
-    assert np.abs(heights_of(scene.shape.heights, make_grid(scene.layout)) - shown).max() < 4e-9
+    assert_near(heights_of(scene.shape.heights, make_grid(scene.layout)), shown, 4e-9)
     bpy.ops.digiclay.shape_remove()
     assert properties.scene_of(made).shape is None
     cube(1.0, 1.0)
@@ -140,7 +141,7 @@ def test_what_is_formed_becomes_the_shape_and_goes_again_and_its_mesh_is_the_sam
     mesh.select_set(True)
     bpy.ops.digiclay.shape_from_object(fit="placed")
     # Twice the dead band, and 32 bits.
-    assert np.abs(heights(other) - shown).max() <= 2 * SHOWN
+    assert_near(heights(other), shown, 2 * SHOWN)
 
 
 def refused(words, operator=None, **options):
@@ -192,7 +193,7 @@ def test_an_exr_is_read_as_it_is_and_displayed(tmp_path):
     before = len(bpy.data.images)
     read = read_pixels(path)
     assert read.shape == (7, 5)
-    assert np.abs(read - values).max() <= 1e-6
+    assert_near(read, values, 1e-6)
     assert len(bpy.data.images) == before
     made = bed()
     bpy.ops.digiclay.shape_from_file(filepath=str(path))
@@ -217,7 +218,7 @@ def test_a_picture_stands_in_blender_as_its_exif_data_say(tmp_path, ending, orie
     path = tmp_path / f"a.{ending}"
     pictures.write_turned(path, orientation)
     seen = read_pixels(path)[::-1][4::8, 4::8] / 20 * 255
-    assert np.abs(seen - pictures.UPRIGHT).max() < 0.2  # what a JPEG leaves
+    assert_near(seen, pictures.UPRIGHT, 0.2)  # what a JPEG leaves
 
 
 @pytest.mark.parametrize("kind, absent", pictures.NO_DATA)
@@ -228,7 +229,7 @@ def test_blender_leaves_out_what_a_geotiff_has_no_data_of(tmp_path, kind, absent
     assert np.array_equal(np.ma.getmaskarray(read), np.tile(np.arange(12) < 6, (10, 1)))
     seen = read[:, 6:]
     # Blender keeps 24 bits of each number, as a share of the largest.
-    assert np.abs(seen * (known.max() / seen.max()) - known).max() < 1e-3
+    assert_near(seen * (known.max() / seen.max()), known, 1e-3)
     monkeypatch.setattr(image_reader, "MOST", 60)
     with pytest.raises(ParameterError, match="unscaled, as it has pixels without data"):
         read_pixels(path)

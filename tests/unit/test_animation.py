@@ -142,7 +142,7 @@ def test_the_command_animates_a_run_between_its_rows_and_refuses_the_rest(here, 
     assert "timeCodesPerSecond = 24\n" in text
     for frame, heights in enumerate(wanted):
         points = ast.literal_eval(re.search(rf"^{frame}: (.*),$", text, re.MULTILINE)[1])
-        assert np.abs(np.array(points)[:, 2] / 1e3 - heights).max() < NEAR
+        assert_near(np.array(points)[:, 2] / 1e3, heights, NEAR)
     assert np.ptp(wanted, axis=0).max() > 1000 * NEAR
     before = sorted(here.rglob("*"))
     for line, said in MISTAKES.items():

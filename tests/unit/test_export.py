@@ -18,6 +18,7 @@ from digiclay.core.mesh_io.export_model import KINDS, Model, make_bodies
 from digiclay.core.model.layout import ARRANGEMENTS, Layout, make_grid
 from digiclay.core.surface.features import Finding
 from digiclay.core.surface.formed import NO_PIN, PIECE, Formed, make_formed
+from numpy.testing import assert_allclose, assert_array_equal
 
 from benchmarks.__main__ import main
 from benchmarks.bed_size import export
@@ -106,7 +107,7 @@ def test_a_3mf_names_its_unit_has_an_object_for_each_feature_and_says_what_is_an
             points = np.array([list(one.Coordinates) for one in found.GetVertices()])
             assert_near(points, body.vertices * factor, WRITTEN * factor / 1e3)
             faces = np.array([list(one.Indices) for one in found.GetTriangleIndices()])
-            np.testing.assert_array_equal(faces, body.faces)
+            assert_array_equal(faces, body.faces)
 
 
 def test_an_obj_has_a_group_for_each_feature(formed, tmp_path):
@@ -122,9 +123,9 @@ def test_an_obj_has_a_group_for_each_feature(formed, tmp_path):
 def test_a_ply_tells_height_force_and_mode_of_each_vertex(formed, solid, tmp_path):
     read = meshio.read(mesh_writer.write(solid, tmp_path / "surface.ply")).point_data
     n = len(formed.height)
-    np.testing.assert_allclose(read["height"][:n], formed.height * 1e3, rtol=1e-7)  # float32
-    np.testing.assert_allclose(read["force"][:n], formed.force, rtol=1e-7)
-    np.testing.assert_array_equal(read["mode"][:n], formed.mode)
+    assert_allclose(read["height"][:n], formed.height * 1e3, rtol=1e-7)  # float32
+    assert_allclose(read["force"][:n], formed.force, rtol=1e-7)
+    assert_array_equal(read["mode"][:n], formed.mode)
     assert set(read["mode"][n:]) == {-1}
 
 
@@ -142,7 +143,7 @@ def test_the_same_mesh_gives_the_same_bytes_whatever_its_path_or_its_pieces(
         mesh_writer.write(solid, tmp_path / "PIECES.STL", kind=kind).read_bytes()
         == whole.read_bytes()
     )
-    np.testing.assert_array_equal(solid[0].vertices, before)
+    assert_array_equal(solid[0].vertices, before)
 
 
 KNOWN = rf"known are {', '.join(mesh_writer.FORMATS)}\.$"
@@ -266,13 +267,13 @@ def test_every_vertex_knows_height_force_and_mode_and_the_base_that_it_belongs_t
     for body in make_bodies(bed, Model(kind=kind)):
         height, force, mode = body.values.values()
         assert tuple(body.values) == ("height", "force", "mode")
-        np.testing.assert_array_equal(height, body.vertices[:, 2])
+        assert_array_equal(height, body.vertices[:, 2])
         assert set(np.unique(mode)) <= {NO_PIN, *range(8)}
         assert 0.0 <= force.min() <= force.max() <= bed.force.max()
         if kind != "features":  # pin tops first
-            np.testing.assert_array_equal([force[:168], mode[:168]], [bed.force, bed.mode])
+            assert_array_equal([force[:168], mode[:168]], [bed.force, bed.mode])
         if kind in ("solid", "pins"):
-            np.testing.assert_array_equal(mode == NO_PIN, height == height.min())
+            assert_array_equal(mode == NO_PIN, height == height.min())
 
 
 def test_all_of_a_pins_top_has_its_values_and_a_skin_of_too_many_points_is_refused():
@@ -334,10 +335,8 @@ def history():
 
 
 def test_the_former_surface_is_a_row_or_one_height_that_the_history_has():
-    np.testing.assert_allclose(make_formed(history(), -1, 0).raised, uneven().raised)
-    np.testing.assert_allclose(
-        make_formed(history(), -1, 0.035).raised, uneven().raised + 0.005, atol=1e-15
-    )
+    assert_allclose(make_formed(history(), -1, 0).raised, uneven().raised)
+    assert_allclose(make_formed(history(), -1, 0.035).raised, uneven().raised + 0.005, atol=1e-15)
     assert not make_formed(history(), 1, 1).raised.any()
     said = r"^The history has 2 rows, 0 to 1 \(got -?\d as (row|former)\)\.$"
     for row, former in ((2, 0), (-3, 0), (0, 2), (0, -3)):

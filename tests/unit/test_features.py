@@ -12,6 +12,7 @@ from digiclay.core.surface.crest_network import measure_run
 from digiclay.core.surface.features import Finding, find, make_table, summarize
 from digiclay.core.surface.formed import Formed
 from digiclay.core.surface.skins import fit_skin
+from numpy.testing import assert_array_equal
 
 LEVEL = 0.04
 
@@ -129,7 +130,7 @@ def test_features_are_measured_from_the_surface_as_it_was_and_put_it_right():
     (one,), (other,) = features(bed), features(moved)
     # Squares may be cut along their other diagonal, which moves the surface within them.
     assert other.volume == pytest.approx(one.volume, rel=1e-3)
-    np.testing.assert_array_equal(other.pins, one.pins)
+    assert_array_equal(other.pins, one.pins)
     # What is formed is what was there, plus the boss, minus the crease, but for the rim below the
     # threshold.
     up, down = ridges(6.0, 4.0, "-12,8 12,8"), ridges(-4.0, 4.0, "-12,-8 12,-8")
@@ -154,7 +155,7 @@ def test_a_pin_exactly_at_the_threshold_does_not_belong_to_the_feature_nor_leave
     height[[12, 13]] = 2.0
     place = make_grid(Layout(rows=5, columns=5)).positions
     (boss,) = features(Formed.of(place, height, 0.0, 0.0, 0), Finding(threshold=0.5, smallest=1))
-    np.testing.assert_array_equal(boss.pins, [12, 13])
+    assert_array_equal(boss.pins, [12, 13])
     a, b, c = np.moveaxis(boss.region.position[boss.region.faces], 1, 0)
     area = 0.5 * np.abs((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0])
     # Beside a corner of the contour stands a triangle of a thousandth of a pitch, and not of
@@ -335,7 +336,7 @@ def test_the_parts_of_a_boss_share_its_pins_area_and_volume(name, bed):
     bed = form_shape(name, *bed)
     parts = features(bed)
     whole = np.flatnonzero(bed.raised > Finding().threshold)
-    np.testing.assert_array_equal(np.sort(np.concatenate([one.pins for one in parts])), whole)
+    assert_array_equal(np.sort(np.concatenate([one.pins for one in parts])), whole)
     (undivided,) = features(bed, Finding(smallest=len(whole) // 2 + 1))
     # The smaller parts have too few pins then.
     assert sum(one.area for one in parts) == pytest.approx(undivided.area, rel=1e-9)

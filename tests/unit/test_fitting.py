@@ -15,7 +15,7 @@ from digiclay.core.shapes.heightmap import (
 from digiclay.core.shapes.mesh_relief import make_shape_mesh
 from digiclay.core.shapes.request import Shape
 
-from tests.assemble import table
+from tests.assemble import assert_near, table
 
 REST, STROKE = Actuator().rest_height, Actuator().stroke
 BED = make_grid(Layout(13, 25, 3e-3))
@@ -101,9 +101,9 @@ def test_placed_a_shape_stands_where_it_says_and_heights_of_a_scene_as_they_are(
     assert (row.min(), row.max(), column.min(), column.max()) == (2, 6, 13, 17)
     heights = np.linspace(-1e-3, 0.11, BED.count)
     # 32 bits: half of 2^-24 of 0.1 m at most.
-    assert np.abs(unpack(pack(heights), BED) - heights).max() <= 4e-9
+    assert_near(unpack(pack(heights), BED), heights, 4e-9)
     cells = fit_given(Shape(file="Suzanne", heights=pack(heights)), BED, Actuator())
-    assert np.abs(cells.heights - np.clip(heights, 0.0, STROKE)).max() <= 4e-9
+    assert_near(cells.heights, np.clip(heights, 0.0, STROKE), 4e-9)
     assert cells.too_low == np.count_nonzero(heights < -1e-9) > 0
     assert cells.describe().startswith("Suzanne: heights from 0.0 to 100.0 mm")
 
@@ -199,17 +199,13 @@ def test_pins_over_no_data_stand_at_the_foot_and_those_beside_are_as_high_as_if_
     cells = laid(grid, fit="stretch", rise=8e-3)
     assert cells.covered == 13 * 25 - 15
     wanted = np.where(absent, 0.0, 2.0 * (heights - 1.0))
-    assert np.abs(relief(cells) - wanted).max() < 1e-9
+    assert_near(relief(cells), wanted, 1e-9)
     # Twice as fine, each pin has the mean of the pixels that have data.
     fine = np.ma.array(
         np.kron(heights, np.ones((2, 2))), mask=np.kron(absent, np.ones((2, 2), bool))
     )
-    assert (
-        np.abs(
-            relief(laid(make_height_map("a.asc", fine), fit="stretch", rise=8e-3)) - wanted
-        ).max()
-        < 1e-9
-    )
+    cells = laid(make_height_map("a.asc", fine), fit="stretch", rise=8e-3)
+    assert_near(relief(cells), wanted, 1e-9)
 
 
 def test_an_esri_grid_keeps_its_proportions_of_plan_and_height(tmp_path):

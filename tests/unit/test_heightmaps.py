@@ -22,7 +22,7 @@ from hypothesis import strategies as st
 from PIL import Image
 
 from tests import pictures
-from tests.assemble import table
+from tests.assemble import assert_near, table
 
 PITCH = 3e-3
 
@@ -69,7 +69,8 @@ def test_a_map_gives_each_pin_the_mean_over_its_square(values, rows, columns, pi
     found = make_height_map("x", values).tops(bed, middle(*values.shape, pixel))
     known = wanted(bed.x, bed.y)
     np.testing.assert_array_equal(found.covered, np.isfinite(known))
-    assert np.abs(found.value - known)[found.covered].max() < 1e-10  # rounding of numbers up to 60
+    # Rounding of numbers up to 60.
+    assert_near(found.value[found.covered], known[found.covered], 1e-10)
 
 
 @given(st.integers(2, 40), st.integers(2, 40), st.integers(1, 9), st.integers(1, 200))
@@ -113,7 +114,7 @@ def test_a_picture_is_read_as_it_was_written(tmp_path, bits, kind, ending):
     # By its brightness, where it is colored: red weighs 0.299 of 255, as in the television
     # standard.
     Image.fromarray(np.array([[[255] * 3] * 2, [[0] * 3, [255, 0, 0]]], np.uint8)).save(path)
-    assert np.abs(read_pixels(path) - [[0, 76.245], [255, 255]]).max() < 1e-4  # 24 bits of 255
+    assert_near(read_pixels(path), [[0, 76.245], [255, 255]], 1e-4)  # 24 bits of 255
 
 
 @pytest.mark.parametrize("name", [*pictures.READ, *pictures.OUTSIDE])
@@ -153,7 +154,7 @@ def test_a_picture_stands_as_its_exif_data_say(tmp_path, ending, orientation):
     path = tmp_path / f"a.{ending}"
     pictures.write_turned(path, orientation)
     seen = read_pixels(path)[::-1][4::8, 4::8] / 20
-    assert np.abs(seen - pictures.UPRIGHT).max() < 0.2  # what a JPEG leaves
+    assert_near(seen, pictures.UPRIGHT, 0.2)  # what a JPEG leaves
 
 
 @pytest.mark.parametrize("big", [False, True])

@@ -12,6 +12,7 @@ from digiclay.core.base.errors import ParameterError
 from digiclay.core.mesh_io import mesh_limits, mesh_writer
 from digiclay.core.mesh_io.mesh_reader import READERS, read
 from digiclay.core.surface.formed import Body
+from numpy.testing import assert_array_equal
 
 from tests.assemble import assert_near
 from tests.mesh_files import FACES, PLACES, VOLUME, assert_refused, put
@@ -68,8 +69,8 @@ def test_a_ball_has_the_same_triangles_in_every_format(tmp_path, kind):
 )  # fmt: skip
 def test_whatever_way_an_obj_is_written_it_is_the_same_square(tmp_path, text):
     back = read(put(tmp_path, "odd.obj", text))
-    np.testing.assert_array_equal(back.vertices, [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
-    np.testing.assert_array_equal(back.faces, [[0, 1, 2], [0, 2, 3]])
+    assert_array_equal(back.vertices, [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
+    assert_array_equal(back.faces, [[0, 1, 2], [0, 2, 3]])
 
 
 THREE = "v 0 0 0\nv 1 0 0\nv 0 1 0\n"
@@ -107,7 +108,7 @@ def test_bytes_beside_a_gltf_are_read_and_materials_and_pictures_are_not_opened(
     (tmp_path / "a folder").mkdir()
     path = gltf(tmp_path, with_uri("a%20folder/bytes.bin"))
     (tmp_path / "bytes.bin").rename(tmp_path / "a folder" / "bytes.bin")
-    np.testing.assert_array_equal(read(path).vertices, PLACES)
+    assert_array_equal(read(path).vertices, PLACES)
 
 
 def test_every_format_that_is_read_is_tested_below():
@@ -145,8 +146,8 @@ def test_a_byte_order_mark_and_many_blocks_change_nothing(tmp_path, kind, monkey
     path.write_bytes(b"\xef\xbb\xbf" + path.read_bytes())
     monkeypatch.setattr("digiclay.core.mesh_io.obj_reader.BLOCK", 100)
     marked = read(path)
-    np.testing.assert_array_equal(plain.vertices, marked.vertices)
-    np.testing.assert_array_equal(plain.faces, marked.faces)
+    assert_array_equal(plain.vertices, marked.vertices)
+    assert_array_equal(plain.faces, marked.faces)
 
 
 @pytest.mark.parametrize(
@@ -235,7 +236,7 @@ def test_strips_and_fans_are_cut_into_triangles(tmp_path, mode, corners):
         tree["meshes"][0]["primitives"][0]["mode"] = mode
 
     wanted = {5: [[0, 1, 2], [1, 3, 2], [2, 3, 0]], 6: [[0, 1, 2], [0, 2, 3]]}[mode]
-    np.testing.assert_array_equal(read(gltf(tmp_path, change)).faces, wanted)
+    assert_array_equal(read(gltf(tmp_path, change)).faces, wanted)
 
 
 @pytest.mark.parametrize("normalized", [True, False])
@@ -257,7 +258,7 @@ def test_vertices_that_are_quantized_are_read_and_extensions_of_materials_do_not
         tree["buffers"][0] = inline(padded + FACES.astype("<u2").tobytes())
 
     found = read(gltf(tmp_path, change)).vertices
-    assert np.abs(found - whole / (32767.0 if normalized else 1.0)).max() < 1e-12
+    assert_near(found, whole / (32767.0 if normalized else 1.0), 1e-12)
 
 
 @pytest.mark.parametrize(
@@ -287,7 +288,7 @@ def test_a_pipe_beside_the_gltf_is_not_opened_nor_its_pictures_and_endless_nesti
         tree["meshes"][0]["primitives"][0]["material"] = 0
 
     os.mkfifo(tmp_path / "pipe.bin")
-    np.testing.assert_array_equal(read(gltf(tmp_path, change)).faces, FACES)
+    assert_array_equal(read(gltf(tmp_path, change)).faces, FACES)
     path = gltf(tmp_path, with_uri("pipe.bin"))
     assert_refused(path, "must have its files beside it")
     path.write_text("[" * 100_000, encoding="utf-8")

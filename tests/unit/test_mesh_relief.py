@@ -48,7 +48,7 @@ def test_the_top_of_a_terrain_is_what_scipy_interpolates(arrangement, seed):
     inside = np.isfinite(wanted) & found.covered
     assert np.count_nonzero(np.isfinite(wanted) != found.covered) <= 2
     # Slivers of Delaunay's may be 1e4 times as long as wide.
-    assert np.abs(found.value - wanted)[inside].max(initial=0.0) < 1e-8
+    assert_near(found.value[inside], wanted[inside], 1e-8)
     assert not found.overhang.any()
 
 
@@ -126,6 +126,10 @@ def ground(x, y):
     return 20.0 + 0.1 * x + 3.0 * np.sin(x / 20.0) * np.cos(y / 25.0)
 
 
+def ground_under(bed):
+    return ground(bed.x * 1e3, bed.y * 1e3)
+
+
 def scan(*holes, size=40.0):
     """Return the ground as triangles 1 mm wide, without those in holes: x, y and radius, mm."""
     side = np.arange(-size, size + 1.0)
@@ -150,7 +154,7 @@ def test_a_hole_of_a_scan_is_as_high_as_what_is_around_it(arrangement):
     assert missed < found.filled < 25
     # The flattest surface leaves the ground by its curvature, 3 mm / (20 mm)², times a quarter of
     # (5 mm)².
-    assert np.abs(found.value - ground(bed.x * 1e3, bed.y * 1e3)).max() < 0.1
+    assert_near(found.value, ground_under(bed), 0.1)
 
 
 def test_a_hole_in_the_top_of_a_solid_is_filled_though_its_inside_is_seen_through_it():
@@ -160,7 +164,7 @@ def test_a_hole_in_the_top_of_a_solid_is_filled_though_its_inside_is_seen_throug
     bed = make_grid(Layout(25, 25, 3e-3))
     found = shape(trimesh.util.concatenate([top, lower])).tops(bed, IN_PLACE)
     assert found.filled > 5
-    assert np.abs(found.value - ground(bed.x * 1e3, bed.y * 1e3)).max() < 0.1
+    assert_near(found.value, ground_under(bed), 0.1)
 
 
 def turned(share):
@@ -195,7 +199,7 @@ def test_what_is_no_small_hole_stays_as_it_is(mesh, bare):
     assert found.filled == 0
     assert not found.covered[bare(bed.x * 1e3, bed.y * 1e3)].any()
     if len(mesh.faces) == 12_800:  # the whole ground
-        assert np.abs(found.value - ground(bed.x * 1e3, bed.y * 1e3)).max() < 0.02
+        assert_near(found.value, ground_under(bed), 0.02)
 
 
 @pytest.mark.parametrize("arrangement", ARRANGEMENTS)
@@ -206,7 +210,7 @@ def test_a_slope_goes_on_through_a_hole(arrangement):
     value, hole = fill_holes(bed, np.where(missing, -99.0, slope), missing)
     assert np.array_equal(hole, missing)
     # 300 rounds bring a hole four pins wide to rest.
-    assert np.abs(value - slope).max() < 1e-9
+    assert_near(value, slope, 1e-9)
 
 
 def test_a_hole_is_small_up_to_a_twentieth_of_the_covered_pins():

@@ -12,6 +12,8 @@ from digiclay.core.shapes.mesh_relief import make_shape_mesh
 from digiclay.core.shapes.request import Placement, Shape
 from digiclay.core.surface.formed import Formed
 
+from tests.assemble import assert_near
+
 #: mm. In the middle of a bed the last ones have no place that is a round number, in binary or in
 #: decimals.
 PITCHES = (3.0, 2.3, 2.54)
@@ -44,7 +46,7 @@ def test_a_formed_bed_comes_back_cell_by_cell(tmp_path, arrangement, format):
             cells, formed, Model(kind=kind), path, format, "m" if pitch == 2.3 else "mm"
         )
         assert (back.covered, back.overhanging) == (cells.count, 0), kind
-        assert np.abs(back.heights - formed.height).max() < EXACT, kind
+        assert_near(back.heights, formed.height, EXACT)
 
 
 @pytest.mark.parametrize("skin", ["smooth", "membrane"])
@@ -52,7 +54,7 @@ def test_a_curved_skin_comes_back_at_its_pins(tmp_path, skin):
     cells, formed = bed(2.3, "hexagonal")
     back = read_back(cells, formed, Model(kind="solid", skin=skin), tmp_path / "x.stl", "stl")
     assert back.covered == cells.count
-    assert np.abs(back.heights - formed.height).max() < 1e-6  # the membrane stops at 1 nm a point
+    assert_near(back.heights, formed.height, 1e-6)  # the membrane stops at 1 nm a point
 
 
 @pytest.mark.parametrize(
@@ -73,10 +75,7 @@ def test_an_obj_comes_back_from_any_axes(tmp_path, up, forward, header):
     if header:
         path.write_text(header + path.read_text()[path.read_text().index("\n") :])
     shape = Shape(file=str(path), fit="placed", unit="mm")
-    assert (
-        np.abs(fit_relief(shape, read(shape), cells, Actuator()).heights - formed.height).max()
-        < EXACT
-    )
+    assert_near(fit_relief(shape, read(shape), cells, Actuator()).heights, formed.height, EXACT)
 
 
 @pytest.mark.parametrize("up, forward", [("z", "-z"), ("w", ""), ("y", "up")])
@@ -98,7 +97,7 @@ def test_a_rim_of_six_digits_still_covers_the_outer_pins(arrangement):
     )
     assert tops.covered.all()
     # 50 nm off, at a slope of up to 20.
-    assert np.abs(tops.value * 1e-3 - formed.height).max() < 2e-6
+    assert_near(tops.value * 1e-3, formed.height, 2e-6)
 
 
 PLATE = np.array([[-5.97, -5.97, 1.0], [5.97, -5.97, 1.0], [5.97, 5.97, 1.0], [-5.97, 5.97, 1.0]])

@@ -7,6 +7,7 @@ import numpy as np
 import trimesh
 from digiclay.settings.devices import BEDS, FIRST
 
+from tests.assemble import assert_near
 from tests.window.blender_window import down, up
 from tests.window.intended import find_distance
 
@@ -37,10 +38,10 @@ def test_a_ridge_and_a_valley_stand_within_a_minute_along_the_hearts_that_were_d
     )
     outer, inner = (find_distance(seen[f"{name} drawn"], x, y) for name in ("ridge", "valley"))
     # A pixel of the picture is 0.3 mm; the top of a blister is flat in its middle.
-    assert np.abs(up(seen, "ridge")[outer < 1.0] - 6.0).max() < 1.0
-    assert np.abs(down(seen, "valley")[inner < 1.0] - 8.0).max() < 1.0
+    assert_near(up(seen, "ridge")[outer < 1.0], 6.0, 1.0)
+    assert_near(down(seen, "valley")[inner < 1.0], 8.0, 1.0)
     # No blister is wider than the paper's, of 15 mm.
-    assert np.abs(up(seen, "ridge")[outer > 20.0]).max() < 0.1
+    assert_near(up(seen, "ridge")[outer > 20.0], 0.0, 0.1)
     # What other programs took of the processor is not the tutorial's; for a film the hand waits.
     assert seen["pictured"] or sum(took - waited for took, waited in seen["took"][1:6]) < 60.0
 

@@ -1,8 +1,8 @@
 """A scene in millimeters: a bed of its true size, seen whole, formed by the mouse."""
 
-import numpy as np
 import pytest
 
+from tests.assemble import assert_near
 from tests.window.blender_window import up
 from tests.window.in_millimeters import PLACES
 
@@ -17,8 +17,8 @@ def test_a_bed_has_its_true_size_and_a_millimeter_is_a_millimeter(seen):
 
 def test_a_stroke_of_the_mouse_has_its_height(seen):
     ridge = up(seen, "raised")[12, 4:21]
-    assert np.abs(ridge - 6.0).max() < 0.1
-    assert np.abs(up(seen, "raised")[[0, 24]]).max() < 0.1
+    assert_near(ridge, 6.0, 0.1)
+    assert_near(up(seen, "raised")[[0, 24]], 0.0, 0.1)
 
 
 @pytest.mark.parametrize("name", ["large", "small"])
