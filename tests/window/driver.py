@@ -105,6 +105,27 @@ def call(operator, *how, **properties):
         return operator(*how, **properties)
 
 
+def choose_tool(name="digiclay.press_tool"):
+    call(bpy.ops.wm.tool_set_by_id, name=name)
+
+
+@contextmanager
+def watch_overlay():
+    """Collect what the overlay draws, with the address of the region in which it does."""
+    module, drawn = part("overlay.draw"), []
+    draw = module.draw
+
+    def noted(picture, width, height):
+        drawn.append((bpy.context.region.as_pointer(), picture))
+        draw(picture, width, height)
+
+    module.draw = noted
+    try:
+        yield drawn
+    finally:
+        module.draw = draw
+
+
 def open_sidebar(tab="Digital Clay"):
     area, _ = view()
     area.spaces.active.show_region_ui = True

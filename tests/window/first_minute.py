@@ -228,7 +228,7 @@ def script():
 
 
 def ball():
-    blender.call(bpy.ops.wm.tool_set_by_id, name="builtin.select_box")
+    blender.choose_tool("builtin.select_box")
     tip = blender.fingertip()
     before = list(tip.matrix_world.translation)
     x, y = blender.pixel(tip["digiclay_ellipsoid"].matrix_world.translation)

@@ -114,7 +114,7 @@ def catch_up():
 
 
 def take_tool():
-    blender.call(bpy.ops.wm.tool_set_by_id, name="digiclay.press_tool")
+    blender.choose_tool()
     blender.call(bpy.ops.object.select_all, action="DESELECT")
 
 

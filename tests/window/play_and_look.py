@@ -1,7 +1,5 @@
 """Drives a session by playback and gizmo, in other windows and views; picks, copies and deletes beds."""
 
-from contextlib import contextmanager
-
 import bpy
 import numpy as np
 
@@ -27,7 +25,7 @@ def script():
 def gizmo():
     yield from blender.start(blender.beds()[0])
     blender.select(blender.fingertip())
-    blender.call(bpy.ops.wm.tool_set_by_id, name="builtin.move")
+    blender.choose_tool("builtin.move")
     yield None
     tip = blender.fingertip().matrix_world.translation.copy()
     below = tip.copy()
@@ -144,7 +142,7 @@ def render():
 
 def views():
     """Press in an orthographic view, and in the top view of a quad view, and see what is written there."""
-    blender.call(bpy.ops.wm.tool_set_by_id, name="digiclay.press_tool")
+    blender.choose_tool()
     area, _ = blender.view()
     area.spaces.active.region_3d.view_perspective = "ORTHO"
     # Blender works out the matrices of a view when it draws it.
@@ -159,8 +157,9 @@ def views():
     blender.call(bpy.ops.screen.region_quadview)
     yield from blender.until(lambda: top_quarter() is not None)
     yield from tapped(blender.pixel(blender.world(15.0, -9.0), top_quarter()), "quad view")
-    with drawn() as marks:
-        yield from blender.until(lambda: len(marks) == 4)
+    with blender.watch_overlay() as drawn:
+        yield from blender.until(lambda: len(find_words(drawn)) == 4)
+    marks = find_words(drawn)
     blender.SEEN["drawn in the quarters"] = sorted(marks.values())
     area, _ = blender.view()
     turned = area.spaces.active.region_3d
@@ -173,8 +172,13 @@ def views():
     yield None
     blender.call(bpy.ops.screen.screen_full_area)
     yield None
-    blender.call(bpy.ops.wm.tool_set_by_id, name="builtin.select_box")
+    blender.choose_tool("builtin.select_box")
     yield None
+
+
+def find_words(drawn):
+    """Return by region whether words are drawn there beside the dots of pins, which no cursor has."""
+    return {region: bool(picture.words) for region, picture in drawn if picture.dots}
 
 
 def top_quarter():
@@ -187,24 +191,6 @@ def top_quarter():
         if np.allclose(matrix[:3, :3], np.eye(3), atol=1e-3) and matrix[2, 3] < 0.0:
             return region
     return None
-
-
-@contextmanager
-def drawn():
-    module = blender.part("overlay.draw")
-    draw, seen = module.draw, {}
-
-    def noted(picture, width, height):
-        # What the cursor of the Press tool draws has words alone.
-        if picture.dots:
-            seen[bpy.context.region.as_pointer()] = bool(picture.words)
-        draw(picture, width, height)
-
-    module.draw = noted
-    try:
-        yield seen
-    finally:
-        module.draw = draw
 
 
 def tapped(at, name):

@@ -224,7 +224,7 @@ def past_objects():
 def put_cube():
     add_bed()
     blender.call(bpy.ops.mesh.primitive_cube_add, size=0.12)
-    blender.call(bpy.ops.wm.tool_set_by_id, name="digiclay.press_tool")
+    blender.choose_tool()
     yield from focus_window()
     blender.window().view_layer.objects.active = blender.beds()[0]
     blender.call(bpy.ops.digiclay.session, "INVOKE_DEFAULT")

@@ -70,7 +70,7 @@ def script():
     yield from blender.scene_with_bed(bed="paper")
     # Software GL draws a frame or two a second; in between the session is to catch up.
     blender.preferences().most_periods = 100
-    blender.call(bpy.ops.wm.tool_set_by_id, name="digiclay.press_tool")
+    blender.choose_tool()
     yield None
     note("added")
     # An outline about 625 pins is what takes software GL longest.

@@ -138,11 +138,10 @@ def note(name):
 
 def list_hidden():
     """Take a picture; return which fingertips the overlay in it covers."""
-    module, (_, region), pictures = blender.part("overlay.draw"), blender.view(), []
-    draw = module.draw
-    module.draw = lambda picture, *size: (pictures.append(picture), draw(picture, *size))
-    blender.shot("hand above")
-    module.draw, box = draw, pictures[0].boxes[0]
+    _, region = blender.view()
+    with blender.watch_overlay() as drawn:
+        blender.shot("hand above")
+    box = drawn[0][1].boxes[0]
     tips = blender.part("roles").fingertips_of(blender.beds()[0]).items()
     places = np.array([blender.pixel(tip.matrix_world.translation) for _, tip in tips])
     aside = places - [region.x + box.x, region.y + box.y]

@@ -160,7 +160,7 @@ def script():
     middle = on_the_screen(0.0, 0.0)
     yield from levels_of_detail()
     # The key is one of the tool's.
-    blender.call(bpy.ops.wm.tool_set_by_id, name="digiclay.press_tool")
+    blender.choose_tool()
     for name in ("alt s", "alt s again"):
         yield from done(hand(to(middle), "key alt+s"))
         note(name)

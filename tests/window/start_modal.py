@@ -51,7 +51,7 @@ def start_failing(kind, action):
 
 def stamp():
     """Press on the bed with a stamp from a file that is not there, then with one that is."""
-    blender.call(bpy.ops.wm.tool_set_by_id, name="digiclay.press_tool")
+    blender.choose_tool()
     settings = blender.part("press.brush").tool_settings(bpy.context)
     settings.brush, settings.stamp, settings.stamp_file = (
         "STAMP",
