@@ -153,7 +153,6 @@ KNOWN = rf"known are {', '.join(mesh_writer.FORMATS)}\.$"
     "count, name, unit, said",
     [
         (1, "surface.step", "mm", rf"^Unknown mesh format 'step': {KNOWN}"),
-        (1, "surface", "mm", rf"^Unknown mesh format '': {KNOWN}"),
         (1, "surface.stl", "inch", r"^Export\.unit must be one of mm, m \(got 'inch'\)\.$"),
         (0, "surface.stl", "mm", r"^There is nothing to write to \S+surface\.stl\.$"),
         (
@@ -315,7 +314,6 @@ def test_each_feature_is_a_group_of_faces_over_its_pins(kind, parts):
         ({"resolution": -1}, "resolution must be at least 0"),
         ({"resolution": 65}, "resolution must be at most 64"),
         ({"base_thickness": 0.0}, "base_thickness must be above 0 m"),
-        ({"base_thickness": np.nan}, "base_thickness must be a finite number"),
         ({"cap": -1.0}, "cap must be above 0 m"),
     ],
 )
@@ -344,7 +342,7 @@ def test_the_former_surface_is_a_row_or_one_height_that_the_history_has():
             make_formed(history(), row, former)
 
 
-@pytest.mark.parametrize("name, bad", [("height", np.nan), ("former", np.inf), ("force", np.nan)])
+@pytest.mark.parametrize("name, bad", [("height", -np.inf), ("former", np.inf), ("force", np.nan)])
 def test_values_that_are_not_finite_are_refused_by_cell(name, bad):
     known = {"height": np.full(168, 0.04), "former": 0.04, "force": 0.0, "mode": 0}
     known[name] = np.where(np.arange(168) == 7, bad, 0.04)
