@@ -1,7 +1,6 @@
 """What sessions take up of snapshots: state, fingertips, base. No Blender."""
 
 from dataclasses import replace
-from typing import NamedTuple
 
 from ..core.base.arrays import Floats
 from ..core.base.errors import ParameterError, StateError
@@ -20,32 +19,39 @@ CHANGED = "Only heights and locks were kept: the bed's parts or its method have 
 Numbers = tuple[int, ...]
 
 
-def fit_base(base: Floats | None, state: State) -> Floats:
-    """Return the base (n,), m, of a state: a stored one, or the surface where that has other pins."""
+def restore_state(
+    scene: Scene,
+    system: System,
+    stored: bytes | None,
+    was: Numbers,
+    numbers: Numbers,
+    base: Floats | None,
+) -> tuple[State, bytes, Floats, str]:
+    """Return state, snapshot, base, and what of a stored snapshot (None: at rest) could not be taken up.
+
+    Fingertips are moved from the places of their numbers before, `was`. `base`: (n,), m, the stored one;
+    the surface replaces it where that has other pins, or nothing of the state could be taken up.
+    """
+    stored = change_fingers(scene, system, stored, was, numbers)
+    state, lost, refused = _load_state(system, stored)
     surface = state.row(0)
-    return surface if base is None or base.size != surface.size else base
+    if base is None or refused or base.size != surface.size:
+        base = surface
+    return state, snapshot.dump(system, state), base, lost
 
 
-class Restored(NamedTuple):
-    """State to continue from, what of the stored one could not be taken up, and whether nothing could."""
-
-    state: State
-    lost: str = ""
-    refused: bool = False
-
-
-def load_state(system: System, stored: bytes | None) -> Restored:
-    """Return the state of a snapshot; None: at rest."""
+def _load_state(system: System, stored: bytes | None) -> tuple[State, str, bool]:
+    """Return the state of a snapshot, what of it could not be taken up, and whether nothing could."""
     if stored is None:
-        return Restored(begin(system))
+        return begin(system), "", False
     # The state of other parts has heights at least; what has none is of no use.
     refused = ""
     for read, words in ((snapshot.load, ""), (snapshot.transfer_heights, CHANGED)):
         try:
-            return Restored(read(system, stored), words and localize(words))
+            return read(system, stored), words and localize(words), False
         except StateError as error:
             refused = localize("The bed begins at rest. {}", error)
-    return Restored(begin(system), refused, refused=True)
+    return begin(system), refused, True
 
 
 def change_fingers(

@@ -24,7 +24,7 @@ from ..strokes.pose import turn_image
 from ..strokes.stroke import FINISHING, RETURNING, Brush, Stroke
 from ..strokes.sweep import SWEEPS, finish, sweep
 from ..strokes.tracking import find_tracking
-from .restored_states import Numbers, change_fingers, fit_base, load_state
+from .restored_states import Numbers, change_fingers, restore_state
 from .running import (
     Gesture,
     Running,
@@ -72,11 +72,8 @@ def begin_session(
     numbers = numbers or tuple(range(1, fingers + 1))
     whole = scene.with_fingers(len(numbers))
     system = assemble(whole)
-    stored = change_fingers(scene, system, stored, was or numbers, numbers)
-    state, lost, refused = load_state(system, stored)
+    state, now, base, lost = restore_state(scene, system, stored, was or numbers, numbers, base)
     poses = live_session.clamp_pose(pose.reshape(-1, 7), system.cell.actuator.stroke)
-    now = snapshot.dump(system, state)
-    base = fit_base(None if refused else base, state)
     running = Running(
         scene=scene,
         system=system,
@@ -277,12 +274,11 @@ def restore(
         session_poses = running.poses[: len(running.numbers)]
         running = replace(running, system=system, monitor=monitor, poses=session_poses)
     was = was or name_fingers(running.numbers, len(poses))
-    stored = change_fingers(running.scene, running.system, stored, was, running.numbers)
     if was != running.numbers:
         poses = match_poses(poses, was, running.poses, running.numbers)
-    state = load_state(running.system, stored).state
-    now = snapshot.dump(running.system, state)
-    base = fit_base(base, state)
+    state, now, base, _ = restore_state(
+        running.scene, running.system, stored, was, running.numbers, base
+    )
     tick = running.tick if tick is None else tick
     recording = running.recording and running.recording.cut_at_tick(tick, state.period)
     gestures = tuple(gesture for gesture in running.gestures if gesture.period < state.period)
