@@ -119,7 +119,6 @@ def draw_all(paths, kind, images):
 FORMED = {
     "R": (LOWERED, TURNED, (840, 226)),
     "X": (RAISED, TURNED, (735, 157)),
-    "logo": (RAISED, AS_DRAWN, (1530, 315)),
 }
 
 
