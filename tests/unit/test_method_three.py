@@ -4,15 +4,17 @@ import math
 
 import numpy as np
 import pytest
+from digiclay.core.base.errors import ParameterError
 from digiclay.core.control.finger_estimate import FingerFilter, Spread, invert_six
 from digiclay.core.control.flow_servo import make_flow_servo
 from digiclay.core.control.servo import Tracking, lock_overloaded
+from digiclay.core.model.actuator import Supply
 from digiclay.core.model.fingertip import Fingertip, compute_forms, compute_underside
 from digiclay.core.model.valve import Valve
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.toml_table import resolve
 
-from tests.assemble import make_basis, make_system, table
+from tests.assemble import make_basis, make_system, refused_in_a_line, table
 from tests.measured import measure
 
 PERIOD, BAND = 5e-3, 1e-6
@@ -145,6 +147,12 @@ def test_the_opening_gives_the_speed_asked_for_under_load(orifice, force):
     # refines it.
     assert cell.flow.flow(command, drop) / cell.actuator.area == pytest.approx(asked, rel=0.03)
     assert speeds[0] == pytest.approx(asked)
+
+
+@pytest.mark.parametrize("name", ["high", "low"])
+def test_a_reservoir_that_moves_no_free_pin_is_refused(name):
+    with refused_in_a_line(ParameterError, f"supply.{name} must move pins without a load"):
+        servo_of(cell_of(supply=Supply(**{name: 0.0})))
 
 
 @pytest.mark.parametrize("dead_time", [0.0, 1e-3, 7e-3, 20e-3])

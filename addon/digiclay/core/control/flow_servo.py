@@ -12,6 +12,7 @@ from functools import cached_property
 import numpy as np
 
 from ..base.arrays import Constants, Floats
+from ..base.errors import ParameterError
 from ..model.delay import Queue
 from ..model.physics import Cell
 from .pin_motion import OPENINGS, find_free_speeds
@@ -133,6 +134,10 @@ class BalancingServo(FlowServo):
 def make_flow_servo(cell: Cell, period: float, dead_time: float, dead_band: float) -> FlowServo:
     """Return a servo that aims two periods ahead, plus the whole periods of the dead time, s."""
     area, supply = cell.actuator.area, cell.supply
+    for name in ("high", "low"):
+        if getattr(supply, name) == 0.0:
+            rule = "must move pins without a load for Method III, control.method = hybrid"
+            raise ParameterError("supply", name, rule, "0 Pa")
     up, down = find_free_speeds(cell, 1.0), find_free_speeds(cell, -1.0)
     ratios = np.concatenate((-down[::-1] / down[-1], up[1:] / up[-1]))
     openings = np.concatenate((-OPENINGS[::-1], OPENINGS[1:]))
