@@ -170,5 +170,7 @@ def test_on_its_own_ground_a_centroid_that_moves_back_by_little_does_not_reverse
     assert update_heading(east, 0.0, 2e-3, 1.5e-3, 6e-3).toward_y == 1.0
     assert update_heading(east, -0.9e-3, 2e-3, 1.5e-3, 6e-3).toward_y > 0.9
     assert update_heading(east, -1.3e-3, 2e-3, 1.5e-3, 6e-3) == east
+    # One that rests has no other direction, however short the travel.
+    assert update_heading(east, 0.0, 0.0, 1e-12) == east
     for ground, reversal in (("cell", 6e-3), ("edge", 1.5e-3)):
         assert make_system(control=VirtualMaster(ground=ground)).controller.reversal == reversal

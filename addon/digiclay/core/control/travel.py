@@ -68,7 +68,7 @@ def update_heading(
     dx, dy = x - heading.x, y - heading.y
     gone = math.hypot(dx, dy)
     along = dx * heading.toward_x + dy * heading.toward_y
-    if gone < travel - TIE or (gone < reversal - TIE and along < BACK * gone - TIE):
+    if not gone or gone < travel - TIE or (gone < reversal - TIE and along < BACK * gone - TIE):
         return heading
     return Heading(x, y, dx / gone, dy / gone)
 
