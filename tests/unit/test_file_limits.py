@@ -127,6 +127,13 @@ def test_a_history_that_is_not_its_scenes_is_not_unpacked(tmp_path, arrays, said
     assert said in refused(lambda: read_run(folder, "height"))
 
 
+@pytest.mark.parametrize("kind", ["f2", "f4", ">f8", "i1"])
+def test_numbers_that_another_program_wrote_in_fewer_bytes_are_those_of_a_run(tmp_path, kind):
+    folder = history(tmp_path, force=np.full((11, 4), 120, kind))
+    force = read_run(folder, "force").history["force"]
+    assert (force.dtype, force.min(), force.max()) == (np.float64, 120.0, 120.0)
+
+
 def test_a_history_that_does_not_fit_into_memory_is_not_unpacked(tmp_path):
     # 20 million cells over 10 000 rows are what such a scene would leave: 1.6 TB.
     scene = resolve({"layout": {"rows": 4472, "columns": 4472}, "simulation": {"duration": 50.0}})

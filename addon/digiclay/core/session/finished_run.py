@@ -1,5 +1,6 @@
 """Finished run, read from its folder."""
 
+import math
 import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -105,7 +106,7 @@ def read_run(folder: Path, *names: str) -> Run:
             ]
             heads = read_heads(archive, wanted)
             _refuse(path, scene, heads)
-            history = {name: read_array(archive, name) for name in heads}
+            history = {name: _read_history_array(archive, name) for name in heads}
     except (OSError, ValueError, KeyError, EOFError, *BROKEN_ZIP) as error:
         raise OutputError(f"{path} cannot be read as a run's history: {error}.") from None
     for name, values in history.items():
@@ -117,6 +118,12 @@ def read_run(folder: Path, *names: str) -> Run:
     if (np.diff(history["time"]) <= 0.0).any():
         raise OutputError(f"{path}: time must increase from row to row.")
     return Run(scene, history)
+
+
+def _read_history_array(archive: zipfile.ZipFile, name: str) -> Array:
+    """Read an array; numbers of fewer bytes, by another program, become those a run records."""
+    values = read_array(archive, name)
+    return values.astype(np.float64, copy=False) if HISTORY_ARRAYS[name].kinds == "if" else values
 
 
 def read_result(folder: Path) -> Result:
@@ -157,7 +164,10 @@ def _refuse(path: Path, scene: Scene, heads: Mapping[str, Head]) -> None:
             raise OutputError(
                 f"{path}: {name} must hold {KINDS[kinds]} of at most 8 bytes (got {head.kind})."
             )
-    size, free = sum(head.size for head in heads.values()), measure_available_memory()
+    size, free = (
+        8 * sum(math.prod(head.shape) for head in heads.values()),
+        measure_available_memory(),
+    )
     if size > free:
         rule = f"must fit into the {free / 1e9:.3g} GB of free memory"
         raise OutputError(f"{path} {rule} (got {size / 1e9:.3g} GB of {', '.join(heads)}).")
