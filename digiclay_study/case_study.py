@@ -169,13 +169,12 @@ def _place(
     file: Path, source: Table, cache: ReadParts, changes: Mapping[str, str]
 ) -> tuple[Scene, tuple[float, float]]:
     """Return a scene with changes that drags and lifts, and start and end of the drag, s."""
-    settings = [Setting(key, word, "STUDY") for key, word in changes.items()]
-    stroke = {
-        key.removeprefix(STROKE): read_value(word)
-        for key, word, _ in settings
-        if key.startswith(STROKE)
-    }
-    settings = [each for each in settings if not each.key.startswith(STROKE)]
+    stroke, settings = dict[str, Any](), list[Setting]()
+    for key, word in changes.items():
+        if key.startswith(STROKE):
+            stroke[key.removeprefix(STROKE)] = read_value(word)
+        else:
+            settings.append(Setting(key, word, "STUDY"))
     scene = make_scene(file, source, settings, cache)
     motion = read_part("stroke", Stroke, {}, stroke)
     trial, start, end = make_trial(scene, motion, motion.speed)

@@ -1,6 +1,5 @@
 """The wheel in Pythons that have nothing else: lowest, usual and highest versions of its libraries."""
 
-import ast
 import functools
 import json
 import os
@@ -15,6 +14,7 @@ import pytest
 from digiclay import __version__
 from digiclay.cli import main
 
+from tests.form.test_architecture import imports
 from tests.other_process import carry_out
 from tests.scene_files import command
 from tests.timeouts import TIMEOUT
@@ -93,18 +93,12 @@ def install_pytest(bare, folder):
 @functools.cache
 def _needed(path):
     found = set()
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-        names = []
-        if isinstance(node, ast.Import):
-            names = [alias.name for alias in node.names]
-        elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
-            names = [node.module]
-        for name in names:
-            helper = ROOT / f"{name.replace('.', '/')}.py"
-            if name.startswith("tests.") and helper.is_file():
-                found |= _needed(helper)
-            elif name.split(".")[0] not in sys.stdlib_module_names:
-                found.add(name)
+    for _, name, _ in imports(path):
+        helper = ROOT / f"{name.replace('.', '/')}.py"
+        if name.startswith("tests.") and helper.is_file():
+            found |= _needed(helper)
+        elif name.split(".")[0] not in {"", *sys.stdlib_module_names}:
+            found.add(name)
     return frozenset(found)
 
 
@@ -112,11 +106,8 @@ def find_core_tests():
     """Return the files of tests that need the core and nothing that the wheel does not bring along."""
 
     def fits(path):
-        names = _needed(path)
-        others = [name for name in names if name.split(".")[0] not in CORE_ONLY]
-        return (
-            any(names) and bool(others) and all(name.startswith("digiclay.core") for name in others)
-        )
+        others = [name for name in _needed(path) if name.split(".")[0] not in CORE_ONLY]
+        return others and all(name.startswith("digiclay.core") for name in others)
 
     files = [
         path for folder in FOLDERS for path in sorted((ROOT / "tests" / folder).glob("test_*.py"))

@@ -1,6 +1,7 @@
 """Control methods of one's own in Python: classes in memory, files, what their runs can be restored to."""
 
 import pickle
+from functools import partial
 from pathlib import Path
 
 import digiclay
@@ -14,6 +15,7 @@ from tests.own_methods import PAD, Mine, forgotten, write_method
 from tests.scene_files import read_text
 
 pytestmark = pytest.mark.usefixtures("here", "no_methods")
+run = partial(digiclay.run, errors=False)
 
 
 def make_again():
@@ -30,9 +32,9 @@ def make_again():
 def test_a_class_in_memory_runs_as_the_same_one_in_a_file(tap):
     write_method(Path())
     changes = {"control.yield_force": "20 mN"}
-    mine = digiclay.run(digiclay.scene(tap, {**changes, "control.method": Mine}), errors=False)
-    filed = digiclay.run(
-        digiclay.scene(tap, {**changes, "control.method": "pad.py:SoftPad"}), errors=False
+    mine, filed = (
+        run(digiclay.scene(tap, {**changes, "control.method": method}))
+        for method in (Mine, "pad.py:SoftPad")
     )
     np.testing.assert_array_equal(mine.history["height"], filed.history["height"])
     assert np.ptp(mine.history["height"]) > 1e-4
@@ -40,19 +42,21 @@ def test_a_class_in_memory_runs_as_the_same_one_in_a_file(tap):
 
 
 def test_a_saved_run_of_a_class_in_memory_says_what_is_missing_and_is_never_reloaded_wrongly(tap):
-    run = digiclay.run(digiclay.scene(tap, {"control.method": Mine}), errors=False)
+    mine = run(digiclay.scene(tap, {"control.method": Mine}))
     with pytest.warns(
         UserWarning, match=r"^out has parameters and results of Mine, but not its code"
     ) as said:
-        run.save("out")
+        mine.save("out")
     assert "\n" not in str(said[0].message)
     assert not Path("out/method.py").exists()
-    assert digiclay.load("out").scene == run.scene
+    assert digiclay.load("out").scene == mine.scene
     other = make_again()
     digiclay.scene("tap", {"control.method": other})
     with pytest.warns(UserWarning, match="^out was not run with the code of mine that is loaded"):
         digiclay.load("out")
-    np.testing.assert_array_equal(digiclay.run(run.scene).history["height"], run.history["height"])
+    np.testing.assert_array_equal(
+        digiclay.run(mine.scene).history["height"], mine.history["height"]
+    )
     for ask in (
         lambda scene: digiclay.scene(scene, {}),
         lambda scene: digiclay.sweep(scene, {"layout.rows": [11]}, "lag"),
@@ -60,14 +64,14 @@ def test_a_saved_run_of_a_class_in_memory_says_what_is_missing_and_is_never_relo
         with refused_in_a_line(
             DigiclayError, "^The scene's method mine must be of the code that was loaded"
         ):
-            ask(run.scene)
+            ask(mine.scene)
 
 
 def test_a_run_whose_method_is_not_loaded_keeps_its_results_and_is_not_simulated_without_it(tap):
     write_method(Path())
     scene = digiclay.scene(tap, {"control.method": "pad.py:SoftPad"})
     with forgotten():
-        digiclay.run(scene, errors=False).save("out")
+        run(scene).save("out")
     assert Path("out/method.py").read_text(encoding="utf-8") == PAD
     code = """
 import digiclay
@@ -103,10 +107,10 @@ def test_a_changed_file_replaces_its_method_and_scenes_of_the_former_code_keep_t
     ):
         digiclay.scene(scene, {"layout.rows": 9})
     # A scene of the former code runs with it, and is saved with it.
-    runs = [digiclay.run(one, errors=False) for one in (scene, changed)]
-    codes = [read_text(run.save(f"run{number}") / "method.py") for number, run in enumerate(runs)]
+    runs = [run(scene), run(changed)]
+    codes = [read_text(done.save(f"run{i}") / "method.py") for i, done in enumerate(runs)]
     assert codes[0] == PAD != codes[1]
-    assert len({run.metrics["versions"]["method"] for run in runs}) == 2
+    assert len({done.metrics["versions"]["method"] for done in runs}) == 2
     assert np.abs(runs[0].history["height"] - runs[1].history["height"]).max() > 1e-5
 
 
