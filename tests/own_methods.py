@@ -8,6 +8,8 @@ from digiclay.cli import main
 from digiclay.core.control.methods import list_added, remove_method
 from digiclay.core.scene.scene_source import Setting, find, load
 
+from tests.scene_files import write_text
+
 HEAD = '''
 """Method of a test."""
 from dataclasses import dataclass
@@ -65,7 +67,7 @@ class Mine(digiclay.Method):
 def write_method(folder, text=PAD, name="pad.py"):
     """Write the file of a method, and return it."""
     path = folder / name
-    path.write_text(text, encoding="utf-8")
+    write_text(path, text)
     return path
 
 

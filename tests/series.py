@@ -4,7 +4,7 @@ from contextlib import redirect_stderr
 from io import StringIO
 from pathlib import Path
 
-from tests.scene_files import call
+from tests.scene_files import call, read_text, write_text
 
 ENDLESS = """
 scenes = ["tap"]
@@ -19,12 +19,12 @@ JOB, RUN = Path("two/jobs/tap-quick"), Path("two/runs/tap-quick")
 
 def write(said):
     path = Path("two.toml").resolve()
-    path.write_text(said, encoding="utf-8")
+    write_text(path, said)
     return path
 
 
 def index():
-    return Path("two/index.html").read_text(encoding="utf-8")
+    return read_text(Path("two/index.html"))
 
 
 def prepare(said=ENDLESS):

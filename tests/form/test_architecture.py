@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from tests.other_process import carry_out
-from tests.scene_files import command
+from tests.scene_files import command, read_text
 
 ROOT = Path(__file__).parents[2]
 PACKAGE = ROOT / "addon" / "digiclay"
@@ -88,7 +88,7 @@ def core_modules() -> dict[str, Path]:
 
 @functools.cache
 def parse(path: Path) -> ast.Module:
-    return ast.parse(path.read_text(encoding="utf-8"))
+    return ast.parse(read_text(path))
 
 
 @functools.cache
@@ -221,11 +221,11 @@ def test_the_extension_never_imports_what_stands_beside_it() -> None:
     files = [path for path in PACKAGE.rglob("*.py") if path != DOOR]
     assert find_imports(files, BESIDE.__contains__) == []
     installed = BESIDE.keys() - {"benchmarks"}
-    texts = {path.name: path.read_text(encoding="utf-8") for path in files}
+    texts = {path.name: read_text(path) for path in files}
     assert [
         name for name, text in texts.items() if any(package in text for package in installed)
     ] == []
-    assert all(package in DOOR.read_text(encoding="utf-8") for package in installed)
+    assert all(package in read_text(DOOR) for package in installed)
 
 
 @pytest.mark.parametrize("name", BESIDE)
@@ -237,7 +237,7 @@ def test_what_stands_beside_the_extension_imports_no_part_of_its_neighbor(name: 
 
 
 def test_no_python_file_is_over_the_limit() -> None:
-    sizes = {path: len(path.read_text(encoding="utf-8").splitlines()) for path in tracked("*.py")}
+    sizes = {path: len(read_text(path).splitlines()) for path in tracked("*.py")}
     assert {
         str(path.relative_to(ROOT)): size for path, size in sizes.items() if size > MAX_LINES
     } == {}
@@ -252,16 +252,12 @@ def test_no_package_registry_and_no_path_of_one_machine_is_named() -> None:
 def test_requirements_are_exact_pins_without_a_place_to_get_them() -> None:
     pin = re.compile(r"#.*|-r [\w.-]+\.txt|[\w.-]+==[\w.]+|")
     files = tracked("requirements/*.txt")
-    lines = [
-        (path.name, line)
-        for path in files
-        for line in path.read_text(encoding="utf-8").splitlines()
-    ]
+    lines = [(path.name, line) for path in files for line in read_text(path).splitlines()]
     assert [pair for pair in lines if not pin.fullmatch(pair[1])] == []
 
 
 def test_the_extension_and_the_package_have_one_version() -> None:
     import digiclay
 
-    manifest = tomllib.loads((PACKAGE / "blender_manifest.toml").read_text(encoding="utf-8"))
+    manifest = tomllib.loads(read_text(PACKAGE / "blender_manifest.toml"))
     assert manifest["version"] == digiclay.__version__

@@ -22,6 +22,7 @@ from digiclay.core.scene.schema import SECTIONS, import_parameters
 from digiclay.core.studies.evaluation import FIGURES
 
 from benchmarks.kinds import parser as benchmarks_parser
+from tests.scene_files import read_text
 
 ROOT = Path(__file__).parents[2]
 PAGES = sorted(
@@ -96,7 +97,7 @@ def _definitions() -> dict[str, set[str]]:
     defined: dict[str, set[str]] = {}
     for path in (path for folder in PACKAGES for path in (ROOT / folder).rglob("*.py")):
         names = defined.setdefault(path.stem, set())
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        for node in ast.walk(ast.parse(read_text(path))):
             if isinstance(node, ast.FunctionDef | ast.ClassDef):
                 names.add(node.name)
             elif isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
@@ -132,9 +133,7 @@ def find_dead_links(page: Path, text: str) -> list[str]:
     for target in re.findall(r"\]\((?!\w+://|(?:\.\./)?reference/)([^)\s]+)\)", text):
         name, _, anchor = target.partition("#")
         file = page.parent / name if name else page
-        if not file.exists() or (
-            anchor and anchor not in _anchors(file.read_text(encoding="utf-8"))
-        ):
+        if not file.exists() or (anchor and anchor not in _anchors(read_text(file))):
             dead.append(target)
     return dead
 
@@ -186,19 +185,19 @@ WRONG = """\
 
 @pytest.mark.parametrize("check", CHECKS, ids=lambda check: check.__name__)
 def test_no_page_has_a_fault_that_the_check_finds(check: Callable[[Path, str], list[str]]) -> None:
-    faults = {page.name: check(page, page.read_text(encoding="utf-8")) for page in PAGES}
+    faults = {page.name: check(page, read_text(page)) for page in PAGES}
     assert {name: found for name, found in faults.items() if found} == {}
     assert len(check(ROOT / "README.md", WRONG)) == 1
 
 
 def test_all_fourteen_equations_have_a_row_and_places_that_exist() -> None:
-    text = (ROOT / "docs" / "equations.md").read_text(encoding="utf-8")
+    text = read_text(ROOT / "docs" / "equations.md")
     assert {int(n) for n in re.findall(r"^\| (\d+)", text, re.MULTILINE)} == set(range(1, 15))
     named = re.findall(r"`core/([\w/]+)\.py: ([\w.]+)`", text)
     assert len(named) > 12
     absent = []
     for module, name in named:
-        code = (ROOT / "addon" / "digiclay" / "core" / f"{module}.py").read_text(encoding="utf-8")
+        code = read_text(ROOT / "addon" / "digiclay" / "core" / f"{module}.py")
         patterns = (rf"\b(def|class) {part}\b|^ *{part}\b *[:=]" for part in name.split("."))
         if not all(re.search(pattern, code, re.MULTILINE) for pattern in patterns):
             absent.append(f"{module}: {name}")
@@ -206,15 +205,15 @@ def test_all_fourteen_equations_have_a_row_and_places_that_exist() -> None:
 
 
 def test_every_parameter_says_where_it_comes_from() -> None:
-    page = (ROOT / "docs" / "nomenclature.md").read_text(encoding="utf-8")
+    page = read_text(ROOT / "docs" / "nomenclature.md")
     sources = {source for *_, quantity in _parameters() for source in quantity.source.split(", ")}
     # The paper, derived, chosen; or a reference of the page, and none without a value.
     assert sources - {"P", "D", "C"} == set(re.findall(r"^- \*\*(.+?)\*\*:", page, re.MULTILINE))
 
 
 def test_the_page_of_the_package_lists_every_extra_that_is_for_its_users() -> None:
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    page = (ROOT / project["readme"]).read_text(encoding="utf-8")
+    project = tomllib.loads(read_text(ROOT / "pyproject.toml"))["project"]
+    page = read_text(ROOT / project["readme"])
     assert sorted(re.findall(r"^\| `digiclay\[(\w+)\]` \|", page, re.MULTILINE)) == sorted(
         project["optional-dependencies"].keys() - {"dev"}
     )
@@ -238,7 +237,7 @@ NAMED = {
 def test_a_page_names_each_entry_of_a_table(
     page: str, heading: str, entries: Iterable[str], form: str
 ) -> None:
-    before, _, rest = (ROOT / page).read_text(encoding="utf-8").partition(f"\n{heading}\n")
+    before, _, rest = read_text(ROOT / page).partition(f"\n{heading}\n")
     section = rest.partition("\n#")[0]
     lacking = [name for name in entries if form.format(name) not in section.replace("glTF", "GLTF")]
     assert lacking == [], (
@@ -259,7 +258,7 @@ t_i t_j u_i u_j v_free w_i w_j w_max w_min ΔP_c β_i ν_i
 
 def read_prose(path: Path) -> str:
     """Return the lines of a file without what is no prose: code of a page, names in Python."""
-    text = path.read_text(encoding="utf-8")
+    text = read_text(path)
     if path.suffix == ".py":
         kept = {
             line
@@ -277,7 +276,7 @@ def read_prose(path: Path) -> str:
 
 def test_every_symbol_of_pages_and_of_the_paper_is_declared() -> None:
     """A parameter whose symbol has changed leaves its former one behind."""
-    page = (ROOT / "docs" / "nomenclature.md").read_text(encoding="utf-8")
+    page = read_text(ROOT / "docs" / "nomenclature.md")
     declared = {quantity.symbol for *_, quantity in _parameters()}
     variables = set(
         re.findall(r"[^\s|,]+", " ".join(re.findall(r"^\| ([^|]+) \|", page, re.MULTILINE)))
@@ -305,9 +304,7 @@ def _targets(entry: Any) -> Iterator[str]:
 
 
 def test_the_navigation_names_each_page_once_and_none_that_is_missing() -> None:
-    listed = list(
-        _targets(yaml.safe_load((ROOT / "mkdocs.yml").read_text(encoding="utf-8"))["nav"])
-    )
+    listed = list(_targets(yaml.safe_load(read_text(ROOT / "mkdocs.yml"))["nav"]))
     written = [name for name in listed if name not in MADE and not name.startswith("reference/")]
     pages = {path.relative_to(ROOT / "docs").as_posix() for path in (ROOT / "docs").rglob("*.md")}
     assert sorted(written) == sorted(pages), "each page needs one line under nav in mkdocs.yml"
@@ -316,16 +313,14 @@ def test_the_navigation_names_each_page_once_and_none_that_is_missing() -> None:
 
 def test_every_picture_is_shown_and_has_a_row_of_the_table() -> None:
     folder = ROOT / "docs" / "pictures"
-    targets = [
-        (page, found) for page in PAGES for found in SHOWN.findall(page.read_text(encoding="utf-8"))
-    ]
+    targets = [(page, found) for page in PAGES for found in SHOWN.findall(read_text(page))]
     shown = {(page.parent / target).resolve() for page, target in targets}
     # The page of the sample scenes is made at the build.
     shown |= {folder / "samples" / f"{name}.jpg" for name in list_samples()}
     lacking = [path.stem for path in shown if not path.exists()]
     assert lacking == [], "draw each by 'python tools/doc_pictures.py samples/NAME.jpg'"
     # The table in CONTRIBUTING.md has the command of each.
-    table = ROW.findall((ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8"))
+    table = ROW.findall(read_text(ROOT / "CONTRIBUTING.md"))
     patterns = [name for names, _ in table for name in re.findall(r"`([^`]+)`", names)]
     inside = (
         path.relative_to(folder).as_posix() if folder in path.parents else path.name

@@ -11,11 +11,11 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from tests.scene_files import read_text
+
 ROOT = Path(__file__).parents[2]
 PACKAGE = ROOT / "addon" / "digiclay"
-MANIFEST: dict[str, Any] = tomllib.loads(
-    (PACKAGE / "blender_manifest.toml").read_text(encoding="utf-8")
-)
+MANIFEST: dict[str, Any] = tomllib.loads(read_text(PACKAGE / "blender_manifest.toml"))
 LONGEST = 64
 #: Licenses that the platform accepts for code and, CC0, for assets, of those that could ever fit.
 LICENSES = {"GPL-3.0-or-later", "CC0-1.0", "MIT"}
@@ -52,7 +52,7 @@ def modules() -> Iterator[tuple[str, str]]:
     for path in sorted(PACKAGE.rglob("*.py")):
         name = path.relative_to(PACKAGE).as_posix()
         if f"/{name}" not in left_out:
-            yield name, path.read_text(encoding="utf-8")
+            yield name, read_text(path)
 
 
 @functools.cache
@@ -99,7 +99,7 @@ def test_the_manifest_has_what_the_platform_takes_and_every_copyright_a_year_and
     lines = MANIFEST["copyright"]
     assert [line for line in lines if not re.fullmatch(r"\d{4}(-\d{4})? \S.*", line)] == []
     # The bundled wheel is of others: the platform asks that they are named.
-    bundled = (ROOT / "requirements" / "extension.txt").read_text(encoding="utf-8")
+    bundled = read_text(ROOT / "requirements" / "extension.txt")
     assert re.findall(r"^([\w-]+)==", bundled, re.MULTILINE) == ["trimesh"]
     assert any("Michael Dawson-Haggerty" in line for line in lines)
 
@@ -116,7 +116,7 @@ def test_every_license_has_its_text_and_manifest_package_and_samples_name_the_sa
         "GNU GENERAL PUBLIC LICENSE\n                       Version 3"
         in (ROOT / "LICENSE").read_text()
     )
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    project = tomllib.loads(read_text(ROOT / "pyproject.toml"))["project"]
     # The wheel on a package index has no trimesh in it, the extension has.
     assert project["license"].split(" AND ") == [
         one.removeprefix("SPDX:") for one in MANIFEST["license"][:2]
@@ -125,8 +125,8 @@ def test_every_license_has_its_text_and_manifest_package_and_samples_name_the_sa
         PACKAGE / "sample_shapes" / name / "README.md"
         for name in ("", "shapes", "sessions", "displays", "bodies")
     ]
-    assert all("CC0-1.0" in page.read_text(encoding="utf-8") for page in pages)
-    assert not any("License:\nGPL" in page.read_text(encoding="utf-8") for page in pages)
+    assert all("CC0-1.0" in read_text(page) for page in pages)
+    assert not any("License:\nGPL" in read_text(page) for page in pages)
 
 
 def find_refused(text: str) -> set[str]:

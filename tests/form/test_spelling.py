@@ -4,6 +4,7 @@ import re
 from collections import Counter
 
 from tests.form.test_architecture import ROOT, tracked
+from tests.scene_files import read_text
 
 BRITISH = re.compile(
     r"colour|behaviour|neighbour|favour|honour|vapour|centre|centring|fibre|litre|metre|grey|licence|defence"
@@ -38,10 +39,7 @@ def test_no_word_is_spelled_the_british_way() -> None:
         for path in tracked("*.py", "*.md", "*.toml", "*.txt")
         if ROOT / "tests" / "samples" not in path.parents and path.name not in UNREAD
     ]
-    texts = {
-        str(path.relative_to(ROOT)): READ.sub("", path.read_text(encoding="utf-8"))
-        for path in files
-    }
+    texts = {str(path.relative_to(ROOT)): READ.sub("", read_text(path)) for path in files}
     found = {
         name: [match.group() for match in BRITISH.finditer(text)] for name, text in texts.items()
     }

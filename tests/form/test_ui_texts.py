@@ -9,6 +9,8 @@ from string import Formatter
 import digiclay
 from digiclay import translations
 
+from tests.scene_files import read_text
+
 ROOT = Path(digiclay.__file__).parent
 FOLDERS = ("operators", "panels", "press", "overlay", "live")
 WORD = re.compile(r"[A-Za-z]{3,}")
@@ -34,7 +36,7 @@ NAMES = (
 def source() -> Iterator[tuple[str, ast.Module]]:
     for folder in FOLDERS:
         for path in sorted((ROOT / folder).glob("*.py")):
-            yield f"{folder}/{path.name}", ast.parse(path.read_text(encoding="utf-8"))
+            yield f"{folder}/{path.name}", ast.parse(read_text(path))
 
 
 def inner(tree: ast.AST, *kinds: type[ast.AST]) -> set[int]:

@@ -7,10 +7,10 @@ from pathlib import Path
 import pytest
 from digiclay import __version__
 
+from tests.scene_files import read_text
+
 ROOT = Path(__file__).parents[2]
-DEPENDENCIES = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"][
-    "dependencies"
-]
+DEPENDENCIES = tomllib.loads(read_text(ROOT / "pyproject.toml"))["project"]["dependencies"]
 #: Of each library the lowest version and the major version that is too high.
 BOUNDS = {
     name: (low, int(above))
@@ -24,7 +24,7 @@ def numbers(version: str) -> list[int]:
 
 
 def read_pins(name: str) -> dict[str, list[int]]:
-    text = (ROOT / "requirements" / f"{name}.txt").read_text(encoding="utf-8")
+    text = read_text(ROOT / "requirements" / f"{name}.txt")
     pins = dict(re.findall(r"^([\w-]+)==([\d.]+)$", text, re.MULTILINE))
     return {library: numbers(pin) for library, pin in pins.items() if library in BOUNDS}
 
@@ -45,5 +45,5 @@ def test_every_pin_lies_between_the_lowest_and_the_highest(file: str) -> None:
 
 @pytest.mark.parametrize("file", ["CITATION.cff", "docs/paper.md"])
 def test_a_citation_has_the_version_of_the_program(file: str) -> None:
-    text = (ROOT / file).read_text(encoding="utf-8")
+    text = read_text(ROOT / file)
     assert re.findall(r"^ *version *[:=] *{?([\d.]+)", text, re.MULTILINE) == [__version__]

@@ -1,6 +1,5 @@
 """Ten seconds of the paper's session as animated files: small, and their heights read by other programs."""
 
-import json
 import sys
 
 import numpy as np
@@ -8,6 +7,8 @@ import pytest
 from alembic3d import Abc, AbcGeom
 from digiclay.core.session.finished_run import read_run
 from pxr import Usd
+
+from tests.scene_files import read_json
 
 from .conftest import told
 
@@ -66,7 +67,7 @@ def glb(path, kind):
     """Read the pins of a GLB by assimp, in m and y up; it leaves out the animation of a skin."""
     whole = path.with_suffix(".json")
     told("assimp", "export", path, whole, "-fassjson")
-    (session,) = json.loads(whole.read_text(encoding="utf-8"))["animations"]
+    (session,) = read_json(whole)["animations"]
     channels = {each["name"]: each["positionkeys"] for each in session["channels"]}
     paths = [channels[f"pin_{number}"] for number in range(len(channels))]
     return [np.array([keys[frame][1][1] for keys in paths]) for frame in FRAMES]

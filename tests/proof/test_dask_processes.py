@@ -17,7 +17,14 @@ from distributed import Client
 from tests.other_process import finish
 from tests.own_methods import forgotten, write_method
 from tests.package_copy import copy_package
-from tests.scene_files import SCENE, command, folder_with, timeless
+from tests.scene_files import (
+    SCENE,
+    command,
+    folder_with,
+    read_text,
+    timeless,
+    write_text,
+)
 from tests.timeouts import TIMEOUT, wait_until
 
 ADDON = Path(__file__).parents[2] / "addon"
@@ -149,7 +156,7 @@ def test_a_piece_that_no_worker_survives_fails_alone(here, start):
 
 def test_a_worker_that_dies_when_it_is_asked_for_its_versions_changes_nothing(here, start):
     other = copy_package(here / "other") / "addon"
-    (other / "digiclay/__init__.py").write_text("import os\nos._exit(1)\n", encoding="utf-8")
+    write_text(other / "digiclay/__init__.py", "import os\nos._exit(1)\n")
     _, address = start_scheduler(start, here)
     workers = [start_worker(start, address, "--no-nanny", addon=addon) for addon in (other, ADDON)]
     with Client(address, set_as_default=False) as client:
@@ -163,8 +170,8 @@ def test_a_worker_that_dies_when_it_is_asked_for_its_versions_changes_nothing(he
 def test_a_worker_of_another_version_is_named_at_once_and_when_it_joins(here, start):
     other = copy_package(here / "other") / "addon"
     front = other / "digiclay" / "core" / "version.py"
-    text = front.read_text(encoding="utf-8")
-    front.write_text(text.replace('__version__ = "', '__version__ = "9.'), encoding="utf-8")
+    text = read_text(front)
+    write_text(front, text.replace('__version__ = "', '__version__ = "9.'))
     _, address = start_scheduler(start, here)
     first = start_worker(start, address, "--no-nanny")
     words = ["digiclay", *SWEEP, *HOURS, "--scheduler", address, "--out", "far"]

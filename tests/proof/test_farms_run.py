@@ -1,6 +1,5 @@
 """Farms' files are executed: a template with a film by openjd, lists of commands by a shell."""
 
-import json
 import re
 import subprocess
 import sys
@@ -10,6 +9,7 @@ import pytest
 from digiclay.cli import main
 
 from tests.proof.conftest import told
+from tests.scene_files import read_json, read_text, write_text
 from tests.timeouts import TIMEOUT
 
 JOBS = """
@@ -32,7 +32,7 @@ def openjd(*arguments):
 
 def test_openjd_checks_a_template_and_runs_its_steps_in_order(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    Path("my film.toml").write_text(JOBS, encoding="utf-8")
+    write_text(Path("my film.toml"), JOBS)
     out = tmp_path / "das Büro's Laufwerk"
     submit = ["--submit", "openjd", "--chunk", "3", "--quiet"]
     assert main(["batch", "my film.toml", "--out", str(out), *submit]) == 0
@@ -46,9 +46,9 @@ def test_openjd_checks_a_template_and_runs_its_steps_in_order(tmp_path, monkeypa
         ("3+3", "drawn"),
     ]
     run = out / "runs" / "tap-short"
-    files = json.loads((run / "timing.json").read_text(encoding="utf-8"))["files"]
+    files = read_json(run / "timing.json")["files"]
     assert (run / "film.mp4").stat().st_size == files["film.mp4"] > 1000
-    assert "1 of 1 jobs done." in (out / "index.html").read_text(encoding="utf-8")
+    assert "1 of 1 jobs done." in read_text(out / "index.html")
     # A task that is sent again ends well and changes nothing.
     before = {path: path.stat().st_mtime_ns for path in run.iterdir()}
     again = openjd("run", template, "-p", f"Python={sys.executable}", "--step", "tap-short: film")
@@ -58,14 +58,12 @@ def test_openjd_checks_a_template_and_runs_its_steps_in_order(tmp_path, monkeypa
 
 def test_a_step_whose_task_fails_stops_those_that_need_it(tmp_path):
     jobs = tmp_path / "two.toml"
-    jobs.write_text(JOBS.replace("0.3", "0.05"), encoding="utf-8")
+    write_text(jobs, JOBS.replace("0.3", "0.05"))
     assert (
         main(["batch", str(jobs), "--out", str(tmp_path / "out"), "--submit", "openjd", "--quiet"])
         == 0
     )
-    (tmp_path / "out" / "jobs" / "tap-short" / "scene.toml").write_text(
-        "name = 3\n", encoding="utf-8"
-    )
+    write_text(tmp_path / "out" / "jobs" / "tap-short" / "scene.toml", "name = 3\n")
     template, program = tmp_path / "out" / "openjd.json", f"Python={sys.executable}"
     done = subprocess.run(
         [sys.executable, "-m", "openjd", "run", template, "-p", program],
@@ -77,7 +75,7 @@ def test_a_step_whose_task_fails_stops_those_that_need_it(tmp_path):
     said = done.stdout + done.stderr
     assert done.returncode != 0
     assert re.findall(r"Running step '(.*)'", said) == ["tap-short: run"]
-    page = (tmp_path / "out" / "index.html").read_text(encoding="utf-8")
+    page = read_text(tmp_path / "out" / "index.html")
     assert "0 of 1 jobs done, 1 failed." in page
 
 
@@ -91,23 +89,23 @@ def test_a_step_whose_task_fails_stops_those_that_need_it(tmp_path):
 )
 def test_the_program_of_a_template_is_named_by_its_kind(program, name, tmp_path):
     jobs, out = tmp_path / "two.toml", tmp_path / "out"
-    jobs.write_text(QUICK, encoding="utf-8")
+    write_text(jobs, QUICK)
     words = ["--program", program] if program else []
     assert (
         main(["batch", str(jobs), "--out", str(out), "--submit", "openjd", *words, "--quiet"]) == 0
     )
     openjd("run", out / "openjd.json", "-p", name)
-    assert "1 of 1 jobs done." in (out / "index.html").read_text(encoding="utf-8")
+    assert "1 of 1 jobs done." in read_text(out / "index.html")
 
 
 def test_a_shell_executes_each_line_of_the_lists_of_cuecmd(tmp_path):
     jobs, out = tmp_path / "two.toml", tmp_path / "schöne 'Tasten' $HOME; #"
-    jobs.write_text(QUICK, encoding="utf-8")
+    write_text(jobs, QUICK)
     assert main(["batch", str(jobs), "--out", str(out), "--submit", "cuecmd", "--quiet"]) == 0
     for path in sorted((out / "cuecmd").iterdir()):
-        for line in path.read_text(encoding="utf-8").splitlines():
+        for line in read_text(path).splitlines():
             subprocess.run(
                 line, shell=True, check=True, timeout=TIMEOUT, capture_output=True, cwd="/"
             )
     assert [path.name for path in (out / "runs").iterdir()] == ["tap-a"]
-    assert "1 of 1 jobs done." in (out / "index.html").read_text(encoding="utf-8")
+    assert "1 of 1 jobs done." in read_text(out / "index.html")

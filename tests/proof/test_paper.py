@@ -1,7 +1,6 @@
 """`digiclay paper --quick`: every file its page names is there, and no claim is left open."""
 
 import csv
-import json
 import re
 
 import numpy as np
@@ -11,6 +10,7 @@ from digiclay.cli import main
 from digiclay_paper.claims import TEXTS
 from digiclay_paper.results import DRAGS
 from digiclay_paper.scenes import COMPARED
+from tests.scene_files import read_json, read_text
 
 
 @pytest.fixture(scope="module")
@@ -22,12 +22,12 @@ def folder(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def text(folder):
-    return (folder / "paper.md").read_text(encoding="utf-8")
+    return read_text(folder / "paper.md")
 
 
 @pytest.fixture(scope="module")
 def numbers(folder):
-    return json.loads((folder / "metrics.json").read_text(encoding="utf-8"))
+    return read_json(folder / "metrics.json")
 
 
 def claims(text):
@@ -46,7 +46,7 @@ def test_every_file_the_page_names_is_there_and_nothing_else(folder, text):
 
 def test_every_figure_is_a_vector_file_with_lettered_panels_and_its_data_beside_it(folder):
     for path in folder.glob("*.svg"):
-        content = path.read_text(encoding="utf-8")
+        content = read_text(path)
         assert content.startswith("<?xml")
         # Letters are outlines, and what they say is a comment beside each.
         letters = re.findall(r"<!-- \(([a-z])\)", content)

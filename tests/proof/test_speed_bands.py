@@ -5,7 +5,7 @@ import numpy as np
 from digiclay.cli import main
 from digiclay.core.studies.speed_limits import measure_speeds
 
-from tests.scene_files import read_json, scene_text
+from tests.scene_files import read_json, scene_text, write_text
 
 #: An orifice known to 5 %: flow, and so the free speed of a pin, to 10 %.
 FITTED = """
@@ -22,8 +22,8 @@ RESOLUTION = 0.5e-3
 
 def test_bands_of_speeds_are_those_of_members_and_no_lift_is_faster_than_its_pins(tmp_path, capsys):
     scene = scene_text(9, 15, (0.0, 0.041), (0.05, 0.038), (0.1, 0.038))
-    (tmp_path / "my.toml").write_text(scene, encoding="utf-8")
-    (tmp_path / "fitted.toml").write_text(FITTED, encoding="utf-8")
+    write_text(tmp_path / "my.toml", scene)
+    write_text(tmp_path / "fitted.toml", FITTED)
     run = tmp_path / "o"
     words = ["--uncertain", str(tmp_path / "fitted.toml"), "--members", "40", "--speed"]
     assert main(["run", str(tmp_path / "my.toml"), *words, "--out", str(run)]) == 0

@@ -7,7 +7,7 @@ from digiclay.core.scene.scene_source import load
 from digiclay.core.studies.evaluation import evaluate_bundle
 from numpy.typing import NDArray
 
-from tests.scene_files import SMALL_BLISTER, rows
+from tests.scene_files import SMALL_BLISTER, rows, write_text
 
 pytest.importorskip("SALib", reason="digiclay[study] is not installed")
 pytest.importorskip("optuna", reason="digiclay[study] is not installed")
@@ -39,7 +39,7 @@ COUNT = 12
 @pytest.fixture(scope="module")
 def scene(tmp_path_factory):
     path = tmp_path_factory.mktemp("grid") / "my.toml"
-    path.write_text(SCENE, encoding="utf-8")
+    write_text(path, SCENE)
     return path
 
 

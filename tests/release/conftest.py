@@ -10,6 +10,7 @@ import pytest
 from digiclay import __version__
 
 from tests.other_process import carry_out
+from tests.scene_files import read_text, write_text
 from tests.timeouts import TIMEOUT
 
 ROOT = Path(__file__).parents[2]
@@ -83,9 +84,9 @@ def leftovers(folder):
 def edit(name, old, new):
 
     def change(folder):
-        text = (folder / name).read_text(encoding="utf-8")
+        text = read_text(folder / name)
         assert old in text, f"{name} has no {old!r}"
-        (folder / name).write_text(text.replace(old, new, 1), encoding="utf-8")
+        write_text(folder / name, text.replace(old, new, 1))
         commit(folder)
 
     return change

@@ -16,7 +16,7 @@ from digiclay.cli import main
 
 from tests.form.test_architecture import imports
 from tests.other_process import carry_out
-from tests.scene_files import command
+from tests.scene_files import command, read_text
 from tests.timeouts import TIMEOUT
 
 ROOT = Path(__file__).parents[2]
@@ -54,7 +54,7 @@ class BarePython:
 
 
 def read_pins(name):
-    text = (ROOT / "requirements" / f"{name}.txt").read_text(encoding="utf-8")
+    text = read_text(ROOT / "requirements" / f"{name}.txt")
     return dict(re.findall(r"^([\w-]+)==([\w.]+)$", text, re.MULTILINE))
 
 

@@ -6,21 +6,21 @@ import sys
 import tomllib
 
 from tests.other_process import carry_out
-from tests.scene_files import command
+from tests.scene_files import command, read_text, write_text
 
 from .conftest import ENVIRONMENT, ROOT, copy_checkout
 
 
 def test_all_extras_fit_into_the_checkout_without_another_numpy(tmp_path):
     checkout = copy_checkout(tmp_path / "a checkout")
-    pins = (checkout / "requirements" / "demo.txt").read_text(encoding="utf-8")
+    pins = read_text(checkout / "requirements" / "demo.txt")
     # As `make demo` sets it up, but without Blender's module, which is 400 MB.
     few = re.findall(r"^(?:numpy|setuptools|trimesh)==.*$", pins, re.MULTILINE)
-    (checkout / "few.txt").write_text("\n".join(few) + "\n", encoding="utf-8")
+    write_text(checkout / "few.txt", "\n".join(few) + "\n")
     here = {"cwd": checkout, "env": ENVIRONMENT | {"GOAL": "demo"}}
     words = ".venv", "few.txt", "3.11", "PYTHON", sys.executable
     carry_out("tools/environment", *words, **here)
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    project = tomllib.loads(read_text(ROOT / "pyproject.toml"))["project"]
     extras = {*project["optional-dependencies"]} - {"blender", "dev"}
     pip = command(
         ".venv/bin/python -m pip --disable-pip-version-check install --dry-run --quiet --report -"

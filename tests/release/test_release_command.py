@@ -22,6 +22,7 @@ from tests.release.conftest import (
     release_command,
     run_release,
 )
+from tests.scene_files import read_text, write_text
 from tests.timeouts import TIMEOUT
 
 ARCHIVES = [f"digiclay-{__version__}{end}" for end in ("-py3-none-any.whl", ".tar.gz", ".zip")]
@@ -35,7 +36,7 @@ def write(name, text):
 
     def change(folder):
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
-        (folder / name).write_text(text, encoding="utf-8")
+        write_text(folder / name, text)
 
     return change
 
@@ -50,7 +51,7 @@ def remove(name):
 
 
 def empty_the_section(folder):
-    text = (folder / CHANGELOG).read_text(encoding="utf-8")
+    text = read_text(folder / CHANGELOG)
     heading = next(line for line in text.splitlines() if line.startswith("## "))
     (folder / CHANGELOG).write_text(
         f"# Changelog\n\n{heading}\n\n## 0.0.1 - 2026-01-01\n\n- First.\n"
@@ -204,7 +205,7 @@ def test_a_release_leaves_its_files_their_checksums_and_an_annotated_tag_with_th
     )
     assert git(released, "tag").split() == [TAG]
     assert git(released, "rev-parse", f"{TAG}^{{commit}}") == git(released, "rev-parse", "HEAD")
-    notes = (released / FOLDER / "release-notes.md").read_text(encoding="utf-8")
+    notes = read_text(released / FOLDER / "release-notes.md")
     assert (
         git(released, "for-each-ref", "--format=%(contents)", f"refs/tags/{TAG}").strip()
         == notes.strip()
@@ -218,8 +219,8 @@ def test_a_release_leaves_its_files_their_checksums_and_an_annotated_tag_with_th
 
 
 def test_the_notes_are_the_newest_section_without_links_to_pages(released):
-    section = (released / CHANGELOG).read_text(encoding="utf-8").split("\n## ")[1]
-    notes = (released / FOLDER / "release-notes.md").read_text(encoding="utf-8")
+    section = read_text(released / CHANGELOG).split("\n## ")[1]
+    notes = read_text(released / FOLDER / "release-notes.md")
     assert notes.startswith(f"# digiclay {__version__}\n\n")
     items = [line for line in section.splitlines() if line.startswith("- ") and "](" not in line]
     assert len(items) > 5

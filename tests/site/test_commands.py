@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import pytest
 
 from tests.form.test_pages import CONTINUED, PAGES, list_lines
+from tests.scene_files import read_text, write_text
 
 ROOT = Path(__file__).parents[2]
 LIST = Path(__file__).with_name("not_executed.toml")
@@ -57,7 +58,7 @@ def find_commands(text: str) -> list[Command]:
 
 @functools.cache
 def _listed() -> dict[str, Any]:
-    return tomllib.loads(LIST.read_text(encoding="utf-8"))
+    return tomllib.loads(read_text(LIST))
 
 
 def _excused() -> set[str]:
@@ -87,7 +88,7 @@ def execute(command: str, folder: Path) -> str:
 def play(text: str, folder: Path, excused: set[str]) -> list[str]:
     """Carry out the commands of a page that are not excused, in a folder with its files; return failures."""
     for name, content in FILE.findall(text):
-        (folder / name).write_text(content, encoding="utf-8")
+        write_text(folder / name, content)
     once = dict.fromkeys(
         command.text for command in find_commands(text) if command.text not in excused
     )
@@ -95,14 +96,12 @@ def play(text: str, folder: Path, excused: set[str]) -> list[str]:
 
 
 def _commands() -> list[Command]:
-    return [
-        command for page in PAGES for command in find_commands(page.read_text(encoding="utf-8"))
-    ]
+    return [command for page in PAGES for command in find_commands(read_text(page))]
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())
 def test_every_command_of_the_page_is_carried_out(page: Path, tmp_path: Path) -> None:
-    assert play(page.read_text(encoding="utf-8"), tmp_path, _excused()) == []
+    assert play(read_text(page), tmp_path, _excused()) == []
 
 
 def test_every_make_of_the_pages_is_carried_out_in_the_checkout_where_it_belongs() -> None:
@@ -131,7 +130,7 @@ def test_every_listed_command_is_on_a_page_and_has_a_reason_and_something_that_s
 
 
 def test_a_command_shown_by_the_whole_check_is_one_of_its_parts() -> None:
-    parts = (ROOT / ".ci" / "run").read_text(encoding="utf-8")
+    parts = read_text(ROOT / ".ci" / "run")
     (shown,) = [group["commands"] for group in _listed()["group"] if group["shown"] == ".ci/run"]
     assert [
         command for command in shown if not re.search(rf" {command}( [A-Z]+=.*)?\n", parts)

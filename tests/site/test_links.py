@@ -9,6 +9,8 @@ from urllib.parse import unquote, urlsplit
 
 import pytest
 
+from tests.scene_files import read_text, write_text
+
 #: Attributes that load something as soon as the page is opened.
 LOADED = {("img", "src"), ("script", "src"), ("link", "href"), ("iframe", "src"), ("source", "src")}
 STYLES = re.compile(r"url\(\s*[\"']?([^\"')]+)|@import\s+[\"']([^\"']+)")
@@ -34,7 +36,7 @@ class Page(HTMLParser):
 
 @functools.cache
 def read_page(path: Path) -> Page:
-    return Page(path.read_text(encoding="utf-8"))
+    return Page(read_text(path))
 
 
 def broken(site: Path, path: Path) -> list[str]:
@@ -73,13 +75,13 @@ def test_every_link_and_picture_of_the_site_leads_to_something(
 
 def test_a_page_with_a_missing_file_anchor_or_picture_is_noticed(tmp_path: Path) -> None:
     text = '<h2 id="a">A</h2><a href="#a">1</a><a href="#b">2</a><a href="x.html">3</a><img src="p.png">'
-    (tmp_path / "page.html").write_text(text, encoding="utf-8")
+    write_text(tmp_path / "page.html", text)
     assert broken(tmp_path, tmp_path / "page.html") == ["#b", "x.html", "p.png"]
 
 
 def test_no_page_loads_anything_from_another_machine(site: Path, pages: list[Path]) -> None:
     loaded = {one for path in pages for one in read_page(path).loaded}
-    sheets = {path.name: path.read_text(encoding="utf-8") for path in site.rglob("*.css")}
+    sheets = {path.name: read_text(path) for path in site.rglob("*.css")}
     styled = {one or two for text in sheets.values() for one, two in STYLES.findall(text)}
     assert len(loaded) > 10
     assert len(sheets) > 1
@@ -87,7 +89,7 @@ def test_no_page_loads_anything_from_another_machine(site: Path, pages: list[Pat
 
 
 def test_the_search_has_every_page(site: Path, pages: list[Path]) -> None:
-    text = (site / "search" / "search_index.js").read_text(encoding="utf-8")
+    text = read_text(site / "search" / "search_index.js")
     docs = json.loads(text[text.index("{") :])["docs"]
     found = {entry["location"].partition("#")[0] or "index.html" for entry in docs}
     assert {path.relative_to(site).as_posix() for path in pages} == found

@@ -21,6 +21,7 @@ from digiclay.core.studies.evaluation import FIGURES
 
 from benchmarks.kinds import parser as benchmarks_parser
 from tests.form.test_pages import COMMAND, is_refused
+from tests.scene_files import read_text
 
 ROOT = Path(__file__).parents[2]
 PACKAGES = ("digiclay", "digiclay_paper", "digiclay_serve", "digiclay_study")
@@ -34,7 +35,7 @@ def commands() -> Iterator[argparse.ArgumentParser]:
 
 
 def text_of(page: Path) -> str:
-    return html.unescape(re.sub(r"<[^>]+>", "", page.read_text(encoding="utf-8")))
+    return html.unescape(re.sub(r"<[^>]+>", "", read_text(page)))
 
 
 def test_every_command_is_on_the_page_of_the_command_line(site: Path) -> None:
@@ -59,7 +60,7 @@ def test_every_example_of_the_command_line_is_one_that_its_program_takes() -> No
 
 
 def test_every_parameter_is_on_its_page_with_its_unit(site: Path) -> None:
-    text = (site / "reference" / "parameters.html").read_text(encoding="utf-8")
+    text = read_text(site / "reference" / "parameters.html")
     lacking = []
     for name in SECTIONS:
         for method in METHODS if name == "control" else ("virtual_master",):
@@ -70,10 +71,10 @@ def test_every_parameter_is_on_its_page_with_its_unit(site: Path) -> None:
 
 
 def test_every_name_that_python_offers_has_its_entry_by_subject(site: Path) -> None:
-    text = (site / "reference" / "python.html").read_text(encoding="utf-8")
+    text = read_text(site / "reference" / "python.html")
     headings = " ".join(re.findall(r"<h3 .*?</h3>", text, re.DOTALL))
     entries = set(re.findall(r">\s*digiclay\.(\w+)\s*<", headings))
-    tree = ast.parse(Path(digiclay.__file__).read_text(encoding="utf-8"))
+    tree = ast.parse(read_text(Path(digiclay.__file__)))
     functions = [
         node.name for node in tree.body if isinstance(node, ast.FunctionDef) and node.name[0] != "_"
     ]
@@ -94,7 +95,7 @@ def list_public(module: griffe.Object) -> Iterator[str]:
 
 @pytest.mark.parametrize("package", PACKAGES)
 def test_everything_public_is_in_the_reference(site: Path, package: str) -> None:
-    pages = [page.read_text(encoding="utf-8") for page in (site / "reference").rglob("*.html")]
+    pages = [read_text(page) for page in (site / "reference").rglob("*.html")]
     anchors = {anchor for text in pages for anchor in re.findall(r'id="([\w.]+)"', text)}
     public = [*list_public(griffe.load(package, search_paths=[ROOT / "addon", ROOT]))]
     assert len(public) > 100
@@ -102,7 +103,7 @@ def test_everything_public_is_in_the_reference(site: Path, package: str) -> None
 
 
 def rows_of(page: Path) -> list[str]:
-    return re.findall(r"<tr>.*?</tr>", page.read_text(encoding="utf-8"), re.DOTALL)
+    return re.findall(r"<tr>.*?</tr>", read_text(page), re.DOTALL)
 
 
 def test_every_sample_scene_has_its_row_with_a_picture(site: Path) -> None:

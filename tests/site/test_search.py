@@ -6,6 +6,8 @@ from typing import Any
 
 import pytest
 
+from tests.scene_files import write_text
+
 #: Longest time in which a page gets ready on a busy machine, s; a test ends as soon as it is.
 PATIENCE = 120.0
 #: A page of the first level, and one two levels deep.
@@ -71,7 +73,7 @@ def test_a_result_leads_to_the_parameter_that_was_searched(site: Path, browser: 
 
 def test_the_check_notices_a_request_to_another_machine(browser: Any, tmp_path: Path) -> None:
     page = tmp_path / "page.html"
-    page.write_text('<script src="https://machine.example/a.js"></script>', encoding="utf-8")
+    write_text(page, '<script src="https://machine.example/a.js"></script>')
     open_page(browser, page)
     assert "https://machine.example/a.js" in requested(browser)
     assert [entry for entry in browser.get_log("browser") if entry["level"] == "SEVERE"] != []

@@ -20,6 +20,7 @@ from benchmarks.kinds import BENCHMARKS
 from benchmarks.report import Report
 from benchmarks.runs_together import STUDIES, study
 from tests.assemble import sample
+from tests.scene_files import read_text, write_text
 
 
 @pytest.fixture
@@ -159,9 +160,7 @@ def test_two_commits_are_timed_by_their_own_code(tmp_path, monkeypatch):
     assert len(times) == len(processes.CASES) + 1
     assert all(0.0 < time < 1.0 for time in times[:-1])
     assert 0.0 < times[-1] < 30.0
-    (tree / "addon" / "digiclay" / "core" / "engine" / "simulation.py").write_text(
-        "1 / 0\n", encoding="utf-8"
-    )
+    write_text(tree / "addon" / "digiclay" / "core" / "engine" / "simulation.py", "1 / 0\n")
     with pytest.raises(DigiclayError, match=r"^commits: HEAD failed: ZeroDivisionError: division"):
         processes.run_commit(tree, "HEAD", 2)
 
@@ -190,14 +189,14 @@ def test_a_benchmark_prints_and_writes_a_table_and_a_picture(tmp_path, monkeypat
         "stack.md",
         "stack.png",
     ]
-    text = (tmp_path / "stack.md").read_text(encoding="utf-8")
+    text = read_text(tmp_path / "stack.md")
     assert printed in text
     # Results name versions and no path.
     assert f"numpy {np.__version__}" in text
     assert not re.search(r"(^|\s)/\w", text)
     with pytest.raises(OutputError, match="Cannot write into"):
         Report(iter(["a line"]), []).write(tmp_path / "stack.md", "what", text)
-    lines = (tmp_path / "stack.csv").read_text(encoding="utf-8").splitlines()
+    lines = read_text(tmp_path / "stack.csv").splitlines()
     assert lines[0] == "study,runs,what,alone,together,times"
     kinds = ("simulated", "recorded and judged", "errors estimated too")
     assert [line.split(",")[:3] for line in lines[1:]] == [

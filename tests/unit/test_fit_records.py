@@ -6,6 +6,7 @@ from digiclay.cli import main
 from digiclay.core.base.errors import DigiclayError
 
 from digiclay_fit.records import MOST, read_records
+from tests.scene_files import write_text
 
 TIME = np.arange(200) * 5e-3
 DEPTH = np.clip(TIME - 0.2, 0.0, 0.5) * 4.0 - 0.3  # mm
@@ -23,7 +24,7 @@ def write(path, columns, units=UNITS, last=""):
     rows += [
         ",".join(f"{value:.9g}" for value in row) for row in zip(*columns.values(), strict=True)
     ]
-    path.write_text("\n".join([*rows, last]) + "\n", encoding="utf-8")
+    write_text(path, "\n".join([*rows, last]) + "\n")
 
 
 def put(column, place, value, columns=PULP):
@@ -71,14 +72,14 @@ def test_a_bad_record_is_refused_in_a_line(tmp_path, name):
 
 def test_too_many_samples_are_refused_before_they_are_read(tmp_path):
     path = tmp_path / "long.csv"
-    path.write_text("time,position,force\ns,mm,N\n" + "nonsense\n" * (MOST + 1), encoding="utf-8")
+    write_text(path, "time,position,force\ns,mm,N\n" + "nonsense\n" * (MOST + 1))
     with pytest.raises(DigiclayError, match=r"at most 200,000 samples: thin them \(got 200,001\)"):
         read_records([path], "pulp")
 
 
 def test_semicolons_are_refused_with_the_remedy(tmp_path):
     path = tmp_path / "from a spreadsheet.csv"
-    path.write_text("time;position;force\ns;mm;N\n0,001;0,5;0,1\n", encoding="utf-8")
+    write_text(path, "time;position;force\ns;mm;N\n0,001;0,5;0,1\n")
     with pytest.raises(DigiclayError, match=r"sheet.csv must use commas .* decimals \(got ';'\).$"):
         read_records([path], "pulp")
 

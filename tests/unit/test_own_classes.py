@@ -12,7 +12,7 @@ from digiclay import DigiclayError
 from tests.assemble import refused_in_a_line
 from tests.other_process import finish, start
 from tests.own_methods import PAD, Mine, forgotten, write_method
-from tests.scene_files import read_text
+from tests.scene_files import read_text, write_text
 
 pytestmark = pytest.mark.usefixtures("here", "no_methods")
 run = partial(digiclay.run, errors=False)
@@ -72,7 +72,7 @@ def test_a_run_whose_method_is_not_loaded_keeps_its_results_and_is_not_simulated
     scene = digiclay.scene(tap, {"control.method": "pad.py:SoftPad"})
     with forgotten():
         run(scene).save("out")
-    assert Path("out/method.py").read_text(encoding="utf-8") == PAD
+    assert read_text(Path("out/method.py")) == PAD
     code = """
 import digiclay
 run = digiclay.load("out")
@@ -100,7 +100,7 @@ print(again.history["height"].tobytes() == run.history["height"].tobytes())
 def test_a_changed_file_replaces_its_method_and_scenes_of_the_former_code_keep_theirs(tap):
     path = write_method(Path())
     scene = digiclay.scene(tap, {"control.method": "pad.py:SoftPad"})
-    path.write_text(PAD.replace("self.step", "0.5 * self.step"), encoding="utf-8")
+    write_text(path, PAD.replace("self.step", "0.5 * self.step"))
     changed = digiclay.scene(tap, {"control.method": "pad.py:SoftPad"})
     with refused_in_a_line(
         DigiclayError, "^The scene's method soft_pad must be of the code that was loaded"
@@ -143,7 +143,7 @@ if __name__ == "__main__":
     scene = digiclay.scene("tap", {"control.method": Mine, "simulation.duration": 0.2})
     print(digiclay.run(scene, errors=False).metrics["method"])
 """
-    Path("mine.py").write_text(text, encoding="utf-8")
+    write_text(Path("mine.py"), text)
     assert (
         finish(start("import runpy; runpy.run_path('mine.py', run_name='__main__')"))[1] == "mine\n"
     )

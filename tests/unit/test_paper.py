@@ -44,6 +44,7 @@ from digiclay_paper.results import (
 )
 from digiclay_paper.scenes import METHODS
 from digiclay_paper.simulations import GAUSSIAN, NO_RISE, STAGGERED, WINDOWS, located, sessions
+from tests.scene_files import write_text
 
 FIRST, SECOND = METHODS
 GOOD = Follows(speed=15e-3, losses=0, loss_share=0.0, lag=1e-3, rfd=0.02)
@@ -147,7 +148,7 @@ waypoints = [
 @pytest.fixture(scope="module")
 def lost(tmp_path_factory):
     path = tmp_path_factory.mktemp("lost") / "lifted.toml"
-    path.write_text(LIFTED, encoding="utf-8")
+    write_text(path, LIFTED)
     found = Results(lifting={"virtual_master": 20e-3, "cell_states": 6e-3})
     sessions(found, lambda stage: None, str(path))
     return found
