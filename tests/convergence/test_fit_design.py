@@ -121,6 +121,7 @@ def test_the_file_is_measured_and_fitted_and_tells_what_was_predicted(
 PULP, CELL = ["--design", "--part", "pulp"], ["--design", "--part", "cell"]
 BAD = {
     "no noise": ([*PULP, "--noise", "0 N"], "--noise must be above 0 N (got 0 N)"),
+    "noise of a force": ([*CELL, "--noise", "1 N"], "--noise must be in m or a multiple of it (got '1 N')"),
     "much noise": ([*PULP, "--noise", "1 kN"], "--noise must have a unit known here: N, mN"),
     "more noise than force": ([*PULP, "--noise", "1e3 N"], "limits permit to know (got contact.stiffness"),
     "negative speed": ([*PULP, "--max-speed", "-1 m/s"], "--max-speed must be at least 0.001 m/s (got -1"),

@@ -179,6 +179,7 @@ def test_a_wrong_scene_is_refused_in_one_line(content, changes, message):
             "fingertip must be Fingertip or None (got Valve)",
         ),
         (lambda scene: replace(scene, fingers=[1]), "fingers must be a tuple of Finger (got [1])."),
+        (lambda scene: scene.with_sections(trajectory=None), "trajectory must be Path (got None)."),
     ],
 )
 def test_a_scene_has_only_parts_of_its_sections_and_its_method(tap, change, message):

@@ -143,6 +143,7 @@ def test_no_line_waits_for_ever(policy):
             "slot must be a whole number of control",
         ),
         "a slot of one and a half": ({"slot": 7.5e-3}, "slot must be a whole number of control"),
+        "a share of lines": ({"share": 0.5}, "share must be true or false"),
     },
 )
 def test_a_drive_that_cannot_be_is_refused(drive, words):

@@ -132,6 +132,7 @@ def path(times, positions=None):
         (Relaxation, {"weights": (0.0,) * 4}, "weights must not all be 0"),
         (Relaxation, {"times": (0.0, 0.07, 1.4)}, "times must be at least 1e-09 s (got 0 s)."),
         (Relaxation, {"weights": (1.0,) * 3}, "weights must have one value more than times, 4 (got 3)."),
+        (Relaxation, {"weights": (1.0,) * 5}, "weights must have one value more than times, 4 (got 5)."),
         (Sensing, {"observer": "valve", "force_noise": 1e-3}, "force_noise must be 0 N with observer"),
         (Sensing, {"observer": "valve", "force_step": 1e-3}, "force_step must be 0 N with observer"),
         (Sensing, {"height_step": 1e-15}, "height_step must be 0 m, or at least 1e-12 m (got 1e-15 m)."),

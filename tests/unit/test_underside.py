@@ -142,6 +142,7 @@ TRIANGLE = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
         (TRIANGLE * [[1], [np.nan], [1]], [[0, 1, 2]], "vertex 1 at nan"),
         (TRIANGLE * 1e7, [[0, 1, 2]], "vertex 1 at 1e\\+07"),
         (TRIANGLE * [1, 0, 0], [[0, 1, 2]], "must have a surface"),
+        (TRIANGLE * 0, [[0, 1, 2]], "must have a surface"),
     ],
 )
 def test_what_is_no_body_is_refused(vertices, triangles, rule):
