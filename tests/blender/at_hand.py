@@ -8,6 +8,8 @@ import numpy as np
 from digiclay import operators
 from digiclay.compat import strips
 from digiclay.device import part_watch
+from digiclay.overlay.picture import choose_colors
+from digiclay.overlay.sections import lay_out
 from digiclay.roles import BALL, FINGER, HOUSING, OWNED, ROLE, fingertip_of, is_bed
 
 #: Names of all operators.
@@ -142,6 +144,12 @@ def fetch(file, name, how):
         done("Make Local")
     else:
         bpy.ops.wm.append(**source)
+
+
+def read_overlay(readings):
+    """Return the texts of the overlay with these readings."""
+    colors = choose_colors((0.1, 0.1, 0.1), (0.9, 0.9, 0.9))
+    return [words.text for words in lay_out(readings, colors, (0.0, 0.0, 900.0, 900.0), 1.0).words]
 
 
 def save_and_open(file):

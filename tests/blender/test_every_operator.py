@@ -102,20 +102,18 @@ FOR_ADDS = {"a bed", "nothing", "edited", "another mesh edited", "joined into a 
 
 
 def calls(adds):
-    """Give every operator, how to call it, and its settings; once more with either value of what has two."""
+    """Give every operator, how to call it, and its settings: either value of what has two."""
     for kind in OPERATORS:
         if kind.bl_idname in ADDS and not adds:
             continue
         area, _, name = kind.bl_idname.partition(".")
         operator, quick = getattr(getattr(BPY, area), name), QUICK.get(kind.bl_idname, {})
         how = "EXEC_DEFAULT" if hasattr(kind, "execute") else "INVOKE_DEFAULT"
-        yield operator, how, quick
-        for known in operator.get_rna_type().properties:
-            both = (
-                known.type == "ENUM" and len(known.enum_items) == 2 and kind.bl_idname not in ADDS
-            )
-            for item in known.enum_items if both else ():
-                yield operator, how, {**quick, known.identifier: item.identifier}
+        known = () if kind.bl_idname in ADDS else operator.get_rna_type().properties
+        twofold = [each for each in known if each.type == "ENUM" and len(each.enum_items) == 2]
+        given = [{each.identifier: item.identifier} for each in twofold for item in each.enum_items]
+        for settings in given or [{}]:
+            yield operator, how, quick | settings
 
 
 def call(operator, how, settings):

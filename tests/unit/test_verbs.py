@@ -154,6 +154,13 @@ def test_locks_are_taken_off_by_ctrl_turned_over_and_cleared():
     assert (turned, again, none) == (441 - rest, rest, 0)
 
 
+@pytest.fixture
+def bright(tmp_path):
+    """A shape that rises to its right side."""
+    np.save(tmp_path / "ramp.npy", np.tile(np.linspace(0.0, 1.0, 40), (40, 1)))
+    return str(tmp_path / "ramp.npy")
+
+
 def ramp(session):
     return 1e3 * session.system.grid.x.reshape(21, 21)
 
@@ -168,12 +175,9 @@ def ramp(session):
         ({"ctrl": True}, 0.0),
     ],
 )
-def test_a_stamp_has_the_drawn_size_turn_and_strength_up_or_down(tmp_path, keys, turned):
-    # Bright on the right side.
-    np.save(tmp_path / "ramp.npy", np.tile(np.linspace(0.0, 1.0, 40), (40, 1)))
+def test_a_stamp_has_the_drawn_size_turn_and_strength_up_or_down(bright, keys, turned):
     places = keys.pop("places", DRAG)
-    name = str(tmp_path / "ramp.npy")
-    done = play(begin(), stroke("stamp", places, height=9e-3, depth=6e-3, stamp=name, **keys))
+    done = play(begin(), stroke("stamp", places, height=9e-3, depth=6e-3, stamp=bright, **keys))
     formed = np.rot90(relief(done), round(turned / 90.0))
     inside = np.abs(ramp(done)) < 14e0
     sign = -6.0 if keys.get("ctrl") else 9.0 * keys.get("strength", 1.0)
@@ -187,15 +191,10 @@ def test_a_stamp_has_the_drawn_size_turn_and_strength_up_or_down(tmp_path, keys,
 @pytest.mark.parametrize(
     "symmetry, axis", [("x", 0.0), ("y", 0.0), ("xy", 0.0), ("x", 90.0), ("radial", 0.0)]
 )
-def test_images_of_a_stamp_are_mirrored_and_turned_about_the_placed_center(
-    tmp_path, symmetry, axis
-):
-    np.save(tmp_path / "ramp.npy", np.tile(np.linspace(0.0, 1.0, 40), (40, 1)))
+def test_images_of_a_stamp_are_mirrored_and_turned_about_the_placed_center(bright, symmetry, axis):
     keys = {"symmetry": symmetry, "axis": axis, "radial": 4}
     places = ((15e-3, 12e-3), (21e-3, 12e-3))
-    formed = relief(
-        play(begin(), stroke("stamp", places, stamp=str(tmp_path / "ramp.npy"), **keys))
-    )
+    formed = relief(play(begin(), stroke("stamp", places, stamp=bright, **keys)))
     assert formed.max() > 10.0
     images = {
         "x": [np.fliplr],
