@@ -50,11 +50,11 @@ def mesh(
 
 def points(name: str, count: int) -> Mesh:
     """Make a mesh of `count` loose vertices with the attributes of a bed."""
-    made = bpy.data.meshes.new(name)
-    made.vertices.add(count)
+    mesh = bpy.data.meshes.new(name)
+    mesh.vertices.add(count)
     for attribute, (kind, _, _) in ATTRIBUTES.items():
-        made.attributes.new(attribute, kind, "POINT")
-    return made
+        mesh.attributes.new(attribute, kind, "POINT")
+    return mesh
 
 
 def find_fault(bed: Mesh, pins: int | None = None) -> str:
@@ -129,26 +129,26 @@ def move_fingertips(
 ) -> None:
     """Put the first fingertips, or those of some numbers, to poses (f, 7); a palm goes along if all do."""
     parts: dict[Any, list[tuple[Any, Floats]]] = {}
-    every, whole = fingertips_of(bed), np.array(bed.matrix_world)
-    for number, at, finger in zip(numbers or every, poses, fingers, strict=False):
-        if number in every:
+    numbered, to_world = fingertips_of(bed), np.array(bed.matrix_world)
+    for number, at, finger in zip(numbers or numbered, poses, fingers, strict=False):
+        if number in numbered:
             center = finger.outline(np.asarray(at, np.float64)[None])[0, :3]
             place = make_place(center, at[3:])
-            parts.setdefault(every[number].parent, []).append((every[number], place))
+            parts.setdefault(numbered[number].parent, []).append((numbered[number], place))
     for above, tips in parts.items():
         role = above and above.get(ROLE)
-        stood = np.array(above.matrix_world if above else np.eye(4))
-        if role == PALM and len(tips) == sum(tip.parent == above for tip in every.values()):
-            ways = [whole @ pose @ np.linalg.pinv(tip.matrix_world) for tip, pose in tips]
-            if np.ptp(ways, axis=0).max() < STRAY * np.linalg.norm(whole[:3, 0]):
-                stood = ways[0] @ stood
-                above.matrix_world = stood.T.tolist()
+        above_to_world = np.array(above.matrix_world if above else np.eye(4))
+        if role == PALM and len(tips) == sum(tip.parent == above for tip in numbered.values()):
+            moves = [to_world @ pose @ np.linalg.pinv(tip.matrix_world) for tip, pose in tips]
+            if np.ptp(moves, axis=0).max() < STRAY * np.linalg.norm(to_world[:3, 0]):
+                above_to_world = moves[0] @ above_to_world
+                above.matrix_world = above_to_world.T.tolist()
         for tip, place in tips:
             if role in (BED, PALM):
                 tip.matrix_parent_inverse.identity()
-                tip.matrix_basis = (np.linalg.pinv(stood) @ whole @ place).T.tolist()
+                tip.matrix_basis = (np.linalg.pinv(above_to_world) @ to_world @ place).T.tolist()
             else:
-                tip.matrix_world = (whole @ place).T.tolist()
+                tip.matrix_world = (to_world @ place).T.tolist()
 
 
 def make_place(origin: Floats, turn: Floats) -> Floats:

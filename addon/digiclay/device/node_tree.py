@@ -135,8 +135,8 @@ def number(tree: NodeTree, operation: str, *values: Value) -> NodeSocket:
 def switch(tree: NodeTree, kind: str, on: Value, off: Value, then: Value) -> NodeSocket:
     """Add a node that hands on `then` where `on` holds and `off` (may be None) else; return its output."""
     # What is not handed on is not worked out either: that is how a part that is off costs nothing.
-    ways = {"Switch": on, **({} if off is None else {"False": off}), "True": then}
-    return enabled(node(tree, "GeometryNodeSwitch", ways, input_type=kind).outputs, "Output")
+    inputs = {"Switch": on, **({} if off is None else {"False": off}), "True": then}
+    return enabled(node(tree, "GeometryNodeSwitch", inputs, input_type=kind).outputs, "Output")
 
 
 def combine(tree: NodeTree, **parts: Value) -> NodeSocket:

@@ -87,21 +87,21 @@ def make_presser(
     bed: Object, name: str, given: Presser, mesh: Mesh, first: float, rate: float
 ) -> Object:
     """Make an object of a mesh, m, that presses a bed as a body does, keyed from a frame on; `rate`: 1/s."""
-    made = bpy.data.objects.new(name, make_body(name, mesh))
-    made.parent, made[PRESSES], made.rotation_mode = bed, bed, "QUATERNION"
-    made.scale = (given.body.scale,) * 3
-    fill(made.digiclay.presser, Body, PRESSER_FIELDS, vars(given.body))
+    thing = bpy.data.objects.new(name, make_body(name, mesh))
+    thing.parent, thing[PRESSES], thing.rotation_mode = bed, bed, "QUATERNION"
+    thing.scale = (given.body.scale,) * 3
+    fill(thing.digiclay.presser, Body, PRESSER_FIELDS, vars(given.body))
     for collection in bed.users_collection:
-        collection.objects.link(made)
+        collection.objects.link(thing)
     path = given.trajectory.trajectory()
     kind = "BEZIER" if path.interpolation == "smooth" else "LINEAR"
     places = path.positions * bridge.SCALE
     speeds = compute_inner_slopes(np.diff(path.times), places) / rate
-    _key(made, "location", first + path.times * rate, places, speeds, kind)
+    _key(thing, "location", first + path.times * rate, places, speeds, kind)
     times, turns = _divide_turns(path)
     still = np.zeros_like(turns)
-    _key(made, "rotation_quaternion", first + times * rate, turns, still, "LINEAR")
-    return made
+    _key(thing, "rotation_quaternion", first + times * rate, turns, still, "LINEAR")
+    return thing
 
 
 def _divide_turns(path: Trajectory) -> tuple[Floats, Floats]:
@@ -130,10 +130,10 @@ def _key(
         for key in points:
             key.interpolation, key.handle_left_type, key.handle_right_type = kind, "FREE", "FREE"
         # Handles at thirds of the time make the cubic of the path.
-        for way, x, y in (
+        for part, x, y in (
             ("co", frames, column),
             ("handle_left", frames - gaps[:-1], column - slope * gaps[:-1]),
             ("handle_right", frames + gaps[1:], column + slope * gaps[1:]),
         ):
-            points.foreach_set(way, np.column_stack([x, y]).astype(np.float32).ravel())
+            points.foreach_set(part, np.column_stack([x, y]).astype(np.float32).ravel())
         curve.update()

@@ -272,7 +272,7 @@ def _find_palm(bed: Object, name: str) -> Object | None:
     if palm is None or tip.parent != palm:
         return bed
     mine = (palm for palm in _standing(PALM) if palm.parent == bed and palm.get(name) is not None)
-    copies = [one for one in mine if one[name].parent == palm]
+    copies = [copy for copy in mine if copy[name].parent == palm]
     if copies:
         return copies[0]
     return _duplicate(palm, bed, bed)

@@ -61,17 +61,17 @@ def read_lines(context: Context, thing: Object, bed: Object) -> list[Floats]:
 
 def _read_edges(context: Context, thing: Object, bed: Object) -> list[Floats]:
     """Return the lines of an object by geometry nodes, which take them from any kind."""
-    name, made = thing.name, list[ID]()
+    name, temporary = thing.name, list[ID]()
     try:
         if thing.type in FILLED:
             thing = thing.copy()
             thing.data = thing.data.copy()
-            made += [thing, thing.data]
+            temporary += [thing, thing.data]
             _bare(thing.data)
             context.scene.collection.objects.link(thing)
         mesh, tree = bpy.data.meshes.new("Lines"), _make_tree(thing)
         carrier = bpy.data.objects.new("Lines", mesh)
-        made += [carrier, mesh, tree]
+        temporary += [carrier, mesh, tree]
         carrier.matrix_world = bed.matrix_world
         carrier.modifiers.new("Lines", "NODES").node_group = tree
         context.scene.collection.objects.link(carrier)
@@ -85,7 +85,7 @@ def _read_edges(context: Context, thing: Object, bed: Object) -> list[Floats]:
         mesh.edges.foreach_get("vertices", edges)
         evaluated.to_mesh_clear()
     finally:
-        bpy.data.batch_remove(made)
+        bpy.data.batch_remove(temporary)
     return join_edges(flat, edges.reshape(-1, 2).astype(np.int64))
 
 

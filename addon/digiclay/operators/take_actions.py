@@ -351,16 +351,16 @@ class Bake(SteppedAction, Operator):
         if recorded:
             take = read_fitting_take(bed, self.take)
         else:
-            made = properties.scene_of(bed)
-            for step in bake.sample_path(scene, bed, self.first, self.last, made):
+            device = properties.scene_of(bed)
+            for step in bake.sample_path(scene, bed, self.first, self.last, device):
                 if isinstance(step, float):
                     yield 0.3 * step
                 else:
                     path = step
-            system = assemble(made)
+            system = assemble(device)
             # How the path ends is unknown before its simulation, and nothing asks for it.
             take = Take(
-                made, snapshot.dump(system, begin(system)), path.poses, b"", knots=path.knots
+                device, snapshot.dump(system, begin(system)), path.poses, b"", knots=path.knots
             )
         rate = bake.read_rate(scene)
         for part in bake.simulate_frames(take, rate):

@@ -180,8 +180,8 @@ def _visible_points(bed: Object, history: Mapping[str, Array], rows: Cells, size
     middle = np.array([*position.mean(axis=0), height.max()])
     reach = np.array([*np.abs(position - middle[:2]).max(axis=0) + NEAR, LIFTED])
     places[(np.abs(places - middle) > reach).any(axis=1)] = middle
-    ways = np.indices((3, 3, 3)).reshape(3, -1) - 1.0
-    extremes = np.unique((places @ ways).argmax(axis=0) // (len(places) // len(poses)))
+    directions = np.indices((3, 3, 3)).reshape(3, -1) - 1.0
+    extremes = np.unique((places @ directions).argmax(axis=0) // (len(places) // len(poses)))
     clouds = [
         np.column_stack([position, level]) * SCALE
         for level in (height.min(axis=0), height.max(axis=0))

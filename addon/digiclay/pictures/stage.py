@@ -58,9 +58,9 @@ def add_bodies(scene: Scene, bed: Object, instant: Instant) -> None:
     """Add the bodies of an instant, at their poses over a bed."""
     for number, body in enumerate(instant.bodies):
         mesh = parts.make_body("Digital Clay Body", body)
-        made = bpy.data.objects.new(mesh.name, mesh)
-        made.parent, made[BODY] = bed, number
-        scene.collection.objects.link(made)
+        part = bpy.data.objects.new(mesh.name, mesh)
+        part.parent, part[BODY] = bed, number
+        scene.collection.objects.link(part)
     _place_bodies(bed, instant)
 
 

@@ -112,9 +112,9 @@ def read(bed: Object, number: str = "") -> Take:
 
 def list_fingers(bed: Object, number: str, count: int) -> tuple[int, ...]:
     """Return the numbers of so many fingertips of a take; where it has none, those of the bed, if as many."""
-    kept = bed[PROPERTY][find(bed, number).number].get("fingers")
+    stored = bed[PROPERTY][find(bed, number).number].get("fingers")
     every = (
-        kept if isinstance(kept, bytes) else b"",
+        stored if isinstance(stored, bytes) else b"",
         tuple(fingertips_of(bed)),
         range(1, count + 1),
     )
