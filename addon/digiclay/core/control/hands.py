@@ -4,7 +4,7 @@ Sensors measure the force on a pin, but not whose it is. What happens in a contr
 that two fingers press, with the rules of `pin_division`:
 
 1. `HandControl.locate` assigns it to the finger whose underside is lowest over it, its owner. A
-   pressed pin far from all fingers begins a new finger.
+   pressed pin far from all fingers begins a new one, if there is one left.
 2. The controller of the owner locates its finger with the whole force on the pin, the other one as
    if the pin had none. (With Method III both see shares in the ratio of the predicted forces.)
    Each answers with the disc of pins to command; the pin is in both.
