@@ -128,16 +128,9 @@ class Order(NamedTuple):
 def pack_order(order: Order) -> bytes:
     """Write an order for `LatestSlot`."""
     pose = order.pose or (0.0,) * 7
-    head = (
-        *pose,
-        order.number,
-        order.pose is not None,
-        order.resets,
-        order.named,
-        len(order.fingers),
-    )
+    counts = order.number, order.pose is not None, order.resets, order.named, len(order.fingers)
     fingers = [value for identity, finger in order.fingers for value in (identity, *finger)]
-    return LAYOUT.pack(*head, *fingers, *[0] * (8 * MOST_FINGERS - len(fingers)))
+    return LAYOUT.pack(*pose, *counts, *fingers, *[0] * (8 * MOST_FINGERS - len(fingers)))
 
 
 def unpack_order(data: bytes) -> Order:

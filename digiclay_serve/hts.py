@@ -37,11 +37,8 @@ class Hands:
         hands = self
         for line in data.decode("utf-8", "replace").splitlines():
             side, kind, *_ = [*line.partition(":")[0].lower().split(), "", ""]
-            hands = (
-                hands._take_line(side, kind, line, now)
-                if side in HANDS and kind in LINES
-                else hands
-            )
+            if side in HANDS and kind in LINES:
+                hands = hands._take_line(side, kind, line, now)
         return hands
 
     def _take_line(self, side: str, kind: str, line: str, now: float) -> Hands:
@@ -66,11 +63,9 @@ class Hands:
 
     def fingers(self, now: float) -> dict[int, Floats]:
         """Return the lowest points (3,), m, of the fingers that are there at a time, s, by identity."""
-        seen = {
-            side: tips - self.origin
+        return {
+            HANDS[side] + row: tip
             for side, (time, tips) in self.tips.items()
             if now - time < GONE
-        }
-        return {
-            HANDS[side] + row: tip for side, tips in seen.items() for row, tip in enumerate(tips)
+            for row, tip in enumerate(tips - self.origin)
         }

@@ -134,12 +134,8 @@ def carry_out(arguments: argparse.Namespace) -> int:
     if arguments.coupling:
         scene = hold_softly(scene, 1e3 * arguments.coupling)
     limits = Limits(arguments.most_force, 1e-3 * arguments.most_speed, arguments.silence)
-    by_hand = (
-        1e-3 * arguments.lift,
-        1e-3 * arguments.clutch,
-        arguments.filter,
-    )
-    session = begin_session(scene, limits, Tracking(*by_hand))
+    tracking = Tracking(1e-3 * arguments.lift, 1e-3 * arguments.clutch, arguments.filter)
+    session = begin_session(scene, limits, tracking)
     bed, host = describe_bed(scene, session.system, session.limits), arguments.host
     size, out = len(pack_frame(make_frame(session))), arguments.out
     with (

@@ -60,11 +60,8 @@ def _take_message(contacts: dict[int, Any], address: str, values: list[Any]) -> 
     """Return the contacts after a message; raise an error of any kind over anything that is none."""
     kind = values[0] if address == "/tuio/2Dcur" else address
     if kind in ("alive", "/tuio2/alv"):
-        return {
-            int(identity) % 2**32: contacts.get(int(identity) % 2**32)
-            for identity in values
-            if identity != "alive"
-        }
+        alive = (int(identity) % 2**32 for identity in values if identity != "alive")
+        return {identity: contacts.get(identity) for identity in alive}
     if kind not in ("set", "/tuio2/ptr"):
         return contacts
     name, *touch = [*values[1:4], 0.0] if kind == "set" else [*values[:1], *values[3:5], values[8]]
