@@ -22,7 +22,7 @@ from digiclay.strokes.locks import find_inside, find_locks, place_images
 from digiclay.strokes.nominal import Device, find_nominal, find_radius
 from digiclay.strokes.queue_ghosts import find_ghosts
 from digiclay.strokes.stamps import load_stamp
-from digiclay.strokes.stroke import Brush, Combine, make_images
+from digiclay.strokes.stroke import Brush, make_images
 from numpy.testing import assert_array_equal
 
 from tests import strokes
@@ -197,16 +197,10 @@ def test_another_method_keeps_all_locks():
 CROSS = ((-12.0, -9.0), (12.0, 9.0))
 CASES = {
     "lower": lay(Brush.LOWER, CROSS),
-    "lower, sphere": lay(Brush.LOWER, CROSS, falloff=Falloff.SPHERE),
-    "lower to a limit": lay(Brush.LOWER, CROSS, limits=(-7e-3, 0.0)),
     "raise": lay(Brush.RAISE, CROSS, amount=9.0),
-    "raise to the higher one": lay(Brush.RAISE, CROSS, combine=Combine.HIGHEST),
     "raise, back and forth": lay(Brush.RAISE, (*CROSS, CROSS[0]), accumulate=True),
-    "level": lay(Brush.LEVEL, CROSS),
     "stamp": lay(Brush.STAMP, CROSS, stamp=load_stamp("dome")),
     "crease": lay(Brush.CREASE, CROSS),
-    "flatten": lay(Brush.FLATTEN, CROSS),
-    "erase": lay(Brush.ERASE, CROSS, falloff=Falloff.SHARP),
     "smooth": lay(Brush.SMOOTH, CROSS, falloff=Falloff.SMOOTH),
 }
 

@@ -1,7 +1,7 @@
 """Press tool in the 3D view's toolbar: its header, and its patch under the mouse, draped over the pins."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -10,10 +10,12 @@ import numpy as np
 
 from .. import bridge, preferences
 from ..compat import (
+    Area,
     Context,
     Object,
     OperatorProperties,
     UILayout,
+    Window,
     WorkSpaceTool,
     bpy,
     connect,
@@ -400,24 +402,24 @@ def unregister() -> None:
 
 def take_up(context: Context) -> None:
     """Take the tool in hand in the 3D views of the context's workspace."""
-    window = context.window
-    views = [
-        area for area in (context.area, *window.screen.areas) if area and area.type == "VIEW_3D"
-    ]
-    if views:
-        region = next(region for region in views[0].regions if region.type == "WINDOW")
-        with context.temp_override(window=window, area=views[0], region=region):
-            bpy.ops.wm.tool_set_by_id(name=PressTool.bl_idname, space_type="VIEW_3D")
+    _choose_tool(context.window, (context.area, *context.window.screen.areas), TOOL)
 
 
 def _put_down() -> None:
     """Take up the first tool in every window where this one is in hand: else its cursor is still drawn."""
     for window in bpy.context.window_manager.windows:
         tool = window.workspace.tools.from_space_view3d_mode("OBJECT", create=False)
-        area = next((area for area in window.screen.areas if area.type == "VIEW_3D"), None)
-        if tool is not None and tool.idname == PressTool.bl_idname and area is not None:
-            with bpy.context.temp_override(window=window, area=area, region=area.regions[-1]):
-                bpy.ops.wm.tool_set_by_id(name="builtin.select_box", space_type="VIEW_3D")
+        if tool is not None and tool.idname == TOOL:
+            _choose_tool(window, window.screen.areas, "builtin.select_box")
+
+
+def _choose_tool(window: Window, areas: Iterable[Area | None], name: str) -> None:
+    """Take a tool in hand in the first of some areas that is a 3D view."""
+    views = [area for area in areas if area and area.type == "VIEW_3D"]
+    if views:
+        region = next(region for region in views[0].regions if region.type == "WINDOW")
+        with bpy.context.temp_override(window=window, area=views[0], region=region):
+            bpy.ops.wm.tool_set_by_id(name=name, space_type="VIEW_3D")
 
 
 #: Standard deviation of the weights, and how far they reach, in pitches.
