@@ -200,7 +200,7 @@ def test_images_begin_no_error_estimate_of_their_own():
 
 def test_no_fingertip_lifts_again_for_another_one_that_is_down():
     images = make_images("RADIAL", 10, (1.1e-3, -0.7e-3), 0.4)
-    session = draw(begin(), line(3.7, 0.9, 6.0, 2.4), images, RAISE)
+    session = draw(begin(), line(3.7, 0.9, 5.0, 1.7), images, RAISE)
     pressing = set[int]()
     lifted = 0
     while session.strokes:

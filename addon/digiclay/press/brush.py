@@ -10,7 +10,6 @@ from ..core.base.arrays import Floats
 from ..core.files.tables import Record
 from ..core.model.fingertip import Fingertip
 from ..core.shapes.fitting import list_shapes
-from ..core.shapes.heightmap import HeightMap
 from ..live import beds
 from ..roles import bed_of, is_bed
 from ..settings import devices
@@ -225,8 +224,9 @@ def lay_stroke(
     share = float(read_own(settings, "strength", kind))
     depth = 1e-3 * share * getattr(settings, amount_name(kind))
     options = find_options(settings, kind) | more
-    if "stamp" not in more:
-        options["stamp"] = find_stamp(settings, kind)
+    if kind in STAMPS and "stamp" not in more:
+        file = bpy.path.abspath(settings.stamp_file)
+        options["stamp"] = load_stamp(file if settings.stamp == FILE else settings.stamp)
     (x, y), images = path[0], find_images(settings)
     return lay_path(start(0, x, y, depth, images, kind, share, **options), path)
 
@@ -312,15 +312,6 @@ def find_press(context: Context, event: Event) -> tuple[int, int]:
 def find_path(settings: OperatorProperties, brush: Brush) -> str:
     """Return the path of a stroke: that of the settings, or STAMP."""
     return "STAMP" if brush in STAMPS else str(settings.path)
-
-
-def find_stamp(settings: OperatorProperties, brush: Brush) -> HeightMap | None:
-    """Return what a brush stamps; a DigiclayError where it cannot be read."""
-    if brush not in STAMPS:
-        return None
-    return load_stamp(
-        bpy.path.abspath(settings.stamp_file) if settings.stamp == FILE else settings.stamp
-    )
 
 
 def amount_name(brush: Brush) -> str:
