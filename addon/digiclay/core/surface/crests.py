@@ -102,14 +102,14 @@ class Field:
         """Return the line along the top that follows a chain of pins, or none if it has no length."""
         pitch = self.bed.spacing
         line = space_evenly(chain.points, pitch)
-        if line is None:
+        if len(line) < 2:
             return None
         line = smooth(line, 2, chain.closed)
         for _ in range(ROUNDS):
-            spread = space_evenly(self._centered(line, chain), pitch)
-            if spread is None:
+            line = space_evenly(self._centered(line, chain), pitch)
+            if len(line) < 2:
                 return None
-            line = smooth(spread, 1, chain.closed)
+            line = smooth(line, 1, chain.closed)
         half = self.half_width(line, chain.closed)
         for end, order in ((0, -1), (1, 1)):
             if not (chain.closed or chain.joined[end]):
@@ -123,7 +123,7 @@ class Field:
         step = self.bed.spacing / 2.0
         fine = space_evenly(line, step)
         width = max(2, round(CORNER * half / step))
-        if fine is None or len(fine) < 4 * width:
+        if len(fine) < 4 * width:
             return line
         wide = max(2, round(LEG * half / step))
         turn = _turns(fine, wide, closed)
@@ -147,21 +147,18 @@ class Field:
         if not pieces:
             return line
         # The last point of a piece is the first one of the next.
-        evenly = [space_evenly(piece, 2.0 * step) for piece in pieces]
-        last_piece = space_evenly(fine[start:], 2.0 * step)
-        parts = [even[:-1] for even in evenly if even is not None]
-        return np.concatenate(parts if last_piece is None else [*parts, last_piece])
+        parts = [space_evenly(piece, 2.0 * step)[:-1] for piece in pieces]
+        return np.concatenate([*parts, space_evenly(fine[start:], 2.0 * step)])
 
     def extend(self, line: Floats, half: float, others: list[Floats]) -> Floats:
         """Return a line extended straight onto one of others, or else to their nearest point."""
         step = self.bed.spacing / 4.0
-        targets = [even for other in others if (even := space_evenly(other, step)) is not None]
-        fine = space_evenly(line, step)
-        if not targets or fine is None:
+        if not others:
             return line
+        fine = space_evenly(line, step)
         near, far = (round(share * half / step) for share in (CORNER, CORNER + LEG))
         leg = fine[-far - 1 : -near]
-        every = np.concatenate(targets)
+        every = np.concatenate([space_evenly(other, step) for other in others])
         corner = every[[int(np.argmin(np.hypot(*(every - line[-1]).T)))]]
         if len(leg) > 4:
             middle, direction = _straight(leg)
@@ -174,8 +171,7 @@ class Field:
                 path = _sample(middle, every[at])
                 if self.at(path).min() >= HIGH * float(np.median(self.at(leg))):
                     fine, corner = fine[:-near], every[at]
-        whole = space_evenly(np.concatenate([fine, corner]), self.bed.spacing)
-        return line if whole is None else whole
+        return space_evenly(np.concatenate([fine, corner]), self.bed.spacing)
 
     def _meeting(self, leg: Floats, other: Floats, half: float) -> Floats | None:
         """Return where two legs (k, 2) meet that lead to a corner, (1, 2), or none."""
@@ -245,8 +241,6 @@ class Field:
         longer = np.arange(1, int(np.ceil(self.most / pitch)) + 1)[:, None] * pitch * direction
         path = np.concatenate([line, line[-1] + longer])
         fine = space_evenly(path, pitch / 4.0)
-        if fine is None:  # a line of a pitch that comes back to where it began
-            return line[:1]
         off, along = self.bed.at(self.off, fine), measure_run(fine)
         beyond = np.flatnonzero(np.isnan(off))
         last = int(beyond[0]) if len(beyond) else len(off)
@@ -280,15 +274,14 @@ class Field:
             return line[:1]
         before = along < end - 0.25 * pitch
         tip = place_along(np.array([end]), along, fine)
-        whole = space_evenly(np.concatenate([fine[before], tip]), pitch)
-        return line[:1] if whole is None else whole
+        return space_evenly(np.concatenate([fine[before], tip]), pitch)
 
 
-def space_evenly(points: Floats, step: float) -> Floats | None:
-    """Return points along a line at even steps, `step` apart at most; none of a line without length."""
+def space_evenly(points: Floats, step: float) -> Floats:
+    """Return points along a line at even steps, `step` apart at most; one of a line without length."""
     run = measure_run(points)
     if run[-1] < 1e-9:
-        return None
+        return points[:1]
     count = max(2, int(np.ceil(run[-1] / step - TIE)) + 1)
     return place_along(np.linspace(0.0, run[-1], count), run, points)
 
