@@ -87,7 +87,7 @@ def pixel(place, region=None):
 def world(x, y, z=40.0):
     """Return where a place in the first bed's space, mm, is in the world; 40 mm: the pins at rest."""
     evaluate()
-    return beds()[0].matrix_world @ (part("bridge").SCALE * 1e-3 * Vector((x, y, z)))
+    return bed().matrix_world @ (part("bridge").SCALE * 1e-3 * Vector((x, y, z)))
 
 
 def on_the_bed(x, y, z=40.0):
@@ -178,6 +178,10 @@ def beds():
     return [thing for thing in window().scene.objects if part("roles").is_bed(thing)]
 
 
+def bed():
+    return beds()[0]
+
+
 def fingertip(number=0):
     return part("roles").fingertip_of(beds()[number])
 
@@ -188,7 +192,7 @@ def sessions():
 
 def session():
     """Return the session of the first bed, or None."""
-    return part("sessions.running").find(beds()[0])
+    return part("sessions.running").find(bed())
 
 
 def stopped():
@@ -197,8 +201,10 @@ def stopped():
 
 def heights():
     """Return the heights drawn of the first bed, mm, rows by columns."""
-    bed = beds()[0]
-    return 1e3 * part("bridge").read_cells(bed.data)["height"].reshape(bed.digiclay.layout.rows, -1)
+    first = bed()
+    return 1e3 * part("bridge").read_cells(first.data)["height"].reshape(
+        first.digiclay.layout.rows, -1
+    )
 
 
 def preferences():

@@ -141,7 +141,7 @@ def start():
 def look():
     """Close the sidebar, and look more from above."""
     if PICTURED:  # speed and remaining time are not those of a computer with a graphics card
-        blender.beds()[0].digiclay_display.overlay = False
+        blender.bed().digiclay_display.overlay = False
         bpy.context.preferences.addons[blender.EXTENSION].preferences.show_cursor_text = False
         blender.view()[0].spaces.active.overlay.show_text = False
     yield from done("key n")

@@ -43,8 +43,8 @@ def put_up(rise):
     pose = session.pose.copy()
     pose[2] = 0.08
     back = blender.part("sessions.sculpting").restore(session, kept, pose)
-    blender.part("live.tick").show(blender.beds()[0], back)
-    blender.part("live.tick").place_fingers(bpy.context, blender.beds()[0], back)
+    blender.part("live.tick").show(blender.bed(), back)
+    blender.part("live.tick").place_fingers(bpy.context, blender.bed(), back)
     blender.call(bpy.ops.ed.undo_push, message="Pins that stand out")
 
 

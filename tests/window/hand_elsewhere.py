@@ -143,7 +143,7 @@ def second_window():
 
 
 def sculpting():
-    blender.select(blender.beds()[0])
+    blender.select(blender.bed())
     home = blender.window().workspace
     blender.window().workspace = bpy.data.workspaces["Sculpting"]
     yield from blender.until(lambda: bpy.context.mode == "SCULPT")

@@ -33,7 +33,7 @@ def keep(name):
     places = np.column_stack([grid.positions, height])
     area, region = blender.view()
     with bpy.context.temp_override(window=blender.window(), area=area, region=region):
-        seen = blender.part("bridge").project(bpy.context, blender.beds()[0], places)
+        seen = blender.part("bridge").project(bpy.context, blender.bed(), places)
     blender.SEEN[name] |= {
         "shares": shares.tolist(),
         "seen": np.add(seen, (region.x, region.y)).round(1).tolist(),
@@ -97,10 +97,10 @@ def script():
     for what in ("BLUR", "BLUR"):
         yield from change("blurred", bpy.ops.digiclay.press_locks, change=what)
     blender.shot("locks_skin_blurred")
-    blender.beds()[0].digiclay_display.form = "pins"
+    blender.bed().digiclay_display.form = "pins"
     yield from blender.rounds(8)
     blender.shot("locks_pins_blurred")
-    blender.beds()[0].digiclay_display.form = "skin"
+    blender.bed().digiclay_display.form = "skin"
     yield from blender.rounds(8)
     settings.brush = "ERASE"
     yield from stroke("erased", (-27.0, -6.0), (27.0, 12.0), *HOW)
@@ -108,7 +108,7 @@ def script():
     blender.shot("locks_erased")
     yield from change("cleared", bpy.ops.digiclay.press_locks, change="CLEAR")
     blender.shot("locks_skin_cleared")
-    blender.beds()[0].digiclay_display.form = "pins"
+    blender.bed().digiclay_display.form = "pins"
     yield from blender.rounds(8)
     blender.shot("locks_pins_cleared")
     for name in ("skin", "pins_blurred", "skin_cleared", "pins_cleared"):
@@ -132,7 +132,7 @@ def without_session():
     """Look at two beds without a session, as skin and as pins, before and after the file is opened again."""
     yield from act("key Escape")
     yield from blender.stopped()
-    bed = blender.beds()[0]
+    bed = blender.bed()
     blender.select(bed)
     blender.call(bpy.ops.object.duplicate)
     other = bpy.context.object

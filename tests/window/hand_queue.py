@@ -129,9 +129,7 @@ def taken_back():
     yield from blender.until(lambda: not blender.sessions())
     note("stopped")
     bpy.ops.wm.open_mainfile(filepath=file)
-    yield from blender.until(
-        lambda: not blender.part("live.beds").read_queue(blender.beds()[0])[-1]
-    )
+    yield from blender.until(lambda: not blender.part("live.beds").read_queue(blender.bed())[-1])
     yield from blender.rounds()
     note("opened")
     brush().brush = "LOWER"

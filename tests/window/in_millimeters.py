@@ -16,7 +16,7 @@ def script():
     units.scale_length, units.length_unit = 1e-3, "MILLIMETERS"
     yield from add(bed="paper")
     area, _ = blender.view()
-    bed, graph = blender.beds()[0], bpy.context.evaluated_depsgraph_get()
+    bed, graph = blender.bed(), bpy.context.evaluated_depsgraph_get()
     blender.SEEN["size"] = list(bed.evaluated_get(graph).dimensions)
     blender.SEEN["millimeter"] = bpy.context.window_manager.operators[-1].properties.millimeter
     area.spaces.active.show_region_hud = True
@@ -35,7 +35,7 @@ def script():
 
 def find_pin(column, row):
     """Return the place of the pin that is seen at a place, pitches from the middle; None without."""
-    pitch = blender.beds()[0].digiclay.layout.pitch
+    pitch = blender.bed().digiclay.layout.pitch
     x, y = blender.on_the_bed(pitch * column, pitch * row)
     _, region = blender.view()
     with blender.in_the_view():

@@ -17,7 +17,7 @@ def press():
 
 def edit_in_mid_stroke():
     """Draw a stroke, go to Edit Mode before the fingertip has formed it, stop with Esc, and go on."""
-    blender.select(blender.beds()[0])
+    blender.select(blender.bed())
     yield None
     move, press = ("MOUSEMOVE", "NOTHING"), "LEFTMOUSE"
     settings = blender.part("press.brush").tool_settings(bpy.context)
@@ -73,14 +73,14 @@ def script():
 
     yield from edit_in_mid_stroke()
 
-    blender.beds()[0].scale = (1.0, 1.0, 1.5)
+    blender.bed().scale = (1.0, 1.0, 1.5)
     yield from after("scaled")
     blender.key("F", blender.on_the_bed(0.0, -25.0))  # at every redraw it would fail
     yield 1.0
     blender.SEEN["adjusting"] = [
         operator.bl_idname for operator in blender.window().modal_operators
     ]
-    blender.beds()[0].scale = (1.0, 1.0, 1.0)
+    blender.bed().scale = (1.0, 1.0, 1.0)
     yield from after("scaled no more")
 
     blender.call(bpy.ops.mesh.digital_clay_add, rows=9, columns=9)
@@ -98,7 +98,7 @@ def script():
     blender.key("Z", ctrl=True)
     yield 1.0
     blender.look("all back")
-    yield from blender.start(blender.beds()[0])
+    yield from blender.start(blender.bed())
     blender.look("started again")
 
     addon_utils.disable(blender.EXTENSION)

@@ -109,10 +109,8 @@ def replayed():
     yield 2.0
     note("replay stopped")
     blender.call(bpy.ops.digiclay.take_replay, "INVOKE_DEFAULT")
-    end = blender.part("recorded.takes").read(blender.beds()[0], "1").end
-    yield from blender.until(
-        lambda: blender.part("live.beds").read_snapshot(blender.beds()[0]) == end
-    )
+    end = blender.part("recorded.takes").read(blender.bed(), "1").end
+    yield from blender.until(lambda: blender.part("live.beds").read_snapshot(blender.bed()) == end)
     yield 1.0
     note("replayed")
 
@@ -153,10 +151,10 @@ def baked():
     yield 1.0
     note("bake stopped")
     blender.call(bpy.ops.digiclay.bake, "INVOKE_DEFAULT", source="TAKE", take="1", first=1)
-    yield from blender.until(lambda: blender.part("recorded.bake").is_baked(blender.beds()[0]))
+    yield from blender.until(lambda: blender.part("recorded.bake").is_baked(blender.bed()))
     yield 1.0
     note("baked")
-    bed = blender.beds()[0]
+    bed = blender.bed()
     blender.window().view_layer.objects.active = bed
     blender.SEEN["session on a bake"] = blender.call(bpy.ops.digiclay.session.poll)
     scene.frame_set(1)
@@ -184,7 +182,7 @@ def fingertip():
 
 def note(name):
     blender.look(name)
-    bed = blender.beds()[0]
+    bed = blender.bed()
     blender.SEEN[name] |= {
         "takes": [list(one) for one in blender.part("recorded.takes").list_takes(bed)],
         "is baked": blender.part("recorded.bake").is_baked(bed),
@@ -224,10 +222,10 @@ def leave_files():
 def recording():
     if not blender.beds():
         blender.call(bpy.ops.mesh.digital_clay_add, rows=9, columns=9)
-    yield from blender.start(blender.beds()[0])
+    yield from blender.start(blender.bed())
     blender.call(bpy.ops.digiclay.take_record)
     yield from blender.settle()
 
 
 def names():
-    return [entry.name for entry in blender.part("recorded.takes").list_takes(blender.beds()[0])]
+    return [entry.name for entry in blender.part("recorded.takes").list_takes(blender.bed())]

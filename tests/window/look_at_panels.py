@@ -31,7 +31,7 @@ def script():
         with blender.unfolded(picture, root, *sections.split()) as tab:
             yield from blender.open_sidebar(tab)
             blender.shot(f"panels_{picture}")
-    bed = blender.beds()[0]
+    bed = blender.bed()
     bed.digiclay.layout.columns = 20
     bed.digiclay.layout.pitch = 1.0
     bed.digiclay.use_delay = False
@@ -41,7 +41,7 @@ def script():
     blender.SEEN["rebuild refused"] = refused()
     bed.digiclay.layout.pitch = 3.0
     blender.SEEN["rebuilt"] = sorted(blender.call(bpy.ops.digiclay.rebuild))
-    blender.SEEN["pins"] = len(blender.beds()[0].data.vertices)
+    blender.SEEN["pins"] = len(blender.bed().data.vertices)
     yield from own_methods()
     yield from export()
 
@@ -53,7 +53,7 @@ def own_methods():
     (folder / "broken.py").write_text("x = (", encoding="utf-8")
     chosen = blender.preferences()
     chosen.methods_folder, chosen.run_own_methods = str(folder), True
-    blender.beds()[0].digiclay.chosen_method = "soft_pad"
+    blender.bed().digiclay.chosen_method = "soft_pad"
     with blender.unfolded("own", "DIGICLAY_PT_control", "control") as tab:
         yield from blender.open_sidebar(tab)
         blender.shot("panels_own")
@@ -83,7 +83,7 @@ def refused():
 def export():
     """Form a ridge and a pit on another bed, and take them out of the bed in every way there is."""
     yield from blender.scene_with_bed(bed="paper")
-    bed = blender.beds()[0]
+    bed = blender.bed()
     form(bed)
     with blender.unfolded("export", "DIGICLAY_PT_features") as tab:
         yield from blender.open_sidebar(tab)
@@ -109,7 +109,7 @@ def export():
     yield None
     yield None
     blender.SEEN["undone"] = count - len(bpy.data.objects)
-    blender.select(blender.beds()[0])
+    blender.select(blender.bed())
     yield from export_by_browser()
 
 

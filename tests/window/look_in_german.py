@@ -84,7 +84,7 @@ def script():
         for root, sections in PANELS.items():
             yield from unfold(root, sections)
     preferences.view.language, preferences.view.ui_scale = LOOKS[0]
-    blender.beds()[0].digiclay_display.overlay_full = True
+    blender.bed().digiclay_display.overlay_full = True
     yield from blender.start()
     blender.call(bpy.ops.digiclay.take_record)
     for root in LIVE:

@@ -23,7 +23,7 @@ def script():
 
 
 def gizmo():
-    yield from blender.start(blender.beds()[0])
+    yield from blender.start(blender.bed())
     blender.select(blender.fingertip())
     blender.choose_tool("builtin.move")
     yield None
@@ -65,7 +65,7 @@ def playback():
     scene.frame_end = 48
     scene.sync_mode = "FRAME_DROP"  # software GL draws two frames a second
     scene.frame_set(1)
-    yield from blender.start(blender.beds()[0])
+    yield from blender.start(blender.bed())
     blender.call(bpy.ops.screen.animation_play)
     yield from blender.until(lambda: lowest() < 39.5)
     blender.look("played")
@@ -85,7 +85,7 @@ def lowest():
 
 def windows():
     """Close a second window in mid-session; then close the one the session was started in."""
-    yield from blender.start(blender.beds()[0])
+    yield from blender.start(blender.bed())
     bpy.ops.wm.window_new()
     yield 1.0
     yield from closed("second window closed")
@@ -93,7 +93,7 @@ def windows():
     yield 0.5
     bpy.ops.wm.window_new()
     yield 1.0
-    blender.select(blender.beds()[0])
+    blender.select(blender.bed())
     with bpy.context.temp_override(window=bpy.context.window_manager.windows[-1]):
         bpy.ops.digiclay.session("INVOKE_DEFAULT")
     yield from blender.settle()
@@ -102,11 +102,11 @@ def windows():
     yield from blender.settle()
     yield from closed("its own window closed", lambda: not blender.sessions())
     list_takes = blender.part("recorded.takes").list_takes
-    kept = blender.SEEN["kept"] = [[entry.name for entry in list_takes(blender.beds()[0])]]
+    kept = blender.SEEN["kept"] = [[entry.name for entry in list_takes(blender.bed())]]
     for turn in (bpy.ops.ed.undo, bpy.ops.ed.redo):
         turn()
         yield 0.5
-    kept.append([entry.name for entry in list_takes(blender.beds()[0])])
+    kept.append([entry.name for entry in list_takes(blender.bed())])
 
 
 def closed(name, then=lambda: True):
@@ -127,7 +127,7 @@ def render():
     scene.cycles.samples, scene.cycles.use_denoising = 128, False
     scene.render.resolution_x, scene.render.resolution_y = 240, 180
     bpy.context.preferences.view.render_display_type = "NONE"
-    yield from blender.start(blender.beds()[0])
+    yield from blender.start(blender.bed())
     blender.call(bpy.ops.render.render, "INVOKE_DEFAULT")
     waits = []
     blender.SEEN["waits in a render"] = waits
@@ -153,7 +153,7 @@ def views():
     # A quarter of a small view has no room for the overlay.
     blender.call(bpy.ops.screen.screen_full_area)
     yield from blender.until(lambda: len(blender.window().screen.areas) < areas)
-    blender.part("operators.pin_view").pick_pins(blender.beds()[0], [312])
+    blender.part("operators.pin_view").pick_pins(blender.bed(), [312])
     blender.call(bpy.ops.screen.region_quadview)
     yield from blender.until(lambda: top_quarter() is not None)
     yield from tapped(blender.pixel(blender.world(15.0, -9.0), top_quarter()), "quad view")
@@ -212,7 +212,7 @@ def held():
 
 
 def at_rest():
-    blender.select(blender.beds()[0])
+    blender.select(blender.bed())
     blender.call(bpy.ops.digiclay.session_reset)
     blender.fingertip().location = 0.0, 0.0, 0.54
     bpy.ops.ed.undo_push(message="At rest")
@@ -228,7 +228,7 @@ def pick():
     blender.call(bpy.ops.digiclay.pick_pins, "INVOKE_DEFAULT")
     yield None
     yield from blender.click(blender.on_the_bed(-6, -9))
-    blender.SEEN["picked"] = list(picked(blender.beds()[0]))
+    blender.SEEN["picked"] = list(picked(blender.bed()))
     home = blender.window().workspace
     blender.window().workspace = bpy.data.workspaces["Animation"]
     yield None
@@ -237,10 +237,10 @@ def pick():
         area for area in blender.window().screen.areas if area.type == "DOPESHEET_EDITOR"
     )
     yield from blender.click((timeline.x + timeline.width // 2, timeline.y + timeline.height // 2))
-    blender.SEEN["clicked in the timeline"] = list(picked(blender.beds()[0]))
+    blender.SEEN["clicked in the timeline"] = list(picked(blender.bed()))
     yield from blender.whole_view()
     yield from blender.click(blender.on_the_bed(6, -9))
-    blender.SEEN["picked elsewhere"] = list(picked(blender.beds()[0]))
+    blender.SEEN["picked elsewhere"] = list(picked(blender.bed()))
     blender.SEEN["told in"] = list(blender.part("operators.action")._TOLD)
     blender.key("RET")
     yield 0.3
@@ -256,7 +256,7 @@ def escape():
     usual = session_loop.EVERY, session_loop.MOMENT
     session_loop.EVERY, session_loop.MOMENT = 0.5, 5.0
     for name in ("VIEW_3D", "PROPERTIES"):
-        blender.select(blender.beds()[0])
+        blender.select(blender.bed())
         blender.call(bpy.ops.digiclay.session, "INVOKE_DEFAULT")
         area = next(one for one in blender.window().screen.areas if one.type == name)
         at = area.x + area.width // 2, area.y + area.height // 2
@@ -313,14 +313,14 @@ def changed_by_f9(name):
 def units():
     """Delete a bed, undo and redo that; drag a copy off, undo and redo that; hide; delete in mid-session."""
     blender.hover(blender.middle())
-    blender.select(blender.beds()[0])
+    blender.select(blender.bed())
     yield 0.5
     counted("one bed")
     yield from pressed("deleted", "DEL")
     yield from pressed("delete undone", "Z", ctrl=True)
     yield from pressed("delete redone", "Z", ctrl=True, shift=True)
     yield from pressed("delete undone again", "Z", ctrl=True)
-    blender.select(blender.beds()[0])
+    blender.select(blender.bed())
     blender.key("D", shift=True)
     yield 1.0
     counted("copy in hand")
@@ -332,7 +332,7 @@ def units():
     yield from changed_by_f9("copy changed by F9")
     yield from pressed("copy undone", "Z", ctrl=True)
     yield from pressed("copy redone", "Z", ctrl=True, shift=True)
-    blender.select(blender.beds()[0])
+    blender.select(blender.bed())
     yield from pressed("hidden", "H")
     yield from pressed("shown", "H", alt=True)
     yield from blender.start(blender.beds()[1])

@@ -7,7 +7,7 @@ from tests.window import driver as blender
 
 def script():
     yield from blender.scene_with_bed(bed="paper")
-    origin = blender.beds()[0].location
+    origin = blender.bed().location
     # Upside down, its lowest point some millimeters above the pins.
     bpy.ops.mesh.primitive_monkey_add(
         size=0.4, location=(origin.x, origin.y, origin.z + 0.65), rotation=(3.1416, 0.0, 0.0)

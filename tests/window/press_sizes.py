@@ -55,7 +55,7 @@ def script():
 def write_down(name):
     """Note the sizes, in mm, and the sessions."""
     note(name)
-    bed, settings, session = blender.beds()[0], brush(), blender.session()
+    bed, settings, session = blender.bed(), brush(), blender.session()
     blender.SEEN[name] |= {
         "size": bed.digiclay.size,
         "drawn size": 2e3 * blender.part("bridge").finger_of(blender.fingertip()).width,
@@ -226,7 +226,7 @@ def put_cube():
     blender.call(bpy.ops.mesh.primitive_cube_add, size=0.12)
     blender.choose_tool()
     yield from focus_window()
-    blender.window().view_layer.objects.active = blender.beds()[0]
+    blender.window().view_layer.objects.active = blender.bed()
     blender.call(bpy.ops.digiclay.session, "INVOKE_DEFAULT")
     yield 1.0
 
@@ -250,7 +250,7 @@ def quarters():
         with bpy.context.temp_override(window=blender.window(), area=area, region=region):
             context = bpy.context
             kind = "top" if abs(context.region_data.view_matrix[2][2]) > 0.99 else "other"
-            bed = blender.beds()[0]
+            bed = blender.bed()
             for what, place in (("covered", COVERED), ("bare", BARE)):
                 point = 1e-3 * np.array([[*place, 40.0]])
                 (xy,) = blender.part("bridge").project(context, bed, point)

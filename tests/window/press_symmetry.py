@@ -40,7 +40,7 @@ TIMED = {
 def script():
     """Do what a hand does."""
     yield from prepare("TOP", bed="paper")
-    bed = blender.beds()[0]
+    bed = blender.bed()
     bed.rotation_euler[2], bed.location[0], bed.location[1] = 0.4, 0.3, -0.2
     blender.evaluate()
     yield None
@@ -128,7 +128,7 @@ def impatient():
     blender.SEEN["at the end"] = session.poses.shape
     yield from act("key Escape")
     yield from blender.stopped()
-    bed = blender.beds()[0]
+    bed = blender.bed()
     take = blender.part("recorded.takes").read(bed)
     blender.SEEN["take"] = [max(take.fingers), min(take.fingers)]
     blender.call(bpy.ops.digiclay.take_replay)  # in steps of its own

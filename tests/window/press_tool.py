@@ -60,9 +60,9 @@ def note(name):
         "finger": (1e3 * blender.part("bridge").pose(tip)[:3]).tolist(),
         "overlay": blender.part("overlay.views").shown(),
         "forces written": bool(
-            blender.part("bridge").read_cells(blender.beds()[0].data)["force"].any()
+            blender.part("bridge").read_cells(blender.bed().data)["force"].any()
         ),
-        "picked": list(blender.part("device.view").picked_pins(blender.beds()[0])),
+        "picked": list(blender.part("device.view").picked_pins(blender.bed())),
     }
 
 
@@ -95,7 +95,7 @@ def script():
 def said(name):
     """Write down what is shown beside the cursor."""
     chosen = blender.part("press.brush").tool_settings(bpy.context)
-    blender.SEEN[name] = blender.part("press.tool").describe(blender.beds()[0], chosen)
+    blender.SEEN[name] = blender.part("press.tool").describe(blender.bed(), chosen)
 
 
 def keys():
@@ -201,7 +201,7 @@ def disabled():
 
 
 def shown():
-    blender.window().view_layer.objects.active = blender.beds()[0]
+    blender.window().view_layer.objects.active = blender.bed()
     blender.call(bpy.ops.digiclay.pick_pins, "INVOKE_DEFAULT")
     yield None
     for x in (-12.0, 0.0, 12.0):
@@ -211,7 +211,7 @@ def shown():
     note("picked")
     chosen = bpy.context.preferences.addons[blender.EXTENSION].preferences
     chosen.overlay_corner = "bottom_right"  # the finger is on the left
-    display = blender.beds()[0].digiclay_display
+    display = blender.bed().digiclay_display
     blender.part("overlay.ready_view").SIDEBAR = 0.0  # none is opened in the guide's picture
     # The bed makes room for all of the overlay: the hand goes where it then is seen.
     display.form, display.color, display.arrows, display.overlay_full = "pins", "force", True, True
@@ -249,7 +249,7 @@ def ended():
     note("ended")
     yield from drag([(20.0, 20.0)])
     note("started anew")
-    bpy.data.objects.remove(blender.beds()[0])
+    bpy.data.objects.remove(blender.bed())
     yield from blender.stopped()
     blender.look("bed deleted")
     blender.event("LEFTMOUSE", "RELEASE", blender.middle())

@@ -57,7 +57,7 @@ def valley():
     bpy.ops.wm.open_mainfile(filepath=path)
     yield from after("loaded")
     blender.shot("session_loaded")
-    yield from blender.start(blender.beds()[0])
+    yield from blender.start(blender.bed())
     blender.look("going on")
     yield from after("stopped", "ESC")
     blender.shot("session_stopped")
@@ -71,7 +71,7 @@ def shape():
     yield from blender.scene_with_bed(bed="paper")
     yield from blender.open_sidebar()
     yield from blender.whole_view()
-    blender.select(blender.beds()[0])
+    blender.select(blender.bed())
     blender.look("flat")
     blender.call(bpy.ops.digiclay.shape_sample, "EXEC_DEFAULT", True, sample="ripple", rise=12.0)
     yield None
@@ -95,7 +95,7 @@ def shape():
     blender.look("formed shape")
     blender.call(bpy.ops.digiclay.shape_keep, "EXEC_DEFAULT", True)
     yield None
-    blender.SEEN["kept"] = len(blender.beds()[0].digiclay.shape.heights)
+    blender.SEEN["kept"] = len(blender.bed().digiclay.shape.heights)
     blender.call(bpy.ops.mesh.digital_clay_make, "EXEC_DEFAULT", True, kind="solid", beside=False)
     yield None
     mesh = blender.window().view_layer.objects.active
@@ -107,7 +107,7 @@ def shape():
 
     blender.key("Z", ctrl=True)
     yield None
-    blender.SEEN["keeping undone"] = blender.beds()[0].digiclay.shape.file
+    blender.SEEN["keeping undone"] = blender.bed().digiclay.shape.file
 
     blender.call(bpy.ops.wm.call_menu, "INVOKE_DEFAULT", name="DIGICLAY_MT_samples")
     yield None
@@ -126,7 +126,7 @@ def shape():
 
 def note(name):
     session, roles = blender.sessions()[0], blender.part("roles")
-    bed = blender.beds()[0]
+    bed = blender.bed()
     blender.SEEN[name] = {
         "numbers": list(session.numbers),
         "tips": list(roles.fingertips_of(bed)),
@@ -142,7 +142,7 @@ def list_hidden():
     with blender.watch_overlay() as drawn:
         blender.shot("hand above")
     box = drawn[0][1].boxes[0]
-    tips = blender.part("roles").fingertips_of(blender.beds()[0]).items()
+    tips = blender.part("roles").fingertips_of(blender.bed()).items()
     places = np.array([blender.pixel(tip.matrix_world.translation) for _, tip in tips])
     aside = places - [region.x + box.x, region.y + box.y]
     inside = ((aside > 0.0) & (aside < [box.width, box.height])).all(axis=1)
@@ -159,14 +159,14 @@ def several_fingers():
     note("two")
     roles = blender.part("roles")
     for number, x in ((1, -14.0), (2, 14.0)):
-        tip = roles.fingertips_of(blender.beds()[0])[number]
+        tip = roles.fingertips_of(blender.bed())[number]
         tip.location.x, tip.location.y = 1e-2 * x, 0.0
         blender.select(tip)
         yield from blender.grab((0.0, 0.0, -9.0), "Z", periods=4)
     note("two pressed")
     blender.shot("two")
-    blender.select(blender.beds()[0])
-    blender.beds()[0].digiclay_display.overlay_full = True
+    blender.select(blender.bed())
+    blender.bed().digiclay_display.overlay_full = True
     blender.call(bpy.ops.digiclay.add_hand)
     yield from blender.settle()
     note("hand")
@@ -181,7 +181,7 @@ def several_fingers():
     yield from blender.undo("undone")
     yield from blender.settle(10)
     note("hand again")
-    blender.select(roles.fingertips_of(blender.beds()[0])[4])
+    blender.select(roles.fingertips_of(blender.bed())[4])
     blender.key("D", shift=True)
     yield 0.5
     blender.key("RET")

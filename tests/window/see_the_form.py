@@ -33,7 +33,7 @@ def read_shot(name):
 def add_by_hand(name, add=bpy.ops.mesh.digital_clay_add, **chosen):
     """Add a bed as its menu entry does, beside or on what the factory file has; note how it is seen."""
     area, region = blender.view()
-    for thing in [blender.beds()[0], blender.fingertip()] if blender.beds() else []:
+    for thing in [blender.bed(), blender.fingertip()] if blender.beds() else []:
         bpy.data.objects.remove(thing)
     blender.call(add, "INVOKE_DEFAULT", **chosen)
     room = blender.part("overlay.views").find_free_room(area, region)
@@ -60,7 +60,7 @@ def see_at_once():
     draw_lines(10, 3.0)
     blender.shot("ten lines")
     blender.SEEN["lit"] = measure_lines(10, "ten lines")
-    shading, display = area.spaces.active.shading, blender.beds()[0].digiclay_display
+    shading, display = area.spaces.active.shading, blender.bed().digiclay_display
     blender.SEEN["shading"] = [shading.light, shading.show_cavity]
     shading.light, shading.show_cavity, display.form = "STUDIO", False, "pins"
     blender.shot("ten lines as pins")
@@ -75,7 +75,7 @@ def see_at_once():
 
 def draw_lines(count, depth):
     """Put the pins where a fingertip of 8 mm would leave them after lines of 100 mm, of a depth in mm."""
-    bed, bridge = blender.beds()[0], blender.part("bridge")
+    bed, bridge = blender.bed(), blender.part("bridge")
     place = bridge.read_cells(bed.data)["position"]
     x, y = 1e3 * place.T
     aside = np.abs(y[:, None] - lines_at(count)).min(axis=1)
@@ -105,7 +105,7 @@ def measure_lines(count, name):
 
 
 def rectangle_of_the_bed():
-    bed = blender.beds()[0]
+    bed = blender.bed()
     corners = np.array(
         [blender.pixel(bed.matrix_world @ Vector(corner)) for corner in bed.bound_box]
     )
@@ -123,7 +123,7 @@ def count_covered():
 
 
 def note(name):
-    form, bed = blender.part("device.view"), blender.beds()[0]
+    form, bed = blender.part("device.view"), blender.bed()
     blender.shot(name)
     blender.SEEN[name] = {
         "form": bed.digiclay_display.form,
@@ -155,7 +155,7 @@ def script():
     add_bed()
     watch_overlay()
     yield from focus_window()
-    blender.select(blender.beds()[0])
+    blender.select(blender.bed())
     note("selected")
     middle = on_the_screen(0.0, 0.0)
     yield from levels_of_detail()
@@ -175,7 +175,7 @@ def script():
         yield from act(to(on_the_screen(place, -4.0), 0.3))
         texts.append(blender.SEEN["text"])
     preferences.show_cursor_text, blender.SEEN["texts"] = True, texts
-    bed = blender.beds()[0]
+    bed = blender.bed()
     yield from blender.open_sidebar()
     looking, covered = blender.view()[0].spaces.active.region_3d, []
     before = looking.view_distance, looking.view_location.copy()
