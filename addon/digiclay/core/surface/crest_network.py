@@ -6,7 +6,7 @@ the third branch of a T ends at the other two. A short stretch that two lines sh
 of two circles, belongs to both.
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Container, Iterable, Sequence
 from dataclasses import dataclass, field
 from itertools import combinations, permutations
 
@@ -342,7 +342,7 @@ def _round(network: Network, first: End, second: End) -> Floats:
 
 def _begin(network: Network, end: End) -> Floats:
     """Return where a branch comes out of its junction, (2,)."""
-    return _without_nodes(network, end, {end: (end, np.empty((0, 2)))})[0]
+    return _without_nodes(network, end, {end})[0]
 
 
 def _meeting(network: Network, end: End, other: End) -> Floats | None:
@@ -415,13 +415,13 @@ def _assembled(network: Network, joints: Joints, junctions: frozenset[int]) -> I
         yield Chain(np.concatenate(parts), closed, (joined[0], joined[1]), junctions & nodes)
 
 
-def _without_nodes(network: Network, end: End, joints: Joints) -> Floats:
-    """Return the points of a branch from one end on, without those in the junctions it runs through."""
+def _without_nodes(network: Network, end: End, through: Container[End]) -> Floats:
+    """Return the points of a branch from an end on, without those in junctions that ends run `through`."""
     points, branch = network.away(end), network.branches[end[0]]
     outside = np.ones(len(points), bool)
     for k in (0, 1):
         node = branch.nodes[k]
-        if (end[0], k) in joints and len(network.ends(node)) > 2:
+        if (end[0], k) in through and len(network.ends(node)) > 2:
             outside &= np.hypot(*(points - network.position[node]).T) > THROUGH * network.half[node]
     middle = len(points) // 2
     outside[middle] |= not outside.any()
