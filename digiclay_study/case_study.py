@@ -308,17 +308,17 @@ def _write(out: Path, study: Study, records: dict[int, Record]) -> list[str]:
         for name, group in groups.items()
     }
     save(draw_limits(study.minimized, limits, curves), out / "limits.png")
-    answers = [f"{name}: {_answer(study, group)}" for name, group in groups.items()]
+    answers = [f"{name}: {answer(study, group)}" for name, group in groups.items()]
     page = [f"# Least {study.minimized}", *answers, "![Worst cases](limits.png)\n"]
     write_whole(out / "study.md", "\n\n".join(page).encode())
     return [*answers, f"written to {out}: start with study.md"]
 
 
-def _answer(study: Study, candidates: Sequence[Candidate]) -> str:
+def answer(study: Study, candidates: Sequence[Candidate]) -> str:
     """Return the least candidate as text, and which larger ones fail."""
     best = find_least(candidates)
     worst = (
-        f"{name} {value:.3g} (at most {most:g})"
+        f"{name} {'absent' if math.isinf(value) else f'{value:.3g}'} (at most {most:g})"
         for (name, most), value in zip(study.limits.items(), best.figures, strict=True)
     )
     text = f"{study.minimized} {best.amount:g} ({', '.join(best.words)}), {', '.join(worst)}"

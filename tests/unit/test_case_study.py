@@ -13,6 +13,7 @@ from digiclay.core.studies.speed_limits import Stroke, make_trial
 
 from digiclay_study.case_study import (
     Candidate,
+    answer,
     compare_relief,
     find_candidates,
     find_least,
@@ -157,6 +158,10 @@ def test_a_candidate_of_a_variant_has_the_worst_figures_of_its_cases():
         1.0,
         1.0,
     ]
+    # A method without a set point, say, has no force deviation.
+    assert "nearest: valve.stroke 4.5e-05 (45 um), rfd_ratio absent (" in answer(
+        study, found["soft"][1:]
+    )
     assert [(each.amount, *each.words) for each in found["hard"]] == [
         (pytest.approx(15e-6), "15 um"),
         (pytest.approx(45e-6), "45 um"),
