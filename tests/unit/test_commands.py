@@ -153,6 +153,9 @@ def stopped(monkeypatch, capsys):
     return run
 
 
+RUN_FILES = {"scene.toml", "history.npz", "metrics.json"}
+
+
 def list_files(folder):
     return {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
 
@@ -176,7 +179,7 @@ def test_what_is_stopped_before_its_extras_names_them_and_how_to_make_them(
     assert main([*command, "--out", "whole"]) == 0
     commands = stopped(run_command, "save", *command)
     assert list(commands) == made
-    assert list_files(here / OUT) == {"scene.toml", "history.npz", "metrics.json"}
+    assert list_files(here / OUT) == RUN_FILES
     assert not read_json(here / OUT / "metrics.json")["incomplete"]
     for command in commands.values():
         assert main(command) == 0

@@ -15,7 +15,7 @@ from scipy import stats
 
 from tests.assemble import table
 from tests.scene_files import SMALL_BLISTER, call, read_json, scene_text
-from tests.unit.test_commands import list_files, stop_before
+from tests.unit.test_commands import RUN_FILES, list_files, stop_before
 
 pytestmark = pytest.mark.usefixtures("here")
 
@@ -336,12 +336,7 @@ def test_members_that_fail_are_counted_and_said_and_none_is_dropped(here, capsys
     err = capsys.readouterr().err
     assert err.startswith("No metric has 40 members: ")
     assert "of 40 members failed; the first: At 0.0" in err
-    assert list_files(here / "o") == {
-        "scene.toml",
-        "history.npz",
-        "metrics.json",
-        "uncertainty.json",
-    }
+    assert list_files(here / "o") == {*RUN_FILES, "uncertainty.json"}
 
 
 @table(
@@ -358,7 +353,7 @@ def test_a_run_stopped_before_its_bands_says_how_to_have_them(
     with monkeypatch.context() as patched:
         stop_before(patched, module, step)
         assert call(line) == 130
-    assert list_files(here / "first") == {"scene.toml", "history.npz", "metrics.json"}
+    assert list_files(here / "first") == RUN_FILES
     said = capsys.readouterr().err.splitlines()[-1]
     begin = "Stopped before uncertainty.json; to have it: digiclay "
     assert said.startswith(begin)
@@ -374,7 +369,7 @@ def test_a_run_outlives_the_processes_of_its_members(measured, here, monkeypatch
     assert call(f"{line} --scheduler tcp://127.0.0.1:9") == 2
     told, error = capsys.readouterr().err.splitlines()
     assert error.startswith("No Dask scheduler answers")
-    assert list_files(here / "first") == {"scene.toml", "history.npz", "metrics.json"}
+    assert list_files(here / "first") == RUN_FILES
     assert call(told.partition("to have it: digiclay ")[2]) == 0
     again = (here / "first/uncertainty.json").read_bytes()
     assert again == (measured / "o/uncertainty.json").read_bytes()
