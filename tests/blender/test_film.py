@@ -24,12 +24,12 @@ from digiclay.core.model.fingertip import LEVEL, Fingertip
 from digiclay.core.model.layout import Layout, make_grid
 from digiclay.core.scene.toml_table import resolve
 from digiclay.core.session.finished_run import read_run
-from digiclay.core.session.render_settings import Film, Still, Turntable, list_missing, name_frame
+from digiclay.core.session.render_settings import Film, Turntable, list_missing, name_frame
 from digiclay.core.session.run_scene import run as simulate
 from digiclay.core.shapes.body import pack_mesh
 from digiclay.core.studies.job_table import read_outputs
 from digiclay.device.instant import Instant
-from digiclay.pictures import film, still
+from digiclay.pictures import film
 from digiclay.pictures.film import draw_frames, stage_film
 from digiclay.pictures.stage import BODY
 from digiclay.roles import BED, FINGERTIP, ROLE, ellipsoid, fingertips_of
@@ -76,20 +76,18 @@ def frames_of(path, folder):
     return rate, pictures
 
 
-def render(shown, out, looks, set_point=None, **known):
-    """Draw a film of a history, or a turntable of an instant."""
-    if isinstance(looks, Film):
-        stage = film.stage_film(
-            shown, looks, ("total force", shown["total_force"]), set_point=set_point
-        )
-    else:
-        stage = film.stage_turntable(shown, looks)
-    return film.render_film(stage, out, looks, **known)
+def stage(shown, looks, set_point=None):
+    """Set the stage for a film of a history, or a turntable of an instant."""
+    if isinstance(looks, Turntable):
+        return film.stage_turntable(shown, looks)
+    return stage_film(shown, looks, ("total force", shown["total_force"]), set_point=set_point)
 
 
-def filmed(shown, path, looks):
-    assert render(shown, path, looks) == path
-    return frames_of(path, path.with_suffix(""))[1]
+def draw(shown, folder, looks):
+    """Draw all frames of a film or turntable; return them."""
+    with stage(shown, looks) as shots:
+        assert draw_frames(shots, range(shots.count), folder, folder / "film.mp4")
+    return [read_picture(name_frame(folder, frame)) for frame in range(shots.count)]
 
 
 def looks_like(pixels, mode):
@@ -101,13 +99,15 @@ def looks_like(pixels, mode):
     return int((cosine > 0.97).sum())
 
 
-def test_a_film_shows_the_rows_in_their_colors_at_its_rate(tmp_path, history):
+def test_a_film_shows_the_rows_in_their_colors_at_its_rate_and_what_lost_its_end_is_known(
+    tmp_path, history
+):
     before, told = inventory(), list[tuple[int, int]]()
     history["total_force"][:] = 0.3
     looks = Film(**SMALL, color="mode", arrows=False)
-    path = render(
-        history, tmp_path / "a film.mp4", looks, set_point=0.3, progress=lambda *at: told.append(at)
-    )
+    path = tmp_path / "a film.mp4"
+    staged = stage(history, looks, set_point=0.3)
+    assert film.render_film(staged, path, looks, lambda *at: told.append(at)) == path
     assert inventory() == before
     assert told == [(i, 5) for i in range(1, 6)]
     assert [file.name for file in tmp_path.iterdir()] == ["a film.mp4"]
@@ -123,15 +123,19 @@ def test_a_film_shows_the_rows_in_their_colors_at_its_rate(tmp_path, history):
     shares = [np.flatnonzero(row).max(initial=0) / WIDTH for row in lower]
     # The strip goes from 3 % to 97 % of the width; letters and the cursor are 2 % wide.
     np.testing.assert_allclose(shares[1:], 0.03 + 0.94 * np.arange(1, 5) / 4, rtol=0, atol=0.03)
+    frame = next((tmp_path / "frames").iterdir())
+    for file, is_whole in ((path, film.is_whole_film), (frame, is_whole_picture)):
+        data = file.read_bytes()
+        assert is_whole(data)
+        ends = (0, 8, 100, len(data) // 2, len(data) - 1)
+        assert not any(is_whole(data[:count]) for count in ends)
 
 
 def test_arrows_are_red_and_only_there_when_asked_for(tmp_path, history):
     counts = []
     for arrows in (False, True):
         looks = Film(**SMALL, start=0.4, stop=0.45, arrows=arrows, strip=False)
-        red, green, blue = np.moveaxis(
-            filmed(history, tmp_path / f"{arrows}.mp4", looks)[-1], -1, 0
-        )
+        red, green, blue = np.moveaxis(draw(history, tmp_path / f"{arrows}", looks)[-1], -1, 0)
         counts.append(int(((red > 0.4) & (green < 0.5 * red) & (blue < 0.5 * red)).sum()))
         assert not (blue[6] - red[6] > 0.25).any(), "without a strip there is none"
     assert counts[0] < 5 < counts[1]
@@ -139,7 +143,7 @@ def test_arrows_are_red_and_only_there_when_asked_for(tmp_path, history):
 
 def test_a_bed_colored_by_force_changes_its_colors_with_the_force(tmp_path, history):
     history["force"] = history["force"] * 10.0
-    pictures = filmed(history, tmp_path / "film.mp4", Film(**SMALL, color="force", arrows=False))
+    pictures = draw(history, tmp_path, Film(**SMALL, color="force", arrows=False))
     middle = [picture[HEIGHT // 2 :, WIDTH // 3 :].reshape(-1, 3) for picture in pictures]
     yellow = [int(((p[:, 1] > 0.8 * p[:, 0]) & (p[:, 2] < 0.5 * p[:, 0])).sum()) for p in middle]
     assert yellow[0] < 5 < yellow[-1] / 10
@@ -149,7 +153,7 @@ def test_a_turntable_turns_once_and_shows_no_fingertip(tmp_path, history):
     # One half of the bed is blue: its middle goes round.
     history["mode"][-1] = np.where(history["position"][:, 0] > 0.0, Mode.HOLD, Mode.REST)
     instant = Instant.of(history, -1)
-    pictures = filmed(instant, tmp_path / "turn.mp4", Turntable(**SMALL, color="mode", frames=4))
+    pictures = draw(instant, tmp_path, Turntable(**SMALL, color="mode", frames=4))
     assert len(pictures) == 4
     across = []
     for picture in pictures:
@@ -165,30 +169,14 @@ def test_a_film_that_is_stopped_leaves_nothing_and_a_folder_that_cannot_be_writt
     tmp_path, history
 ):
     asked = iter([False, True])
-    path = tmp_path / "film.mp4"
-    assert render(history, path, Film(**SMALL), stopped=lambda: next(asked)) is None
+    path, looks = tmp_path / "film.mp4", Film(**SMALL)
+    staged = stage(history, looks)
+    assert film.render_film(staged, path, looks, stopped=lambda: next(asked)) is None
     assert list(tmp_path.iterdir()) == []
     (tmp_path / "file").touch()
     with pytest.raises(OutputError, match=r"film\.mp4 cannot be written") as caught:
-        render(history, tmp_path / "file" / "film.mp4", Film(**SMALL))
+        film.render_film(stage(history, looks), tmp_path / "file" / "film.mp4", looks)
     assert "\n" not in str(caught.value)
-
-
-def test_a_film_or_frame_that_lost_its_end_is_known(tmp_path, history):
-    path = render(history, tmp_path / "film.mp4", Film(**SMALL, stop=0.3))
-    data = path.read_bytes()
-    assert film.is_whole_film(data)
-    assert not any(
-        film.is_whole_film(data[:count]) for count in (0, 8, 100, len(data) // 2, len(data) - 1)
-    )
-    path = still.render_still(
-        Instant.of(history), tmp_path / "still.png", Still(width=32, height=20, engine="workbench")
-    )
-    picture = path.read_bytes()
-    assert is_whole_picture(picture)
-    assert not any(
-        is_whole_picture(picture[:count]) for count in (0, 8, len(picture) // 2, len(picture) - 1)
-    )
 
 
 @pytest.mark.skipif(
@@ -202,11 +190,12 @@ def test_on_a_full_disk_nothing_half_written_stays(tmp_path, history):
     )
     if made.returncode:
         pytest.skip("this machine does not let root mount a disk")
+    looks = Film(**SMALL, stop=0.3)
     try:
         with pytest.raises(
             OutputError, match=r"film\.mp4 cannot be written: [Nn]o space"
         ) as caught:
-            render(history, disk / "film.mp4", Film(**SMALL, stop=0.3))
+            film.render_film(stage(history, looks), disk / "film.mp4", looks)
         assert "\n" not in str(caught.value)
         assert list(disk.iterdir()) == []
     finally:
