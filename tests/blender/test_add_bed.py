@@ -134,15 +134,17 @@ def test_a_bed_of_any_scale_stands_on_the_cursor_with_its_fingertip_above(scale)
 def test_a_bed_has_its_true_size_where_a_unit_is_no_meter(system, unit, given, scale, millimeter):
     units = bpy.context.scene.unit_settings
     units.system, units.scale_length = system, unit
-    for added in (
-        lambda: bpy.ops.mesh.digital_clay_add(rows=2, columns=2, **given),
-        lambda: bpy.ops.digiclay.add_sample(sample="session:tap", take=False, **given),
-    ):
-        added()
-        assert tuple(bpy.context.object.scale) == pytest.approx((scale,) * 3, rel=1e-5)
+    bed = add(rows=2, columns=2, **given)
+    assert tuple(bed.scale) == pytest.approx((scale,) * 3, rel=1e-5)
     shown = bpy.context.window_manager.operator_properties_last("mesh.digital_clay_add")
     shown.scale = scale
     assert shown.millimeter * unit == pytest.approx(millimeter, rel=1e-5)
+
+
+def test_a_sample_has_its_true_size_too():
+    bpy.context.scene.unit_settings.scale_length = 0.001
+    bpy.ops.digiclay.add_sample(sample="session:tap", take=False)
+    assert tuple(bpy.context.object.scale) == pytest.approx((100.0,) * 3, rel=1e-5)
 
 
 @pytest.mark.parametrize("name", BEDS)
@@ -244,9 +246,9 @@ def test_applying_one_of_the_core_s_presets_changes_what_a_scene_file_would(name
     "name",
     ["", "  ", "paper", "Viscous", "../up", "a/b", ".hidden", "x" * 61, "a\nb", "what?", "end."],
 )
-def test_a_name_that_no_preset_can_have_is_refused(name, bed):
+def test_a_name_that_no_preset_can_have_is_refused(name):
     with pytest.raises(OutputError, match=r"^The preset's name must"):
-        own_presets.save(name, properties.scene_of(bed))
+        own_presets.save(name, resolve({}))
     assert own_presets.names() == []
 
 
