@@ -29,7 +29,7 @@ from tests.blender.session.live import (
 )
 
 #: Rows of the strokes, mm, and where they begin and end.
-ROWS, ENDS = (-12.0, 0.0, 12.0), (-4.0, 4.0)
+ROWS, ENDS = (-12.0, 0.0, 12.0), (-9.0, 9.0)
 
 
 def draw(y, **how):
@@ -54,7 +54,7 @@ def form(clock):
 
 def rows():
     """Tell which strokes are formed, each wholly or not at all."""
-    down = 40e-3 - exact().reshape(13, 13)[[round(6 + y / 3) for y in ROWS]][:, 5:8]
+    down = 40e-3 - exact().reshape(13, 13)[[round(6 + y / 3) for y in ROWS]][:, 4:9]
     assert all(row.min() > 1e-3 or row.max() < 0.7e-3 for row in down), down
     return [bool(row.min() > 1e-3) for row in down]
 
@@ -207,7 +207,7 @@ def test_strokes_from_the_base_leave_one_depth_until_set_base_which_undo_takes_b
     for base in (False, False, True, False):
         press(0.0, base)
     form(clock)
-    row = slice(13 * 6 + 5, 13 * 6 + 8)
+    row = slice(13 * 6 + 4, 13 * 6 + 9)
     # Pins that give way to a force stand 1.1 mm less deep than the fingertip came, and a little
     # deeper after each pass.
     once, twice = 40e-3 - 1.9e-3, 40e-3 - 3.8e-3
