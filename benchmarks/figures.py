@@ -5,14 +5,13 @@ import csv
 import math
 import re
 import subprocess
-import tomllib
 from functools import cache
 from pathlib import Path
 
 from digiclay.core.base.errors import OutputError
 from digiclay.core.files.tables import Record, Table
 from digiclay.core.metrics.metric_table import ERRORS, FACTORS
-from digiclay.core.scene.scene_source import Setting, find, load
+from digiclay.core.scene.scene_source import Setting, find, load, read_table
 from digiclay.core.session.run_scene import run
 from digiclay.core.studies.speed_limits import Criterion, find_largest_speed
 
@@ -48,7 +47,7 @@ USUAL: Row = {
 @cache
 def read_plan() -> Record:
     """Return figures.toml."""
-    return tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
+    return read_table(Path(__file__).with_suffix(".toml"))
 
 
 def read_figures(page: str | None = None) -> list[Row]:

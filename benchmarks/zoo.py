@@ -1,11 +1,11 @@
 """Benchmark ``zoo``: published figures of pin displays beside those of the sample scenes."""
 
 import argparse
-import tomllib
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+from digiclay.core.scene.scene_source import read_table
 from digiclay.core.session.run_scene import Result, run
 from digiclay.front_door import change_scene
 
@@ -66,9 +66,7 @@ def judge(figure: Row) -> Row:
 
 def measure(arguments: argparse.Namespace, steps: Steps) -> Report:
     """Simulate all displays; what the model lacks follows the table."""
-    figures = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))[
-        "figure"
-    ]
+    figures = read_table(Path(__file__).with_suffix(".toml"))["figure"]
     chosen = [row for row in figures if not (arguments.quick and row.get("slow"))]
     rows = [judge(row) for row in steps.through(chosen, lambda row: row["scene"])]
     lacks = [f"  {row['scene']} lacks {row['lacks']}" for row in chosen if "lacks" in row]

@@ -1,10 +1,9 @@
 """Claims of the paper beside measurements, with numbers from the results alone."""
 
-import tomllib
 from pathlib import Path
 from typing import NamedTuple
 
-from digiclay.core.files.tables import Record
+from digiclay.core.scene.scene_source import read_table
 
 from . import evidence
 from .evidence import MM
@@ -12,7 +11,7 @@ from .results import AHEAD, PAPER_SPEED, Results
 from .scenes import PRESSED
 
 #: Claims, figures and metrics of the page, in its order.
-TEXTS: Record = tomllib.loads(Path(__file__).with_name("paper.toml").read_text(encoding="utf-8"))
+TEXTS = read_table(Path(__file__).with_name("paper.toml"))
 
 
 class Claim(NamedTuple):

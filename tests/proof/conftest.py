@@ -5,9 +5,9 @@ import subprocess
 from functools import partial
 
 import pytest
-from digiclay.cli import main
 
 from tests.other_process import carry_out
+from tests.scene_files import call
 
 PROGRAMS = ("admesh", "assimp", "prusa-slicer")
 
@@ -26,23 +26,19 @@ def pytest_collection_modifyitems(items):
 @pytest.fixture(scope="session")
 def paper(tmp_path_factory):
     folder = tmp_path_factory.mktemp("proof") / "paper"
-    assert main(["run", "ridge_mound_valley", "--out", str(folder), "--quiet", "--no-errors"]) == 0
+    assert call(f"run ridge_mound_valley --out {folder} --quiet --no-errors") == 0
     return folder
 
 
 @pytest.fixture(scope="session")
 def meshes(paper):
     out = paper.parent
-    every = ["--format", "stl,stl_ascii,obj,ply,glb,3mf", "--quiet"]
+    export = f"export {paper} --format stl,stl_ascii,obj,ply,glb,3mf --quiet"
     for kind in ("solid", "surface", "pins", "features"):
-        assert (
-            main(["export", str(paper), "--kind", kind, "--out", str(out / "bilinear"), *every])
-            == 0
-        )
+        assert call(f"{export} --kind {kind} --out {out / 'bilinear'}") == 0
     for skin in ("smooth", "membrane"):
-        for kind in (["solid"], ["features", "--separate"]):
-            words = ["--kind", *kind, "--skin", skin, "--out", str(out / skin), *every]
-            assert main(["export", str(paper), *words]) == 0
+        for kind in ("solid", "features --separate"):
+            assert call(f"{export} --kind {kind} --skin {skin} --out {out / skin}") == 0
     return out
 
 

@@ -9,7 +9,7 @@ import pytest
 from digiclay.cli import main
 
 from tests.proof.conftest import told
-from tests.scene_files import read_json, read_text, write_text
+from tests.scene_files import call, read_json, read_text, write_text
 from tests.timeouts import TIMEOUT
 
 JOBS = """
@@ -59,10 +59,7 @@ def test_openjd_checks_a_template_and_runs_its_steps_in_order(tmp_path, monkeypa
 def test_a_step_whose_task_fails_stops_those_that_need_it(tmp_path):
     jobs = tmp_path / "two.toml"
     write_text(jobs, JOBS.replace("0.3", "0.05"))
-    assert (
-        main(["batch", str(jobs), "--out", str(tmp_path / "out"), "--submit", "openjd", "--quiet"])
-        == 0
-    )
+    assert call(f"batch {jobs} --out {tmp_path / 'out'} --submit openjd --quiet") == 0
     write_text(tmp_path / "out" / "jobs" / "tap-short" / "scene.toml", "name = 3\n")
     template, program = tmp_path / "out" / "openjd.json", f"Python={sys.executable}"
     done = subprocess.run(
@@ -90,10 +87,8 @@ def test_a_step_whose_task_fails_stops_those_that_need_it(tmp_path):
 def test_the_program_of_a_template_is_named_by_its_kind(program, name, tmp_path):
     jobs, out = tmp_path / "two.toml", tmp_path / "out"
     write_text(jobs, QUICK)
-    words = ["--program", program] if program else []
-    assert (
-        main(["batch", str(jobs), "--out", str(out), "--submit", "openjd", *words, "--quiet"]) == 0
-    )
+    named = f"--program {program}" if program else ""
+    assert call(f"batch {jobs} --out {out} --submit openjd {named} --quiet") == 0
     openjd("run", out / "openjd.json", "-p", name)
     assert "1 of 1 jobs done." in read_text(out / "index.html")
 

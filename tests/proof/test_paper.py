@@ -5,18 +5,17 @@ import re
 
 import numpy as np
 import pytest
-from digiclay.cli import main
 
 from digiclay_paper.claims import TEXTS
 from digiclay_paper.results import DRAGS
 from digiclay_paper.scenes import COMPARED
-from tests.scene_files import read_json, read_text
+from tests.scene_files import call, read_json, read_text
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     out = tmp_path_factory.mktemp("paper") / "quick"
-    assert main(["paper", "--quick", "--quiet", "--out", str(out)]) == 0
+    assert call(f"paper --quick --quiet --out {out}") == 0
     return out
 
 
@@ -107,7 +106,7 @@ def test_in_the_papers_own_windows_method_two_deviates_four_to_nine_times_as_muc
 
 def test_an_older_folder_is_kept_unless_it_may_be_replaced(folder, capfd):
     before = (folder / "paper.md").stat().st_mtime_ns
-    assert main(["paper", "--quick", "--out", str(folder)]) == 2
+    assert call(f"paper --quick --out {folder}") == 2
     assert "--overwrite" in capfd.readouterr().err
     assert (folder / "paper.md").stat().st_mtime_ns == before
 

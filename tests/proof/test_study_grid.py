@@ -2,12 +2,11 @@
 
 import numpy as np
 import pytest
-from digiclay.cli import main
 from digiclay.core.scene.scene_source import load
 from digiclay.core.studies.evaluation import evaluate_bundle
 from numpy.typing import NDArray
 
-from tests.scene_files import SMALL_BLISTER, rows, write_text
+from tests.scene_files import SMALL_BLISTER, call, rows, write_text
 
 pytest.importorskip("SALib", reason="digiclay[study] is not installed")
 pytest.importorskip("optuna", reason="digiclay[study] is not installed")
@@ -55,10 +54,10 @@ def grid(scene):
     return values.reshape(COUNT, COUNT, 2)
 
 
-def run_command(command, scene, out, *options):
-    varied = [word for said in VARIED for word in ("--vary", said)]
-    words = [command, str(scene), *varied, "--metric", ",".join(NAMES), "--workers", "1", "--quiet"]
-    assert main([*words, "--out", str(out), *options]) == 0
+def run_command(command, scene, out, options):
+    varied = " ".join(f"--vary {said}" for said in VARIED)
+    line = f"{command} {scene} {varied} --metric {','.join(NAMES)} --workers 1 --quiet"
+    assert call(f"{line} --out {out} {options}") == 0
 
 
 def read_values(path):
@@ -66,7 +65,7 @@ def read_values(path):
 
 
 def test_the_indices_are_those_of_the_double_loop(scene, grid, tmp_path):
-    run_command("study", scene, tmp_path / "out", "--samples", "64")
+    run_command("study", scene, tmp_path / "out", "--samples 64")
     found = rows(tmp_path / "out" / "indices.csv")
     assert len(found) == 8
     for row in found:
@@ -89,7 +88,7 @@ def measure_hypervolume(front, worst):
 
 
 def test_no_run_of_the_grid_is_beyond_the_front(scene, grid, tmp_path):
-    run_command("tune", scene, tmp_path / "out", "--population", "24", "--generations", "5")
+    run_command("tune", scene, tmp_path / "out", "--population 24 --generations 5")
     front = read_values(tmp_path / "out" / "front.csv")
     every = grid.reshape(-1, 2)
     extent, worst = np.ptp(every, axis=0), every.max(axis=0)

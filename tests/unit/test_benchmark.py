@@ -20,7 +20,7 @@ from benchmarks.kinds import BENCHMARKS
 from benchmarks.report import Report
 from benchmarks.runs_together import STUDIES, study
 from tests.assemble import sample
-from tests.scene_files import read_text, write_text
+from tests.scene_files import command, read_text, write_text
 
 
 @pytest.fixture
@@ -106,7 +106,7 @@ def test_a_session_gives_the_cost_of_every_part_and_its_processor_time(here, cap
         name for name in session_parts.FILES if not any(file.startswith(name) for file in files)
     ] == []
     assert set(session_parts.FILES.values()) == set(session_parts.PARTS)
-    main(["session", "--scene", "my.toml", "--repeats", "1", "--calls"])
+    main(command("session --scene my.toml --repeats 1 --calls"))
     out = capsys.readouterr().out
     costs = {
         part: re.search(rf"^  {part} .* ([\d.]+)  ", out, re.MULTILINE)
@@ -131,7 +131,7 @@ def test_every_benchmark_shows_an_example_and_one_without_scipy_what_to_install(
             True,
         )
     monkeypatch.setitem(sys.modules, "scipy", None)
-    assert main(["peers", "--quick"]) == 2
+    assert main(command("peers --quick")) == 2
     assert "pip install" in capsys.readouterr().err
 
 
@@ -147,7 +147,7 @@ def test_a_term_left_out_is_absent_and_nothing_else_changes(capsys):
     )
     assert less.simulation.physics_step == less.simulation.control_period
     assert session_parts.without(less, session_parts.LONGER) is None
-    assert main(["terms", "tap", "--quick", "--quiet", "--set", "simulation.duration=0.1"]) == 0
+    assert main(command("terms tap --quick --quiet --set simulation.duration=0.1")) == 0
     out = capsys.readouterr().out
     for name in ("the full scene", "without conduit", "without relaxation", "all of these"):
         assert name in out
@@ -179,8 +179,8 @@ def test_the_runs_of_a_study_differ_and_form_one_batch(name):
 
 def test_a_benchmark_prints_and_writes_a_table_and_a_picture(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(runs_together, "COUNTS", (2,))
-    words = ["--scene", "tap", "--set", "simulation.duration=0.1", "--quick", "--quiet"]
-    assert main(["stack", *words, "--out", str(tmp_path)]) == 0
+    line = f"stack --scene tap --set simulation.duration=0.1 --quick --quiet --out {tmp_path}"
+    assert main(command(line)) == 0
     printed = capsys.readouterr().out
     assert "control.force_gain varies" in printed
     assert "valve.stroke varies" in printed
