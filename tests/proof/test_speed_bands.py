@@ -2,10 +2,9 @@
 
 import digiclay
 import numpy as np
-from digiclay.cli import main
 from digiclay.core.studies.speed_limits import measure_speeds
 
-from tests.scene_files import read_json, scene_text, write_text
+from tests.scene_files import call, read_json, scene_text, write_text
 
 #: An orifice known to 5 %: flow, and so the free speed of a pin, to 10 %.
 FITTED = """
@@ -25,8 +24,8 @@ def test_bands_of_speeds_are_those_of_members_and_no_lift_is_faster_than_its_pin
     write_text(tmp_path / "my.toml", scene)
     write_text(tmp_path / "fitted.toml", FITTED)
     run = tmp_path / "o"
-    words = ["--uncertain", str(tmp_path / "fitted.toml"), "--members", "40", "--speed"]
-    assert main(["run", str(tmp_path / "my.toml"), *words, "--out", str(run)]) == 0
+    line = f"run {tmp_path / 'my.toml'} --uncertain {tmp_path / 'fitted.toml'} --members 40"
+    assert call(f"{line} --speed --out {run}") == 0
     content = read_json(run / "uncertainty.json")
     members = [each["figures"] for each in content["members"]]
     for number in (0, 39):
