@@ -114,6 +114,19 @@ def test_a_small_finger_and_a_coarse_bed_are_judged_together():
 
 
 @pytest.mark.parametrize(
+    "drive, control, said",
+    [
+        ({"line_lag": 1e-3}, {}, True),
+        ({"line_lag": 1e-3}, "absent", False),
+        ({}, {}, False),
+    ],
+)
+def test_gates_are_said_to_move_pins_that_no_method_corrects(drive, control, said):
+    found = list_cautions(digiclay.scene("tap", {"drive": drive, "control": control}))
+    assert any("corrects only those near it" in line for line in found) == said
+
+
+@pytest.mark.parametrize(
     "text, shares",
     [
         ('[layout]\npitch = "4 mm"', [0.34]),

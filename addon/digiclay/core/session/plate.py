@@ -86,8 +86,13 @@ def measure_lattice(plan: Layout, tip: Fingertip, law: ExponentialLaw) -> float:
 
 
 def list_cautions(scene: Scene) -> list[str]:
-    """Return lines on fingers that have another force on this bed than on a plate, or none."""
+    """Return lines on fingers that have another force than on a plate, and on idle pins that creep."""
     plan, lines = scene.layout, []
+    if scene.drive and scene.drive.line_lag and scene.control:
+        lines.append(
+            "drive.line_lag: leak and half-selection also move pins away from the fingertip, and the method "
+            "corrects only those near it and those that it still moves"
+        )
     for finger in dict.fromkeys((each.fingertip, each.contact) for each in scene.fingers):
         tip, law = finger
         if tip is None or law is None:
