@@ -89,10 +89,10 @@ def sheet(width: float, height: float, title: str) -> Iterator[Any]:
         yield figure
 
 
-def add_legend(figure: Any, axes: Any, **looks: Any) -> None:
+def add_legend(figure: Any, axes: Any, ncols: int = 7, **looks: Any) -> None:
     """Put the legend of a panel below all of them."""
     handles = axes.get_legend_handles_labels()
-    figure.legend(*handles, loc="outside lower left", ncols=7, **looks)
+    figure.legend(*handles, loc="outside lower left", ncols=ncols, **looks)
 
 
 def blisters(results: Results) -> Any:
@@ -268,7 +268,7 @@ def tracking(results: Results) -> Any:
         axes.plot([], [], "o", label="without contact, or lost", **hollow)
         axes.plot([], [], **DASHED, label="criterion")
         axes.plot([], [], **DOTTED, label="the paper's 15 mm/s")
-        add_legend(figure, axes)
+        add_legend(figure, axes, ncols=3)
     return figure
 
 

@@ -12,7 +12,7 @@ from digiclay.core.studies.speed_limits import Follows, find_unintended_losses
 from digiclay.plots.figure import canvas
 from numpy.typing import NDArray
 
-from digiclay_paper import scenes
+from digiclay_paper import paper_figures, scenes
 from digiclay_paper.evidence import (
     DEVIATIONS,
     WINDOWED,
@@ -171,6 +171,16 @@ def test_a_session_a_method_loses_the_finger_in_is_run_again_slowly_enough(lost)
     one, two, *_ = figure.axes
     assert len(one.get_lines()) == len(two.get_lines()) > 0
     assert one.get_ylim() == two.get_ylim()
+
+
+def test_the_legend_of_all_methods_is_whole_below_the_panels():
+    tracks = {method: [GOOD] for method in scenes.COMPARED}
+    figure = paper_figures.tracking(replace(results(), tracks=tracks))
+    figure.draw_without_rendering()
+    (legend,) = figure.legends
+    frame = legend.get_window_extent()
+    assert 0.0 <= frame.x0 < frame.x1 <= figure.bbox.width
+    assert frame.y1 <= min(axes.get_tightbbox().y0 for axes in figure.axes)
 
 
 SURFACE = "in the surface"

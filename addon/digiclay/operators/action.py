@@ -9,7 +9,6 @@ from typing import Any
 
 from ..compat import Area, Context, Event, Operator, bpy
 from ..core.base.errors import DigiclayError, one_line
-from ..overlay import views
 from ..panels.base import declare
 from ..settings.declared import number
 from ..ui_text import localize
@@ -258,7 +257,8 @@ class Drawing(Modal):
         if self.handler is not None:
             bpy.types.SpaceView3D.draw_handler_remove(self.handler, "WINDOW")
             self.handler = None
-        views.redraw()
+        for area in context.screen.areas if context.screen else ():
+            area.tag_redraw()
         return set(result)
 
     def cancel(self, context: Context) -> None:
