@@ -32,7 +32,7 @@ from digiclay.device.instant import Instant
 from digiclay.pictures import film
 from digiclay.pictures.film import draw_frames, stage_film
 from digiclay.pictures.stage import BODY
-from digiclay.roles import BED, FINGERTIP, ROLE, ellipsoid, fingertips_of
+from digiclay.roles import BED, FINGERTIP, ROLE, ellipsoid, fingertips_of, is_bed
 
 from tests.blender.at_hand import film_strip, inventory, read_picture
 
@@ -88,6 +88,15 @@ def draw(shown, folder, looks):
     with stage(shown, looks) as shots:
         assert draw_frames(shots, range(shots.count), folder, folder / "film.mp4")
     return [read_picture(name_frame(folder, frame)) for frame in range(shots.count)]
+
+
+def see(shots, part):
+    """Return where the camera sees the vertices of a part (k, 2), as shares of the picture."""
+    shots.scene.view_layers[0].update()
+    corners = [part.matrix_world @ vertex.co for vertex in part.data.vertices]
+    return np.array(
+        [world_to_camera_view(shots.scene, shots.scene.camera, at)[:2] for at in corners]
+    )
 
 
 def looks_like(pixels, mode):
@@ -163,6 +172,16 @@ def test_a_turntable_turns_once_and_shows_no_fingertip(tmp_path, history):
     # It goes round in four steps like a square: opposite steps are opposite, and none is nothing.
     assert np.linalg.norm(turns, axis=1).min() > 5.0
     assert np.all(np.sum(turns[:2] * turns[2:], axis=1) < 0.0)
+
+
+def test_a_bed_that_turns_is_whole_in_every_frame():
+    long = Instant.at_rest(Layout(rows=30, columns=3))
+    with stage(long, Turntable(width=50, height=100, frames=8)) as shots:
+        (bed,) = (thing for thing in shots.scene.objects if is_bed(thing))
+        for frame in range(shots.count):
+            shots.show(frame)
+            seen = see(shots, bed)
+            assert 0.0 < seen.min() < seen.max() < 1.0
 
 
 def test_a_film_that_is_stopped_leaves_nothing_and_a_folder_that_cannot_be_written_is_told(
@@ -243,14 +262,7 @@ def test_fingertips_stay_in_the_frame_and_the_bed_is_not_made_small_for_one_that
         ) as shots:
             shots.show(shots.count - 1)
             bed = next(thing for thing in shots.scene.objects if thing.get(ROLE) == BED)
-            shots.scene.view_layers[0].update()
-            parts, seen = (bed, ellipsoid(fingertips_of(bed)[2])), []
-            for part in parts:
-                corners = [part.matrix_world @ vertex.co for vertex in part.data.vertices]
-                look = [
-                    world_to_camera_view(shots.scene, shots.scene.camera, at)[:2] for at in corners
-                ]
-                seen.append(np.array(look))
+            seen = see(shots, bed), see(shots, ellipsoid(fingertips_of(bed)[2]))
         assert ((seen[1] > 0.0) & (seen[1] < 1.0)).all() == (name != "parked"), name
         widths[name] = np.ptp(seen[0][:, 0])
     low, lifted, behind, high, parked = widths.values()

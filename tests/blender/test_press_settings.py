@@ -72,6 +72,7 @@ SPOILT = [
     ('settings.brush = "RAISE"\nsettings.depth = "deep"', "depth must be a value"),
     ('settings.brush = "RAISE"\nsettings.depth = 1e9', "depth must be a value"),
     ("settings.depth = -1e999", "depth must be a value of that setting (got -inf)"),
+    ("settings.radial = 1000000000", "radial must be a value"),
     ("settings.use_tilt = 1", "use_tilt must be a value"),
     ("settings.former = 'RAISE'", "a key must be a setting of the Press tool (got 'former')"),
     (
@@ -79,6 +80,7 @@ SPOILT = [
         "Fingertip.length must be above 0",
     ),
     ("wm.digiclay_finger = (5.0,)", "spoilt.py cannot be read: not enough values"),
+    ("wm.digiclay_finger = 5.0", "spoilt.py cannot be read: "),
     ('wm.digiclay_finger = ("a", 1.0, 1.0)', "spoilt.py cannot be read: could not convert"),
     ("settings.depth = open('x')", "spoilt.py cannot be read: malformed"),
     ("settings.depth = ", "spoilt.py cannot be read: invalid syntax"),

@@ -323,6 +323,7 @@ def stl(folder, triangles):
         (change(samples=4), "body #1.samples must be odd"),
         (change(stifness=3.0), "body #1.stifness must be a known key"),
         (change(file="x.stl"), "body #1.file must be left out where mesh is given"),
+        (change(up="y"), "body #1.up must be left out where mesh is given"),
         (change(unit="mm"), "body #1.unit must be left out where mesh is given"),
         (change(up="w"), "body #1.up must be one of auto, z, y, x, -z, -y, -x (got 'w')"),
         (change(unit="km"), "body #1.unit must be one of auto, mm, cm, m, inch (got 'km')"),

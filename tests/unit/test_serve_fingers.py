@@ -91,6 +91,22 @@ def test_a_message_that_is_none_is_refused_in_one_line(said, message):
         read_json(json.dumps({"type": "poses", **said}))
 
 
+@pytest.mark.parametrize(
+    "address, values, message",
+    [
+        ("pose", [0.0, 0.0], "pose must be 3 numbers"),
+        ("pose", ["x", 0.0, 0.0], "pose must be numbers"),
+        ("subscribe", ["state"], "subscription must be state or pins"),
+        ("subscribe", ["all", 10.0], "subscription must be state or pins"),
+        ("subscribe", ["state", "fast"], "subscription must be state or pins"),
+        ("reset", [1], "address must be /digiclay/pose"),
+    ],
+)
+def test_a_message_by_osc_that_is_none_is_refused_in_one_line(address, values, message):
+    with refused_in_a_line(ParameterError, message):
+        read_request(f"/digiclay/{address}", values)
+
+
 def poses(*identities, alive=(), **given):
     """Return a request with fingers 10 mm apart."""
     fingers = tuple((one, (0.01 * one, 0.0, 0.05, *LEVEL)) for one in identities)

@@ -37,7 +37,7 @@ IN_A_SESSION = {
 }
 
 
-#: What can be called without a bed, and what in the Edit Mode of one.
+#: What can be called without a bed, and what while one is edited or painted.
 WITHOUT_A_BED = {
     "digiclay.add_sample",
     "digiclay.open_scene",
@@ -74,16 +74,17 @@ def test_the_reasons_in_a_session_name_the_session(bed, clock):
     assert IN_A_SESSION.items() <= declining().items()
 
 
-def test_in_edit_mode_and_without_a_bed_nothing_can_be_changed(bed, clock):
+def test_in_another_mode_and_without_a_bed_nothing_can_be_changed(bed, clock):
     started(bed)
     press(bed, clock)
     tick.stop(bed.session_uid)
-    bpy.ops.object.mode_set(mode="EDIT")
-    activate(fingertip_of(bed))
-    assert bpy.context.mode == "OBJECT"
-    assert refused("digiclay.session_reset") == "Go back to Object Mode first"
-    activate(bed)
-    assert set(OPERATORS) - declining().keys() == IN_EDIT_MODE
+    for mode in ("EDIT", "WEIGHT_PAINT"):
+        bpy.ops.object.mode_set(mode=mode)
+        activate(fingertip_of(bed))
+        assert bpy.context.mode == "OBJECT"
+        assert refused("digiclay.session_reset") == "Go back to Object Mode first"
+        activate(bed)
+        assert set(OPERATORS) - declining().keys() == IN_EDIT_MODE
     bpy.ops.object.mode_set(mode="OBJECT")
     bpy.data.objects.remove(bed)
     assert set(OPERATORS) - declining().keys() == WITHOUT_A_BED
