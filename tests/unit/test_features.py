@@ -105,7 +105,8 @@ def test_a_crease_is_measured_as_the_boss_it_mirrors_and_a_slope_counts_in_the_c
         [getattr(up, name) for name in figures]
     )
     head, row = make_table([up])
-    assert (len(head), head[4]) == (len(row), "height or depth, mm")
+    words = "feature, form, pins, area, mm², height or depth, mm, crest, mm, volume, mm³"
+    assert (len(head), ", ".join(head)) == (len(row), words)
     assert (*row[:2], row[4]) == ("boss_1", "ridge", "6.00")
     (boss,) = features(formed(lambda x, y: ridge(x, y) / 6.0 * (9.0 + x / 2.0)))
     span = boss.crests[0][-1] - boss.crests[0][0]

@@ -90,7 +90,9 @@ def test_means_keep_the_sum(rows, columns, block, chunk):
     [
         (np.zeros((1, 9)), "at least 2 x 2 heights (got odd.npy: 1 x 9)"),
         (np.zeros(9), "at least 2 x 2 heights (got odd.npy: 9)"),
+        (np.zeros((2, 2, 3)), "at least 2 x 2 heights (got odd.npy: 2 x 2 x 3)"),
         (np.zeros(()), "at least 2 x 2 heights (got odd.npy: a single number)"),
+        (np.array([["a", "b"], ["c", "d"]]), "hold numbers (got odd.npy: <U1)"),
         (np.zeros((2, 2), complex), "hold numbers (got odd.npy: complex128)"),
         (
             np.array([[0.0, 1.0], [np.nan, 2.0]]),

@@ -10,11 +10,13 @@ from digiclay.core.control.orders import (
     Orders,
     Verb,
     find_fault,
+    order_periods,
     place,
     repeat_order,
     share,
 )
 from digiclay.core.control.pin_motion import MotionParameters
+from digiclay.core.control.virtual_master import Master, Phase
 from digiclay.core.engine.simulation import begin
 from digiclay.core.model.layout import enclose_discs
 from digiclay.core.model.physics import find_speeds
@@ -24,6 +26,7 @@ from digiclay.core.session.live_session import has_arrived, simulate_path
 from numpy.testing import assert_array_equal
 
 from tests.assemble import assert_near, table
+from tests.measured import measure
 from tests.reliefs import heighten, make_orders, make_spike_and_ridge, measure_roughness, stay_away
 
 ARRANGEMENTS = ("aligned", "staggered", "hexagonal")
@@ -392,3 +395,14 @@ def test_a_disc_that_holds_two_is_no_larger_than_it_must_be(other, held):
     (a, b, radius), (c, d, another) = both
     least = (np.hypot(a - c, b - d) + radius + another) / 2.0
     assert whole == pytest.approx(least if held is None else both[held][2])
+
+
+def test_the_disc_of_a_period_holds_that_of_the_method_too():
+    system, memory = bed(), Master(Phase.SHAPING, 2e-3, -1e-3, 40e-3)
+    orders = Orders(repeat_order(1, Verb.AVERAGE, 12e-3, -9e-3, 5e-3, 1.0))
+    (control,) = order_periods(system.controller, system.grid, system.cell, system.period, orders)
+    untouched = measure(*np.empty((2, 0)))
+    (x, y, radius), (at_x, at_y, inner) = (
+        each.locate(memory, untouched)[1] for each in (control, system.controller)
+    )
+    assert np.hypot(x - at_x, y - at_y) + inner <= radius * (1.0 + 1e-12)
