@@ -133,13 +133,15 @@ def test_a_mistake_is_told_in_one_line_and_leaves_no_folder(words, message, here
 
 def test_a_point_is_the_run_with_that_setting_also_within_a_tolerance():
     line = (
-        "sweep my.toml --vary control.force_gain=5 --metric rfd --set simulation.physics_step=5e-3"
+        "sweep my.toml --vary control.force_gain=5 --metric rfd,contact_share "
+        "--set simulation.physics_step=5e-3"
     )
     assert main([*command(line), "--tolerance", "50 um", "--out", "out", "--quiet"]) == 0
     changes = {"control.force_gain": "5", "simulation.physics_step": "5e-3"}
     changes |= {"simulation.stepper": "adaptive", "simulation.tolerance": "50 um"}
     alone = run(load(find("my.toml"), list(starmap(Setting, changes.items()))))
-    assert rows("out")[0]["rfd (N)"] == repr(alone.metrics["rfd"])
+    for name, unit in (("rfd", "N"), ("contact_share", "1")):
+        assert rows("out")[0][f"{name} ({unit})"] == repr(alone.metrics[name])
 
 
 def test_a_point_that_fails_or_is_no_scene_is_recorded_and_the_others_go_on(capsys):

@@ -111,7 +111,7 @@ def read_run(folder: Path, *names: str) -> Run:
         raise OutputError(f"{path} cannot be read as a run's history: {error}.") from None
     for name, values in history.items():
         low, high = (0, len(Mode) - 1) if name == "mode" else (-LARGEST, LARGEST)
-        if not (values.min() >= low and values.max() <= high):
+        if values.size and not (values.min() >= low and values.max() <= high):
             raise OutputError(
                 f"{path}: {name} must hold numbers from {low:g} to {high:g}, as a run leaves."
             )
@@ -148,7 +148,7 @@ def _refuse(path: Path, scene: Scene, heads: Mapping[str, Head]) -> None:
     if not 0 < rows <= most:
         rule = f"must have from 1 to the {most:,} rows of its scene's {scene.periods:,} control periods"
         raise OutputError(f"{path} {rule} (got {rows:,}).")
-    sizes = {"n": scene.cells, "t": rows, "f": len(scene.fingers), "b": len(scene.bodies)}
+    sizes, size = {"n": scene.cells, "t": rows, "f": len(scene.fingers), "b": len(scene.bodies)}, 0
     for name, head in heads.items():
         axes = HISTORY_ARRAYS[name].axes.split(", ")
         several = len(scene.fingers) > 1
@@ -164,10 +164,8 @@ def _refuse(path: Path, scene: Scene, heads: Mapping[str, Head]) -> None:
             raise OutputError(
                 f"{path}: {name} must hold {KINDS[kinds]} of at most 8 bytes (got {head.kind})."
             )
-    size, free = (
-        8 * sum(math.prod(head.shape) for head in heads.values()),
-        measure_available_memory(),
-    )
+        size += 8 * math.prod(shape) if kinds == "if" else head.size
+    free = measure_available_memory()
     if size > free:
         rule = f"must fit into the {free / 1e9:.3g} GB of free memory"
         raise OutputError(f"{path} {rule} (got {size / 1e9:.3g} GB of {', '.join(heads)}).")
