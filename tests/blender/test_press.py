@@ -141,13 +141,14 @@ def test_without_a_session_the_surface_is_what_is_drawn(bed):
 def test_the_patch_lies_on_the_pins_about_the_mouse_as_wide_as_the_finger_pressed_in(bed):
     cells, _ = aim.read_surface(bed)
     finger, turn = bridge.finger_of(fingertip_of(bed)), bridge.pose(fingertip_of(bed))[3:]
-    rim = tool.find_outline(finger, turn, 4e-3, Brush.LOWER, cells.layout)
+    middle = np.array([0.002, 0.001])
+    rim = tool.find_outline(middle, finger, turn, 4e-3, Brush.LOWER, cells.layout)
     # Pressed in by half its height of 8 mm, an ellipsoid is cut at sqrt(3)/2 of its width.
     across = np.ptp(rim, axis=0) / 2
     np.testing.assert_allclose(
         across, np.sqrt(0.75) * np.array([finger.length, finger.width]), rtol=1e-6
     )
-    assert_near(rim.mean(axis=0), 0.0, 1e-9)
+    assert_near(rim.mean(axis=0), middle, 1e-9)
 
 
 @table(

@@ -194,15 +194,15 @@ def _number(layout: UILayout, owner: OperatorProperties, name: str, units: float
 
 
 def find_outline(
-    finger: Fingertip, turn: Floats, depth: float, brush: Brush, layout: Layout
+    middle: Floats, finger: Fingertip, turn: Floats, depth: float, brush: Brush, layout: Layout
 ) -> Floats:
-    """Return the rim of what a brush would form about the origin at a depth, m, (k, 2), m."""
+    """Return the rim of what a brush would form about a place (2,), m, at a depth, m, (k, 2), m."""
     radius = find_radius(finger, layout)
     if brush in STAMPS:
-        return lay_square((0.0, 0.0), (radius, 0.0))[:-1]
+        return middle + lay_square((0.0, 0.0), (radius, 0.0))[:-1]
     if brush in RINGED:
-        return find_contact_outline(Fingertip(radius, radius, radius), turn, radius)
-    return find_contact_outline(finger, turn, depth)
+        finger, depth = Fingertip(radius, radius, radius), radius
+    return middle + find_contact_outline(finger, turn, depth)
 
 
 def _draw_cursor(context: Context, tool: WorkSpaceTool, xy: tuple[int, int]) -> None:
@@ -228,7 +228,8 @@ def _draw_cursor(context: Context, tool: WorkSpaceTool, xy: tuple[int, int]) -> 
     brush, amount, _ = find_shown(target.bed, settings)
     depth = 1e-3 * settings.depth if brush.rises else amount
     finger, turn = devices.read_finger(devices.find_first(target.bed)), bridge.pose(tip)[3:]
-    rim = close(target.point[:2] + find_outline(finger, turn, depth, brush, target.grid.layout))
+    layout = target.grid.layout
+    rim = close(find_outline(target.point[:2], finger, turn, depth, brush, layout))
     rims = [np.column_stack(image.place(*rim.T)) for image in find_images(settings)]
     paths = map_paths(partial(drape, target.grid, target.height), [*rims, *_trail(target)])
     paths += find_axes(target.grid, target.height, settings)
@@ -297,10 +298,10 @@ def _trail(target: aim.Target) -> list[Floats]:
     paths = [path for stroke in session.strokes for path in stroke.ahead]
     if not first.parts:
         paths[0] = np.concatenate([session.poses[:1, :2], paths[0]])
+    layout = target.grid.layout
     for pose in session.poses[list_pressing(session)]:
         depth = float(target.height.max()) - pose[2]
-        rim = find_outline(finger, pose[3:], depth, first.brush, target.grid.layout)
-        paths.append(close(pose[:2] + rim))
+        paths.append(close(find_outline(pose[:2], finger, pose[3:], depth, first.brush, layout)))
     return [path for path in paths if len(path) > 1]
 
 
