@@ -93,6 +93,7 @@ def test_every_direction_of_a_mesh_can_be_up(up):
         (trimesh.creation.icosphere(), True),
         (trimesh.creation.torus(2.0, 1.0), True),
         (trimesh.Trimesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]), False),
+        (trimesh.Trimesh(PLACES, [*FACES, FACES[0]]), False),  # a face twice
     ],
 )
 def test_a_mesh_is_known_as_closed_as_trimesh_knows_it(mesh, closed):
