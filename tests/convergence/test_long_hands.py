@@ -1,9 +1,15 @@
-"""Hands for longer than in tests/scenes: tracked from beside the bed, without a part, and a bowl of two."""
+"""Hands for longer than in tests/scenes: tracked, lost, from beside the bed; samples of many fingers."""
 
 from dataclasses import replace
 
+import pytest
+
 from tests.scenes.test_hand_scenes import assert_sample
 from tests.scenes.test_tracked_hands import HANDS, WORSE, Stream, assert_soft, shaped
+
+
+def test_hands_with_dropouts_other_identities_and_hostile_fingers_shape_softly():
+    assert_soft(WORSE)
 
 
 def test_hands_at_30_hz_from_beside_the_bed_with_places_that_are_none_shape_softly():
@@ -24,5 +30,7 @@ def test_without_a_part_tracked_hands_are_no_fingers():
     assert found["coupling"].force.max() > 2.0
 
 
-def test_a_bowl_of_two_hands_loses_no_finger_and_is_formed_where_they_meet_too():
-    assert_sample("two_hands_bowl", 4)
+# The bowl where the hands meet, too.
+@pytest.mark.parametrize("name, fingers", [("five_fingers_mound", 5), ("two_hands_bowl", 4)])
+def test_a_sample_of_hands_loses_no_finger_and_forms_what_it_is_called(name, fingers):
+    assert_sample(name, fingers)

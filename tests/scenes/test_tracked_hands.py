@@ -150,10 +150,6 @@ def assert_soft(stream):
     assert abs(rise[x < 0].max() - rise[x > 0].max()) < 2e-3
 
 
-def test_hands_with_dropouts_other_identities_and_hostile_fingers_shape_softly():
-    assert_soft(WORSE)
-
-
 def test_nobody_presses_on_after_a_dropout():
     gone, silent = (1.6, 1.9), (2.1, 2.4)
     seen = shaped(Stream(gone=gone, silent=silent), lasts=2.6)
