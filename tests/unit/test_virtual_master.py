@@ -145,6 +145,8 @@ def test_a_steady_force_takes_the_master_to_a_height(before, force, count, heigh
         "not far enough": (master(), np.linspace(0, 1.4, 500), (0.0, 0.0)),
         "at rest it keeps its direction": (master(0.0, 1.0), [0.3, -0.4] * 200, (0.0, 1.0)),
         "fast, in one period": (master(), [-5.0], (-1.0, 0.0)),
+        "back by 2 mm": (master(), [6.0, 12.0, 10.0], (-1.0, 0.0)),
+        "not so beside the rim": (master(), [6.0, 12.0, 18.0, 20.0, 18.0], (1.0, 0.0)),
     },
 )
 def test_a_fingertip_gets_its_direction_once_it_has_gone_far_enough(before, path_x, toward):

@@ -88,3 +88,6 @@ def test_in_another_mode_and_without_a_bed_nothing_can_be_changed(bed, clock):
     bpy.ops.object.mode_set(mode="OBJECT")
     bpy.data.objects.remove(bed)
     assert set(OPERATORS) - declining().keys() == WITHOUT_A_BED
+    activate(bpy.data.objects["Cube"])
+    bpy.ops.object.mode_set(mode="SCULPT")
+    assert refused("mesh.digital_clay_add")
