@@ -57,7 +57,7 @@ FINGER = "[trajectory]\nwaypoints = [{ time = 0, position = [0, 0.01, 0.05] }]\n
 def file(tmp_path):
     """A scene of two eggs beside their mesh, in a file, and Blender at the pace of the clock."""
     bpy.context.scene.render.fps = 30
-    egg = trimesh.creation.icosphere(4, radius=16.0)
+    egg = trimesh.creation.icosphere(3, radius=16.0)
     egg.apply_scale((1.0, 1.3, 0.9))
     egg.export(tmp_path / "egg.stl")
     path = tmp_path / "pressed.toml"
