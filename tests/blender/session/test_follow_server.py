@@ -13,7 +13,7 @@ from digiclay.roles import fingertip_of, fingertips_of
 from digiclay.sessions import running
 
 from tests.blender.at_hand import select
-from tests.blender.session.live import FLOAT32, exact, started
+from tests.blender.session.live import FLOAT32, TICK, exact, started
 from tests.timeouts import TIMEOUT
 
 SERVES = pytest.mark.skipif(
@@ -176,7 +176,7 @@ def test_under_a_silent_server_the_fingertip_lifts_and_it_is_told_once_and_when_
     address = followed(bed, server, clock)
     arrived(server, address, state(*PRESS))
     clock.tick(3)
-    notes = clock.tick(200)
+    notes = clock.tick(round(2.0 / TICK))
     assert ["No pose from" in note.message for note in notes] == [True]
     assert pose_of(bed)[:3] == [*PRESS[:2], follow.LIFTED]
     arrived(server, address, state(*PRESS))
