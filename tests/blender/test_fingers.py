@@ -8,6 +8,7 @@ from digiclay.cli import main
 from digiclay.core.scene.scene_source import load
 from digiclay.core.scene.toml_table import resolve
 from digiclay.core.session.finished_run import read_run
+from digiclay.device import view
 from digiclay.recorded import takes
 from digiclay.roles import BALL, PALM, ROLE, ellipsoid, fingertips_of, is_linked
 from digiclay.settings import own_presets, properties
@@ -63,9 +64,12 @@ def sound(bed, *numbers):
 
 def test_fingertips_are_apart_above_the_pins_and_sized_each_for_itself():
     bed = with_finger()
+    view.show_arrows(bed, True)
     bpy.ops.digiclay.add_hand()
     done("Add Hand")
     assert sound(bed, *range(1, 8))
+    balls = map(ellipsoid, fingertips_of(bed).values())
+    assert {ball.material_slots[0].material[ROLE] for ball in balls} == {"fingertip_clear"}
     poses = bridge.poses(bed)
     away = np.linalg.norm(poses[:, None, :2] - poses[:, :2], axis=-1)[~np.eye(7, dtype=bool)]
     assert away.min() >= 18e-3 - 1e-6  # Blender's 32 bits

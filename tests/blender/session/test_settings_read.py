@@ -138,7 +138,8 @@ def test_a_pin_that_was_moved_aside_stops_the_session_in_the_next_tick(bed, cloc
 
 def test_a_session_is_told_by_the_new_name_of_its_bed(bed, clock):
     started(bed)
-    bed.name = "Renamed"
+    name, bed.name = bed.name, "Renamed"
+    bpy.data.objects["Cube"].name = name
     clock.tick()
     (session,) = running.list_sessions()
     assert session.name == session.scene.name == "Renamed"
