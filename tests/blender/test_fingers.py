@@ -68,8 +68,8 @@ def test_fingertips_are_apart_above_the_pins_and_sized_each_for_itself():
     bpy.ops.digiclay.add_hand()
     done("Add Hand")
     assert sound(bed, *range(1, 8))
-    balls = map(ellipsoid, fingertips_of(bed).values())
-    assert {ball.material_slots[0].material[ROLE] for ball in balls} == {"fingertip_clear"}
+    for ball in map(ellipsoid, fingertips_of(bed).values()):
+        assert ball.material_slots[0].material[ROLE].endswith("_clear")
     poses = bridge.poses(bed)
     away = np.linalg.norm(poses[:, None, :2] - poses[:, :2], axis=-1)[~np.eye(7, dtype=bool)]
     assert away.min() >= 18e-3 - 1e-6  # Blender's 32 bits
