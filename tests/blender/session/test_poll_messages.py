@@ -91,3 +91,10 @@ def test_in_another_mode_and_without_a_bed_nothing_can_be_changed(bed, clock):
     activate(bpy.data.objects["Cube"])
     bpy.ops.object.mode_set(mode="SCULPT")
     assert refused("mesh.digital_clay_add")
+
+
+@pytest.mark.usefixtures("bed")
+def test_from_sculpt_mode_too_it_goes_back_to_object_mode():
+    bpy.ops.object.mode_set(mode="SCULPT")
+    bpy.ops.digiclay.leave_mode()
+    assert bpy.context.mode == "OBJECT"

@@ -53,6 +53,7 @@ def edit_through_a_linked_duplicate(bed):
     [
         (lambda bed: look_at("Other"), "no window shows its scene", lambda bed: look_at("Scene")),
         (lambda bed: edit(), "back to Object Mode", lambda bed: edit("OBJECT")),
+        (lambda bed: edit("SCULPT"), "back to Object Mode", lambda bed: edit("OBJECT")),
         (edit_through_a_linked_duplicate, "back to Object Mode", lambda bed: edit("OBJECT")),
         (
             lambda bed: scale(bed, 2.0),
