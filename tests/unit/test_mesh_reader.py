@@ -79,8 +79,8 @@ THREE = "v 0 0 0\nv 1 0 0\nv 0 1 0\n"
 @pytest.mark.parametrize(
     "text, said",
     [
-        (f"{THREE}f 1 2 9\n", "vertex 9 of 3"),
-        (f"{THREE}f -1 -2 -9\n", "line 4: there is no vertex -9"),
+        (f"{THREE}f 1 2 4\n", "vertex 4 of 3"),
+        (f"{THREE}f -1 -2 -4\n", "line 4: there is no vertex -4"),
         (f"{THREE}f 0 1 2\n", "line 4: there is no vertex 0"),
         (f"{THREE}f 1 2 x\n", "line 4: invalid literal for int()"),
         ("v 0 0 0\nv 1 0\nv 0 1 0\nf 1 2 3\n", "line 2: not enough values"),

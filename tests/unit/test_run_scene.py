@@ -67,7 +67,9 @@ def test_the_arrays_of_a_history_are_the_declared_ones_and_are_read_again(finger
     assert all(np.array_equal(again[name], array) for name, array in done.history.items())
 
 
-def test_bodies_in_the_history_of_a_scene_without_any_are_refused_by_their_shape(result, tmp_path):
+def test_bodies_in_the_history_of_a_scene_without_any_are_none_or_refused_by_their_shape(
+    result, tmp_path
+):
     history = result.history | {"body": np.zeros((41, 1, 7))}
     save(replace(result, history=history), tmp_path)
     with pytest.raises(OutputError, match=r"body must have the shape \(41, 0, 7\) of its scene"):
