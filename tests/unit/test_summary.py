@@ -194,7 +194,7 @@ def test_a_session_without_contact_has_no_rfd_lag_or_loss():
         "rfd", "rfd_shaping", "contact_loss_share", "lag_mean", "lag_max", "force_deviation",
         "force_oscillation", "force_overshoot", "settling_time", "height_deviation", "ridge_offset",
         "ridge_error", "ridge_unevenness", "rfd_jnd_least", "rfd_jnd_most", "ridge_unevenness_touch",
-    }  # fmt: skip
+    }, "a metric that needs contact belongs in this list"  # fmt: skip
     assert found["contact_share"] == 0.0
 
 
