@@ -9,7 +9,7 @@ from digiclay import DigiclayError
 from digiclay.cli import main
 from digiclay.core.session.plate import list_cautions
 
-from tests.assemble import refused_in_a_line
+from tests.assemble import refused_in_a_line, table
 
 BEDS = list(itertools.product(("aligned", "staggered", "hexagonal"), (2, 3, 4, 5, 6)))
 
@@ -113,17 +113,28 @@ def test_a_small_finger_and_a_coarse_bed_are_judged_together():
     )
 
 
-@pytest.mark.parametrize(
-    "drive, control, said",
-    [
-        ({"line_lag": 1e-3}, {}, True),
-        ({"line_lag": 1e-3}, "absent", False),
-        ({}, {}, False),
-    ],
+PUSH_PULL = {"method": "push_pull"}
+CREEP, ALIAS = "corrects only those near it", "they run away"
+
+
+@table(
+    "drive, control, words",
+    {
+        "gates": ({"line_lag": 1e-3}, {}, [CREEP]),
+        "no method": ({"line_lag": 1e-3}, "absent", []),
+        "no gates": ({}, {}, []),
+        "a cycle of two periods, lines in turn": ({"policy": "round_robin"}, PUSH_PULL, [ALIAS]),
+        "needed lines": ({"policy": "needed"}, PUSH_PULL, [ALIAS]),
+        "pressed lines first": ({}, PUSH_PULL, []),
+        "a valve per cell": ({"policy": "needed", "sections": 11}, PUSH_PULL, []),
+    },
 )
-def test_gates_are_said_to_move_pins_that_no_method_corrects(drive, control, said):
-    found = list_cautions(digiclay.scene("tap", {"drive": drive, "control": control}))
-    assert any("corrects only those near it" in line for line in found) == said
+def test_what_a_drive_does_to_pins_is_said(drive, control, words):
+    layout = {"rows": 11, "columns": 11}
+    found = list_cautions(
+        digiclay.scene("tap", {"layout": layout, "drive": drive, "control": control})
+    )
+    assert [line for line, word in zip(found, words, strict=True) if word not in line] == []
 
 
 @pytest.mark.parametrize(

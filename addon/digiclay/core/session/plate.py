@@ -85,10 +85,24 @@ def measure_lattice(plan: Layout, tip: Fingertip, law: ExponentialLaw) -> float:
     return float(0.5 * np.ptp(force) / force.mean())
 
 
+#: Methods whose cycle of control periods meets the turns of lines that wait.
+ALIASED = {("push_pull", "needed"), ("push_pull", "round_robin")}
+
+
 def list_cautions(scene: Scene) -> list[str]:
-    """Return lines on fingers that have another force than on a plate, and on idle pins that creep."""
+    """Return lines on fingers that have another force than on a plate, and on what a drive does to pins."""
     plan, lines = scene.layout, []
-    if scene.drive and scene.drive.line_lag and scene.control:
+    drive = scene.drive
+    if (
+        drive
+        and drive.sections < drive.count_lines(plan)
+        and (scene.method, drive.policy) in ALIASED
+    ):
+        lines.append(
+            f"drive.policy {drive.policy} may serve a line only when push_pull pushes its pins, so that they "
+            "run away: use pressed"
+        )
+    if drive and drive.line_lag and scene.control:
         lines.append(
             "drive.line_lag: leak and half-selection also move pins away from the fingertip, and the method "
             "corrects only those near it and those that it still moves"
