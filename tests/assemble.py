@@ -278,3 +278,13 @@ def moved(known, x, z, lasting=None, pace=1.0):
     return known.with_sections(
         trajectory=replace(known.section("trajectory"), waypoints=points), simulation=simulation
     )
+
+
+def assert_goes_on(made, before, after):
+    """Assert that a session goes on from a state kept after some control periods as if it had not stopped."""
+    system, paths = assemble(made), made.trajectories()
+    *_, half = periods(system, paths, begin(system), before)
+    data = snapshot.dump(system, half)
+    *_, end = periods(system, paths, half, after)
+    *_, again = periods(system, paths, snapshot.load(system, data), after)
+    assert snapshot.dump(system, again) == snapshot.dump(system, end)

@@ -18,6 +18,7 @@ from scipy.integrate import quad, solve_ivp
 from tests.assemble import (
     AWAY,
     Scripted,
+    assert_goes_on,
     assert_near,
     over_middle,
     record,
@@ -26,7 +27,6 @@ from tests.assemble import (
     scripted,
     table,
 )
-from tests.unit.test_matrix_drive import assert_goes_on
 
 #: Control periods of a slot, and of the five lines in turn.
 SLOT, PERIOD = 4, 5e-3

@@ -20,7 +20,7 @@ from digiclay.core.session.run_scene import run
 from digiclay.core.session.take import Take, from_bytes, replay, to_bytes
 from digiclay.core.shapes.body import pack_mesh
 
-from tests.assemble import over_middle, refused_in_a_line, table
+from tests.assemble import assert_goes_on, over_middle, refused_in_a_line, table
 from tests.own_methods import Mine, forgotten
 
 BED = {"layout": {"rows": 11, "columns": 13}}
@@ -180,16 +180,6 @@ def test_pins_that_wait_for_their_lines_arrive(method):
 def test_the_error_is_that_of_the_commands_that_acted():
     result = run(scene({"sections": 2, "policy": "round_robin"}, control={"method": "elastic"}))
     assert result.estimate_errors().metrics["height_error"] < 0.15e-3
-
-
-def assert_goes_on(made, before, after):
-    """Assert that a session goes on from a state kept after some control periods as if it had not stopped."""
-    system, paths = assemble(made), made.trajectories()
-    *_, half = periods(system, paths, begin(system), before)
-    data = snapshot.dump(system, half)
-    *_, end = periods(system, paths, half, after)
-    *_, again = periods(system, paths, snapshot.load(system, data), after)
-    assert snapshot.dump(system, again) == snapshot.dump(system, end)
 
 
 #: Beds on which a drive serves: sections of the scene.

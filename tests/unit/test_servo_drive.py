@@ -1,7 +1,7 @@
 """The servo drive: commanded heights frame by frame, a dead zone, quantized heights."""
 
 import tomllib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import digiclay
 import numpy as np
@@ -20,15 +20,14 @@ from digiclay.core.session.run_scene import run
 from tests.assemble import (
     AWAY,
     Scripted,
+    assert_goes_on,
     assert_near,
     over_middle,
     record,
     refused_in_a_line,
-    replace,
     table,
 )
 from tests.own_methods import forgotten
-from tests.unit.test_matrix_drive import assert_goes_on
 
 PERIOD = 5e-3
 MOTOR = {"valve": {"law": "motor", "hold": "braked", "free_speed": 0.2}, "conduit": "absent"}

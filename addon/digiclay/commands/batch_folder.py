@@ -11,12 +11,12 @@ from typing import Any
 from ..core.base.errors import DigiclayError, OutputError
 from ..core.files import run_folder
 from ..core.metrics.metric_table import (
-    BEYOND,
     ERRORS,
     METRICS,
     RUN,
     describe_errors,
     describe_losses,
+    list_beyond,
 )
 from ..core.scene.toml_table import format_scene
 from ..core.studies.job_table import JOB, SCENE, Job, JobSeries, Outputs
@@ -153,10 +153,7 @@ class Folder:
                 for name, fact in FACTS.items()
             ),
             ("losses", describe_losses(metrics)),
-            (
-                "not to be trusted",
-                "; ".join(metrics.get(name) or "" for name in BEYOND).strip("; "),
-            ),
+            ("not to be trusted", "; ".join(list_beyond(metrics))),
             (
                 "errors",
                 metrics.get("errors_in_doubt")

@@ -29,8 +29,22 @@ examples:
 """
 #: Sections of the scene along the line from finger to pins, and names of places that are others.
 PLACES = (
-    *("hand", "fingertip", "contact", "relaxation", "actuator", "supply", "fluid", "valve"),
-    *("conduit", "valve_lag", "delay", "drive", "sensors", "control", "blister", "recorder"),
+    "hand",
+    "fingertip",
+    "contact",
+    "relaxation",
+    "actuator",
+    "supply",
+    "fluid",
+    "valve",
+    "conduit",
+    "valve_lag",
+    "delay",
+    "drive",
+    "sensors",
+    "control",
+    "blister",
+    "recorder",
 )
 NAMES = {
     "fingertip": "finger",

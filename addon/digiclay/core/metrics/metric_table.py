@@ -243,6 +243,11 @@ def describe_losses(metrics: Mapping[str, Any]) -> str:
     return "; ".join(lines)
 
 
+def list_beyond(metrics: Mapping[str, Any]) -> list[str]:
+    """Return what of a run goes beyond the models of finger and body."""
+    return [message for name in BEYOND if (message := metrics.get(name))]
+
+
 def describe_time(metrics: Mapping[str, Any]) -> str:
     """Return how long a run took, ``26.5 s simulated in 0.65 s (41 x real time)``."""
     simulated, spent, factor = (

@@ -148,7 +148,8 @@ def _refuse(path: Path, scene: Scene, heads: Mapping[str, Head]) -> None:
     if not 0 < rows <= most:
         rule = f"must have from 1 to the {most:,} rows of its scene's {scene.periods:,} control periods"
         raise OutputError(f"{path} {rule} (got {rows:,}).")
-    sizes, size = {"n": scene.cells, "t": rows, "f": len(scene.fingers), "b": len(scene.bodies)}, 0
+    sizes = {"n": scene.cells, "t": rows, "f": len(scene.fingers), "b": len(scene.bodies)}
+    size = 0
     for name, head in heads.items():
         axes = HISTORY_ARRAYS[name].axes.split(", ")
         several = len(scene.fingers) > 1

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -85,28 +86,9 @@ def measure_lattice(plan: Layout, tip: Fingertip, law: ExponentialLaw) -> float:
     return float(0.5 * np.ptp(force) / force.mean())
 
 
-#: Methods whose cycle of control periods meets the turns of lines that wait.
-ALIASED = {("push_pull", "needed"), ("push_pull", "round_robin")}
-
-
 def list_cautions(scene: Scene) -> list[str]:
     """Return lines on fingers that have another force than on a plate, and on what a drive does to pins."""
-    plan, lines = scene.layout, []
-    drive = scene.drive
-    if (
-        drive
-        and drive.sections < drive.count_lines(plan)
-        and (scene.method, drive.policy) in ALIASED
-    ):
-        lines.append(
-            f"drive.policy {drive.policy} may serve a line only when push_pull pushes its pins, so that they "
-            "run away: use pressed"
-        )
-    if drive and drive.line_lag and scene.control:
-        lines.append(
-            "drive.line_lag: leak and half-selection also move pins away from the fingertip, and the method "
-            "corrects only those near it and those that it still moves"
-        )
+    plan, lines = scene.layout, list(_list_drive_cautions(scene))
     for finger in dict.fromkeys((each.fingertip, each.contact) for each in scene.fingers):
         tip, law = finger
         if tip is None or law is None:
@@ -126,3 +108,25 @@ def list_cautions(scene: Scene) -> list[str]:
                 + (": the bed can show shapes, but cannot be sculpted" if spread > LOST else "")
             )
     return lines
+
+
+#: Methods whose cycle of control periods meets the turns of lines that wait.
+ALIASED = {("push_pull", "needed"), ("push_pull", "round_robin")}
+
+
+def _list_drive_cautions(scene: Scene) -> Iterator[str]:
+    """Yield lines on pins that run away or creep."""
+    drive = scene.drive
+    if drive is None:
+        return
+    lines_wait = drive.sections < drive.count_lines(scene.layout)
+    if lines_wait and (scene.method, drive.policy) in ALIASED:
+        yield (
+            f"drive.policy {drive.policy} may serve a line only when push_pull pushes its pins, so that they "
+            "run away: use pressed"
+        )
+    if drive.line_lag and scene.control:
+        yield (
+            "drive.line_lag: leak and half-selection also move pins away from the fingertip, and the method "
+            "corrects only those near it and those that it still moves"
+        )

@@ -19,13 +19,13 @@ from ..engine.simulation import Progress, Stopped, begin, periods
 from ..engine.system import System
 from ..files.tables import Described, Record, Table
 from ..metrics.metric_table import (
-    BEYOND,
     ERRORS,
     METRICS,
     RUN,
     describe_errors,
     describe_losses,
     describe_time,
+    list_beyond,
 )
 from ..metrics.signals import compute_weights
 from ..metrics.summary import (
@@ -99,11 +99,6 @@ class Result(Described):
         return self.periods < self.scene.periods
 
     @property
-    def beyond(self) -> list[str]:
-        """What goes beyond the models of finger and body."""
-        return [said for name in BEYOND if (said := self.metrics.get(name))]
-
-    @property
     def finger_force(self) -> Floats:
         """Total force on each finger over time, (t, f), N."""
         self.require_history("finger_force")
@@ -137,7 +132,7 @@ class Result(Described):
         """Return what matters most of it, by name."""
         largest = self.metrics.get("max_total_force")
         reached = "not recorded" if largest is None else f"at most {largest:.2g} N"
-        cautions = "; ".join((*self.beyond, *list_cautions(self.scene)))
+        cautions = "; ".join((*list_beyond(self.metrics), *list_cautions(self.scene)))
         rows, pins = len(self.history.get("time", ())), self.scene.cells
         return {
             "time": describe_time(self.metrics)
@@ -155,7 +150,7 @@ class Result(Described):
         felt = self._describe_force(), self._describe_bodies(), describe_errors(self.metrics)
         end = " (incomplete: stopped)" if self.incomplete else ""
         line = ", ".join(filter(None, (describe_time(self.metrics), *felt))) + end
-        return "; ".join((line, *self.beyond))
+        return "; ".join((line, *list_beyond(self.metrics)))
 
     def _describe_force(self) -> str:
         """Return the deviation of the force, and the losses, or ``""``."""
