@@ -431,7 +431,7 @@ def move_one():
 LAYOUT = "The pins differ from the parameters of Layout: press Rebuild"
 ROWS = "pins, in rows along x"
 NOT_PINS = "mesh is no longer that of its pins: undo that"
-SOME = "pins now instead of 25: undo that"
+COUNT = "pins now instead of 25: undo that"
 #: What Blender's own verbs make of a bed, which are selected then, and what is said against a
 #: session and a bake of each bed, and against its export as it is drawn; nothing: they are right.
 VERBS = {
@@ -445,8 +445,8 @@ VERBS = {
     "converted to a curve, which it cannot be": (convert("CURVE"), "", ""),
     "modifier applied": (lambda bed: bpy.ops.object.modifier_apply(modifier=bed.modifiers[0].name),
                          NOT_PINS, NOT_PINS),
-    "pins separated": (in_edit_mode(lambda: bpy.ops.mesh.separate(type="SELECTED")), SOME, SOME),
-    "pins duplicated": (in_edit_mode(bpy.ops.mesh.duplicate), SOME, SOME),
+    "pins separated": (in_edit_mode(lambda: bpy.ops.mesh.separate(type="SELECTED")), COUNT, COUNT),
+    "pins duplicated": (in_edit_mode(bpy.ops.mesh.duplicate), COUNT, COUNT),
     "pins in another order": (in_edit_mode(shuffle), LAYOUT, "must fill rows of 2 pins"),
     "pins of a row in another order": (in_edit_mode(reverse_some), LAYOUT, "must order the pins row by row"),
     "a pin moved aside": (in_edit_mode(move_one), LAYOUT, ""),

@@ -110,7 +110,7 @@ def test_no_estimate_is_made_of_a_thinned_run_or_once_it_is_stopped_and_a_summar
 #: How long scenes last, s: a press and a drag or two.
 DRAWN = 0.1
 #: Scenes of each stepper; the adaptive one takes about a second per scene.
-SCENES = dict.fromkeys(STEPPERS, 100) | {"adaptive": 25}
+COUNTS = dict.fromkeys(STEPPERS, 100) | {"adaptive": 25}
 #: A conduit that is not turbulent, and one that is, in a share of the scenes.
 TURBULENT = {
     "valve": {"orifice_diameter": 0.8e-3},
@@ -171,7 +171,7 @@ FORMING = ("virtual_master", "cell_states", "hybrid", "elastic", "plastic", "vis
 @pytest.mark.parametrize("stepper", STEPPERS)
 def test_an_estimate_covers_the_truth_in_95_of_100_scenes(stepper):
     random, missed, refused = np.random.default_rng(38), [], 0
-    for number in range(SCENES[stepper]):
+    for number in range(COUNTS[stepper]):
         scene = draw_scene(random, stepper)
         try:
             history = run(scene).history
@@ -189,10 +189,10 @@ def test_an_estimate_covers_the_truth_in_95_of_100_scenes(stepper):
         )
         truth = (error / SHARE for error in true)
         missed += list_uncovered(number, found, truth, NOTHING)
-    assert len({number for number, *_ in missed}) <= 0.05 * (SCENES[stepper] - refused), missed
+    assert len({number for number, *_ in missed}) <= 0.05 * (COUNTS[stepper] - refused), missed
     # An explicit method that has left its region of stability says so, and has no result to be
     # judged.
-    assert refused <= (0.1 * SCENES[stepper] if stepper in EXPLICIT else 0)
+    assert refused <= (0.1 * COUNTS[stepper] if stepper in EXPLICIT else 0)
 
 
 def list_uncovered(number, found, truth, nothing):

@@ -5,6 +5,7 @@ import functools
 import re
 import sys
 import tomllib
+from collections import Counter
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
@@ -234,6 +235,16 @@ def test_what_stands_beside_the_extension_imports_no_part_of_its_neighbor(name: 
     allowed = ["digiclay_study", "digiclay_fit"] if name == "benchmarks" else []
     others = BESIDE.keys() - {name, *allowed}
     assert find_imports(BESIDE[name].rglob("*.py"), others.__contains__) == []
+
+
+def test_a_constant_of_a_module_is_bound_once() -> None:
+    twice = []
+    for path in tracked("*.py"):
+        assigned = [node for node in parse(path).body if isinstance(node, ast.Assign)]
+        targets = [target for node in assigned for target in node.targets]
+        names = Counter(target.id for target in targets if isinstance(target, ast.Name))
+        twice += [f"{path.relative_to(ROOT)}: {name}" for name, times in names.items() if times > 1]
+    assert twice == []
 
 
 def test_no_python_file_is_over_the_limit() -> None:
