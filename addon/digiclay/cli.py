@@ -84,8 +84,10 @@ def run_as_program(parse: Callable[[], Namespace]) -> NoReturn:
 
     for name in CORES:  # read when numpy is imported, which it has not been yet
         os.environ.setdefault(name, "1")
-    for stream in (sys.stdout, sys.stderr):
-        stream.reconfigure(errors="replace")  # type: ignore[union-attr]  # a terminal may not know µ
+    for name in ("stdout", "stderr"):
+        if getattr(sys, name) is None:  # closed, or of a program without a terminal
+            setattr(sys, name, open(os.devnull, "w"))
+        getattr(sys, name).reconfigure(errors="replace")  # a terminal may not know µ
     try:
         code = carry_out(parse_and_freeze)
         sys.stdout.flush()

@@ -242,6 +242,12 @@ def test_a_terminal_that_does_not_know_a_letter_gets_another_and_a_notebook_hind
     assert (here / "my" / "session.png").is_file()
 
 
+def test_a_program_whose_output_is_closed_runs_all_the_same(here):
+    script = f"import sys; sys.stdout = sys.stderr = None\n{PROGRAM}"
+    assert finish(start(script, "run", "my.toml")) == (0, "", "")
+    assert (here / "my" / "history.npz").is_file()
+
+
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no signals to send")
 def test_a_signal_while_the_program_starts_stops_it_in_one_line(here):
     # As numpy and trimesh do: what an import is interrupted by passes for a library that is broken.
