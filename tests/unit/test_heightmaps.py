@@ -181,6 +181,9 @@ KNOWN = np.ma.masked_equal([[9, 10, 11, 12], [5, -9999, 7, 8], [1, 2, 3, 4]], -9
         ("a.asc", ESRI.upper().replace("NODATA_VALUE -9999\n", "") + NORTH_UP, KNOWN),
         ("a.ASC", ESRI + "1 2\n3 4\n5 -9999\n7 8\n9 10\n11 12", KNOWN),
         ("a.txt", "# in m\n1 2.5 3e0\n4 5 6", [[1, 2.5, 3], [4, 5, 6]]),
+        # As Octave saves a matrix; as numpy does, with a header.
+        ("a.txt", "# Created by Octave 8.4.0, Mon\n# rows: 2\n 1 2\n 3 4\n", [[1, 2], [3, 4]]),
+        ("a.csv", "# in m; north is up\n1,2\n3,4\n", [[1, 2], [3, 4]]),
         ("a.csv", "1, 2.5, 3\n4, 5, 6\n\n", [[1, 2.5, 3], [4, 5, 6]]),
         ("a.csv", "1;2,5;3\n4;5;6\n", [[1, 2.5, 3], [4, 5, 6]]),
         ("a.txt", "1\t2,5\t3\n4\t5\t6\n", [[1, 2.5, 3], [4, 5, 6]]),

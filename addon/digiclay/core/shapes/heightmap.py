@@ -412,7 +412,7 @@ def read_grid(path: Path) -> HeightMap:
         text = path.read_text("utf-8-sig")
         while path.suffix.lower() == ".asc" and (line := ESRI.match(text, at)):
             head[line[1].lower()], at = float(line[2]), line.end()
-        text = text[at:]
+        text = re.sub("#.*", "", text[at:])
         separator = next((sign for sign in ";\t," if sign in text), None)
         if separator != ",":
             text = text.replace(",", ".")
