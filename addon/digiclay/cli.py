@@ -86,7 +86,7 @@ def run_as_program(parse: Callable[[], Namespace]) -> NoReturn:
         os.environ.setdefault(name, "1")
     for name in ("stdout", "stderr"):
         if getattr(sys, name) is None:  # closed, or of a program without a terminal
-            setattr(sys, name, open(os.devnull, "w"))
+            setattr(sys, name, open(os.devnull, "w"))  # noqa: SIM115
         getattr(sys, name).reconfigure(errors="replace")  # a terminal may not know µ
     try:
         code = carry_out(parse_and_freeze)

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import re
 from array import array
-from itertools import pairwise
 
 import numpy as np
 
 from ..base.arrays import Floats, Indices
 from ..base.errors import ParameterError
-from .mesh_limits import CORNERS, make_refusal, refuse_many_triangles
+from .mesh_limits import make_refusal, refuse_many_triangles
+from .polygons import cut
 
 AXES = ("x", "y", "z", "-x", "-y", "-z")
 #: Upward axis of Blender's exporter and importer; its forward axis is -z.
@@ -61,9 +61,9 @@ BLOCK = 1 << 22
 
 
 def read(data: bytes, name: str) -> tuple[Floats, Indices]:
-    """Return vertices (v, 3) and triangles (f, 3) of a file's bytes; polygons are cut into fans."""
+    """Return vertices (v, 3) and triangles (f, 3) of a file's bytes."""
     data = data.replace(b"\\\r\n", b" ").replace(b"\\\n", b" ")
-    vertices, corners = array("d"), array("q")
+    vertices, corners, sizes = array("d"), array("q"), array("q")
     ended = not data or data.endswith((b"\n", b"\r"))
     if not ended:
         _refuse_cut_line(data, name)
@@ -73,13 +73,11 @@ def read(data: bytes, name: str) -> tuple[Floats, Indices]:
         # Files of the old Macintosh end lines with a carriage return.
         block = data[at:end].replace(b"\r\n", b"\n").replace(b"\r", b"\n")
         lines = block.split(b"\n")
-        _add_lines(lines, first, name, vertices, corners)
+        _add_lines(lines, first, name, vertices, corners, sizes)
         refuse_many_triangles(name, max(len(vertices), len(corners)) // 3)
         first, at = first + len(lines) - 1, end
-    points, faces = np.array(vertices).reshape(-1, 3), np.array(corners, np.int64).reshape(-1, 3)
-    if faces.size and (faces.min() < 0 or faces.max() >= len(points)):
-        content = f"vertex {faces.max() + 1} of {len(points)}"
-        raise make_refusal(CORNERS, name, content, "Is the file cut off?")
+    points = np.array(vertices).reshape(-1, 3)
+    faces = cut(points, np.array(corners, np.int64), np.array(sizes, np.int64), name)
     if not ended and len(faces) and (unused := len(points) - np.unique(faces).size):
         content = f"no end of line, and {unused:,} of {len(points):,} vertices without a face"
         raise make_refusal(CUT, name, content)
@@ -87,7 +85,12 @@ def read(data: bytes, name: str) -> tuple[Floats, Indices]:
 
 
 def _add_lines(
-    lines: list[bytes], first: int, name: str, vertices: array[float], corners: array[int]
+    lines: list[bytes],
+    first: int,
+    name: str,
+    vertices: array[float],
+    corners: array[int],
+    sizes: array[int],
 ) -> None:
     """Add lines one by one, with an error that names the line."""
     for number, line in enumerate(lines, first):
@@ -98,9 +101,8 @@ def _add_lines(
                 vertices.extend((x, y, z))
             elif kind == b"f":
                 count = len(vertices) // 3
-                face = [_find_vertex(word, count) for word in words]
-                for second, third in pairwise(face[1:]):
-                    corners.extend((face[0], second, third))
+                corners.extend([_find_vertex(word, count) for word in words])
+                sizes.append(len(words))
         except (ValueError, OverflowError) as error:
             content = f"line {number}: {error}"
             raise make_refusal("must be an OBJ file that can be read", name, content) from None

@@ -1,4 +1,4 @@
-"""Readers of STL, PLY and OFF files, text and binary: vertices and triangles; polygons are cut into fans."""
+"""Readers of STL, PLY and OFF files, text and binary: vertices and triangles."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ import numpy as np
 from ..base.arrays import Array, Floats, Indices
 from ..base.errors import ParameterError
 from .mesh_limits import MOST_TRIANGLES, make_refusal, refuse_many_triangles
+from .polygons import cut
 
 WHOLE = "must be whole: the file is cut off"
 #: A head is no longer than this.
@@ -202,7 +203,7 @@ def _read_ply(data: bytes, name: str) -> tuple[Floats, Indices]:
         raise make_refusal("must have faces", name, f"only {' and '.join(tables)} elements")
     vertices, faces = tables["vertex"], tables["face"]
     points = np.column_stack([np.concatenate(vertices[axis]).astype(np.float64) for axis in "xyz"])
-    return points, _cut(next(faces[word] for word in CORNERS if word in faces), name)
+    return points, _cut(points, next(faces[word] for word in CORNERS if word in faces), name)
 
 
 def _read_head(head: str) -> tuple[bool, list[_Element]]:
@@ -227,14 +228,13 @@ def _read_head(head: str) -> tuple[bool, list[_Element]]:
     return text, [_Element(*element, order) for element in elements]
 
 
-def _cut(polygons: list[Array], name: str) -> Indices:
-    """Return the triangles (f, 3) of polygons, arrays (count, corners), as fans."""
-    refuse_many_triangles(name, sum(len(group) * max(0, group.shape[1] - 2) for group in polygons))
-    fans = [np.empty((0, 3), np.int64)]
-    for group in polygons:
-        for corner in range(1, group.shape[1] - 1):
-            fans.append(group[:, [0, corner, corner + 1]].astype(np.int64))
-    return np.concatenate(fans)
+def _cut(points: Floats, polygons: list[Array], name: str) -> Indices:
+    """Return the triangles (f, 3) of polygons, arrays (count, corners)."""
+    corners = [np.empty(0, np.int64), *(group.ravel().astype(np.int64) for group in polygons)]
+    sizes = np.repeat(
+        *np.array([(group.shape[1], len(group)) for group in polygons]).reshape(-1, 2).T
+    )
+    return cut(points, np.concatenate(corners), sizes, name)
 
 
 def _read_off(data: bytes, name: str) -> tuple[Floats, Indices]:
@@ -260,7 +260,7 @@ def _read_off(data: bytes, name: str) -> tuple[Floats, Indices]:
         if polygon.shape[1] != corners:
             raise make_refusal(WHOLE, name, f"a face of {corners} corners without them")
         polygons.append(polygon)
-    return points, _cut(polygons, name)
+    return points, _cut(points, polygons, name)
 
 
 READERS = {".stl": _read_stl, ".ply": _read_ply, ".off": _read_off}

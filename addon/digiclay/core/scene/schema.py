@@ -237,7 +237,7 @@ class Scene(Described):
         longer_side = max(plan.columns * plan.pitch, plan.rows * plan.row_spacing)
         if self.blister and 2.0 * self.blister.radius > longer_side * (1.0 + 1e-9):
             rule = f"must be at most half the bed's longer side, {longer_side / 2:g} m"
-            hint = "Make all lengths of [blister] smaller, or take a method without one, such as plastic or shape_display."
+            hint = "Make all lengths of [blister] smaller, or take a method without one, as shape_display."
             raise ParameterError("blister", "radius", rule, f"{self.blister.radius:g} m", hint)
         if self.bodies:
             self._refuse_beside_bodies()
