@@ -70,6 +70,44 @@ def test_both_methods_are_printed_side_by_side_and_kept_with_a_picture_of_the_sa
     assert 0.03 <= known["cell_states"]["set_point"] < 121 * 0.03
 
 
+#: A body that falls by 4 mm in a control period, and a path behind lines in turn.
+FALL = """\
+layout.rows = 5
+[[body]]
+file = "box.stl"
+unit = "m"
+trajectory.waypoints = [{time = 0, position = [0, 0, 90e-3]}, {time = 0.1, position = [0, 0, 30e-3]}]
+"""
+TURNS = f'{PRESS}[drive]\nsections = 2\npolicy = "round_robin"\n'
+
+
+@table(
+    "scene, methods, said",
+    {
+        "a body that falls fast, by any method": (
+            FALL,
+            "elastic,plastic",
+            "elastic, plastic: body 1 ",
+        ),
+        "lines in turn, by one method alone": (
+            TURNS,
+            "elastic,push_pull",
+            "push_pull: drive.policy ",
+        ),
+    },
+)
+def test_a_comparison_tells_what_is_not_to_be_trusted_of_which_method(
+    scene, methods, said, here, capsys
+):
+    trimesh.creation.box((20e-3, 20e-3, 20e-3)).export(here / "box.stl")
+    (here / "my.toml").write_text(scene, encoding="utf-8")
+    assert call(f"compare my.toml --methods {methods}") == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert sum(line.startswith(said) for line in lines) == 1
+    falls = read_json(here / "my_compare" / "metrics.json")["beyond_cap"]
+    assert [bool(falls[name]) for name in methods.split(",")] == [scene is FALL] * 2
+
+
 def read_times(folder):
     """Return how long each method took, which no other run takes to the last digit."""
     known = read_json(folder / "metrics.json")["methods"]

@@ -16,12 +16,13 @@ from ..core.base.quantity import find_nearest_name
 from ..core.control.methods import list_methods
 from ..core.files.run_folder import MARK, find_name, format_json, write_whole
 from ..core.files.tables import Record, Table
-from ..core.metrics.metric_table import ERRORS, SPEEDS, describe_errors
+from ..core.metrics.metric_table import BEYOND, ERRORS, SPEEDS, describe_errors, list_beyond
 from ..core.metrics.summary import find_worst_finger, sum_cells
 from ..core.model.control_interface import find_set_point
 from ..core.scene.recorder import Recorder
 from ..core.scene.scene_source import Setting, find, load
 from ..core.scene.schema import Scene
+from ..core.session.plate import list_cautions
 from ..core.session.run_scene import RUN_METRICS, run
 from ..core.studies.axes import Point
 from ..core.studies.speed_limits import (
@@ -60,8 +61,6 @@ READ = {"m": (1e3, "mm"), "m3": (1e6, "ml"), "m/s": (1e3, "mm/s"), "1": (1.0, ""
 Metrics = dict[str, float | None]
 #: Rows of the table.
 FIGURES = {**RUN_METRICS, **ERRORS, **SPEEDS}
-#: Figures and notes of a record.
-NOTED = ("figures", "beyond_a_finger")
 #: Methods where none are named.
 DEFAULT = ("virtual_master", "cell_states")
 #: Options that need --suite.
@@ -158,7 +157,7 @@ def carry_out(arguments: Namespace) -> int:
                     folder.keep(point, (METHOD,), record)
                     records[point.index] = record
             every = {point.words[0]: records[point.index] for point in points}
-            notes = _write(out, scenes[0], every, speed=arguments.speed)
+            notes = _write(out, scenes, every, speed=arguments.speed)
     except KeyboardInterrupt:
         if not records:
             raise
@@ -206,27 +205,33 @@ def _measure(point: Point, arguments: Namespace) -> Record:
             *([describe_errors(done.metrics)] if "height_error" not in done.metrics else []),
         ],
         "forces": [worst["time"].tolist(), worst["total_force"].tolist(), asked.tolist()],
-        "beyond_a_finger": done.metrics.get("beyond_a_finger", ""),
+        **{name: done.metrics.get(name, "") for name in BEYOND},
         "fingers": done.metrics.get("fingers"),
     }
 
 
-def _write(out: Path, scene: Scene, every: Mapping[str, Record], *, speed: bool) -> list[str]:
+def _write(
+    out: Path, scenes: Sequence[Scene], every: Mapping[str, Record], *, speed: bool
+) -> list[str]:
     """Write the table and the picture of all methods' records; return the lines to print below the table."""
     from ..plots.figure import save
     from ..plots.sweep import comparison
 
+    scene = scenes[0]
     several = len(scene.fingers) > 1
-    measured, beyond = ({name: each[key] for name, each in every.items()} for key in NOTED)
+    measured = {name: record["figures"] for name, record in every.items()}
     units = {name: metric.unit for name, metric in FIGURES.items()}
-    content = {"scene": scene.name, "methods": measured, "units": units, "beyond_a_finger": beyond}
+    content = {"scene": scene.name, "methods": measured, "units": units}
+    content |= {
+        key: {name: record.get(key, "") for name, record in every.items()} for key in BEYOND
+    }
     if several:
         content["fingers"] = {name: each["fingers"] for name, each in every.items()}
     write_whole(out / MARK, format_json(content))
     forces = {name: tuple(np.array(each["forces"], np.float64)) for name, each in every.items()}
     called = "force of the worst finger" if several else "total force"
     save(comparison(measured, forces, scene.name, called), out / "compare.png")
-    notes = [f"{method}: {words}" for method, words in beyond.items() if words]
+    notes = _list_notes(scenes, every)
     alone = ", for the first finger alone" if several else ""
     if speed:
         ends = f"searched from {LOW * 1e3:g} to {HIGH * 1e3:g} mm/s"
@@ -236,6 +241,15 @@ def _write(out: Path, scene: Scene, every: Mapping[str, Record], *, speed: bool)
         [f"The worst of {len(scene.fingers)} fingers; metrics.json has each."] if several else []
     )
     return [*notes, f"written to {out}"]
+
+
+def _list_notes(scenes: Sequence[Scene], every: Mapping[str, Record]) -> list[str]:
+    """Return what is to be known of a scene or its results, after the methods that it is true of."""
+    said: dict[str, list[str]] = {}
+    for scene, (name, record) in zip(scenes, every.items(), strict=True):
+        for note in (*list_cautions(scene), *list_beyond(record)):
+            said.setdefault(note, []).append(name)
+    return [f"{', '.join(names)}: {note}" for note, names in said.items()]
 
 
 def _list_words(arguments: Namespace, default: Sequence[str]) -> list[tuple[str, str]]:
