@@ -17,7 +17,7 @@ from digiclay.commands.job_steps import Work, find_frames, is_done
 from digiclay.commands.render import ARRAYS, stage_moving
 from digiclay.compat import scratch
 from digiclay.core.base.errors import OutputError
-from digiclay.core.base.modes import COLORS, Mode
+from digiclay.core.base.modes import COLORS, WAITING, Mode
 from digiclay.core.files.formats import is_whole_picture
 from digiclay.core.files.run_folder import lock_name
 from digiclay.core.model.fingertip import LEVEL, Fingertip
@@ -99,10 +99,10 @@ def see(shots, part):
     )
 
 
-def looks_like(pixels, mode):
+def looks_like(pixels, color):
     """Count pixels of the bed, right of the legend and above the strip, in the direction of a color."""
     bed = pixels[HEIGHT // 3 :, WIDTH // 4 :].reshape(-1, 3)
-    wanted = np.array(COLORS[mode])
+    wanted = np.array(color)
     cosine = bed @ wanted / np.maximum(np.linalg.norm(bed, axis=1) * np.linalg.norm(wanted), 1e-6)
     # Blue and vermilion are 70 degrees apart; gray is 25 degrees or more from both.
     return int((cosine > 0.97).sum())
@@ -122,8 +122,8 @@ def test_a_film_shows_the_rows_in_their_colors_at_its_rate_and_what_lost_its_end
     assert [file.name for file in tmp_path.iterdir()] == ["a film.mp4"]
     rate, pictures = frames_of(path, tmp_path / "frames")
     assert (rate, len(pictures), pictures[0].shape) == (4.0, 5, (HEIGHT, WIDTH, 3))
-    blue = [looks_like(picture, Mode.HOLD) for picture in pictures]
-    red = [looks_like(picture, Mode.FORCE_FOLLOW) for picture in pictures]
+    blue = [looks_like(picture, COLORS[Mode.HOLD]) for picture in pictures]
+    red = [looks_like(picture, COLORS[Mode.FORCE_FOLLOW]) for picture in pictures]
     # Frames 0 and 1 are before half a second. A few pixels may be mixtures at edges.
     assert min(blue[:2]) > 20 * max(max(blue[2:]), 5)
     assert min(red[2:]) > 20 * max(max(red[:2]), 5)
@@ -138,6 +138,22 @@ def test_a_film_shows_the_rows_in_their_colors_at_its_rate_and_what_lost_its_end
         assert is_whole(data)
         ends = (0, 8, 100, len(data) // 2, len(data) - 1)
         assert not any(is_whole(data[:count]) for count in ends)
+
+
+def test_pins_are_brown_while_they_wait_for_their_drive_and_the_legend_says_so(tmp_path, history):
+    late = history["time"] >= 0.5
+    history["mode"][:] = Mode.HOLD
+    history["waiting"] = np.tile(late[:, None], history["mode"].shape[1])
+    looks = Film(**SMALL, color="mode", arrows=False)
+    with stage(history, looks) as shots:
+        written = {part.data.body for part in shots.scene.objects if part.type == "FONT"}
+    assert {"hold", "waiting"} <= written
+    pictures = draw(history, tmp_path, looks)
+    blue = [looks_like(picture, COLORS[Mode.HOLD]) for picture in pictures]
+    brown = [looks_like(picture, WAITING) for picture in pictures]
+    # Frames 0 and 1 are before half a second. A few pixels may be mixtures at edges.
+    assert min(blue[:2]) > 20 * max(max(blue[2:]), 5)
+    assert min(brown[2:]) > 20 * max(max(brown[:2]), 5)
 
 
 def test_arrows_are_red_and_only_there_when_asked_for(tmp_path, history):

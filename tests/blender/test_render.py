@@ -18,6 +18,7 @@ from digiclay.pictures.legend import (
     SHARE,
     Front,
     draw_force_plot,
+    list_entries,
     write_force_legend,
     write_mode_legend,
 )
@@ -167,8 +168,8 @@ def extent(plane, part):
 @pytest.mark.parametrize("size, letters", SIZES.items())
 def test_letters_have_a_size_that_can_be_read_and_modes_are_explained_where_it_can(size, letters):
     plane = front(*size)
-    write_mode_legend(plane, list(Mode))
-    assert len(texts(plane)) == len(Mode) * (2 if size[0] >= 800 else 1)
+    write_mode_legend(plane, list_entries(list(Mode), True))
+    assert len(texts(plane)) == (len(Mode) + 1) * (2 if size[0] >= 800 else 1)
     session(plane)
     found = texts(plane)
     sizes = [found[said].data.size / plane.pixel for said in ("force follow", "total force 0.49 N")]
@@ -177,7 +178,8 @@ def test_letters_have_a_size_that_can_be_read_and_modes_are_explained_where_it_c
 
 @pytest.mark.parametrize("size", [*SIZES, (200, 320), (64, 40), (1000, 200)])
 @pytest.mark.parametrize(
-    "legend", [lambda plane: write_mode_legend(plane, list(Mode)), write_force_legend]
+    "legend",
+    [lambda plane: write_mode_legend(plane, list_entries(list(Mode), True)), write_force_legend],
 )
 def test_nothing_that_is_written_covers_anything_else(size, legend):
     plane = front(*size)

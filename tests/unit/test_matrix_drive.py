@@ -43,8 +43,9 @@ def test_as_many_sections_as_lines_are_a_valve_per_cell_bit_for_bit(method):
     drives = None, {"sections": 11, "slot": 0.02}, {"sections": 13, "axis": "columns"}
     direct, *driven = (run(scene(drive, control={"method": method})).history for drive in drives)
     for history in driven:
-        assert history.keys() - direct.keys() == {"served"}
+        assert history.keys() - direct.keys() == {"served", "waiting"}
         assert history["served"][:-1].all()
+        assert not history["waiting"].any()
         for name, values in direct.items():
             assert history[name].tobytes() == values.tobytes(), name
 
@@ -212,6 +213,10 @@ def test_a_bed_is_driven_goes_on_from_a_kept_state_and_knows_its_error(tables):
     served, command = result.history["served"], result.history["command"]
     assert served.shape == command.shape
     assert not command[~served].any()
+    system = assemble(made)
+    states = periods(system, made.trajectories(), begin(system), made.periods)
+    waiting = [state.waiting() for state in states]
+    np.testing.assert_array_equal(result.history["waiting"], [*waiting, waiting[0] & False])
     error = result.estimate_errors().metrics["height_error"]
     assert error < 0.2e-3  # commands that did not act would leave millimeters
 

@@ -52,7 +52,7 @@ def test_the_arrays_of_a_history_are_the_declared_ones_and_are_read_again(finger
     done = run(resolve({"layout": TABLE["layout"], "blister": SMALL, **motion, **drive}))
     save(done, tmp_path)
     absent = {"finger_force"} if fingers == 1 else set()
-    absent |= set() if drive else {"served"}
+    absent |= set() if drive else {"served", "waiting"}
     sizes = {"t": 41, "n": 12, "f": fingers}
     assert {name: array.shape for name, array in done.history.items()} == {
         name: tuple(

@@ -222,7 +222,7 @@ def draw_relief(scene, relief, lowest, looks, out, light=None):
             part.hide_render = True
         points = stage.outline(bed)
         below = points[points[:, 2] <= points[: len(relief), 2].max()]  # without the fingertip
-        stage.set_up(drawn, bed, instant, points=below, modes=(), margins=MARGINS)
+        stage.set_up(drawn, bed, instant, points=below, entries=(), margins=MARGINS)
         if light is not None:
             light(drawn, float(np.ptp(below[:, 0])))
         file = out.with_suffix(".png")

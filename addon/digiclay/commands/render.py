@@ -81,6 +81,7 @@ ARRAYS = (
     "finger_force",
     "body",
     "body_force",
+    "waiting",
 )
 #: Options of one kind of picture only; --rate is of both.
 OF_FILMS, OF_TURNTABLES = ("rate", "speed", "start", "stop", "strip"), ("rate", "frames")

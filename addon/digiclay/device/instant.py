@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..core.base.arrays import Floats, Modes
+from ..core.base.arrays import Array, Flags, Floats, Modes
 from ..core.base.errors import OutputError
 from ..core.base.modes import Mode
 from ..core.model.actuator import Actuator
@@ -50,6 +50,8 @@ class Instant:
     #: Meshes that press the pins, and their poses (b, 7).
     bodies: tuple[Mesh, ...] = ()
     body: Floats | None = None
+    #: (n,), whether each pin waits for its drive, where there is one.
+    waiting: Flags | None = None
 
     def __post_init__(self) -> None:
         for name in ARRAYS:
@@ -63,7 +65,7 @@ class Instant:
         rows = len(history["height"])
         if not -rows <= index < rows:
             raise OutputError(f"The history has {rows} rows, 0 to {rows - 1} (got {index}).")
-        names = [name for name in (*ARRAYS[1:], "body") if name in history]
+        names = [name for name in (*ARRAYS[1:], "body", "waiting") if name in history]
         taken = {name: np.asarray(history[name])[index] for name in names}
         return cls(position=np.asarray(history["position"]), **taken, **sizes)
 
@@ -89,9 +91,10 @@ class Instant:
         )
 
     @property
-    def modes(self) -> list[Mode]:
-        """The modes present, in the order of their codes."""
-        return [Mode(int(code)) for code in np.unique(self.mode)]
+    def looks(self) -> dict[str, Array]:
+        """What the colors of the pins show, (n,), by its name."""
+        waiting = np.zeros(self.height.shape, np.bool_) if self.waiting is None else self.waiting
+        return {"mode": self.mode, "force": self.force, "waiting": waiting}
 
 
 def find_ellipsoids(scene: Scene) -> tuple[Fingertip, ...]:

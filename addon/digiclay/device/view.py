@@ -68,9 +68,7 @@ def build(instant: Instant, collection: Collection, lowest: float | None = None)
 def make_cells(instant: Instant) -> Mesh:
     """Make the mesh of a bed at an instant."""
     cells = bridge.points("Digital Clay", len(instant.height))
-    bridge.write_cells(
-        cells, instant.position, instant.height, mode=instant.mode, force=instant.force
-    )
+    bridge.write_cells(cells, instant.position, instant.height, **instant.looks)
     return cells
 
 
@@ -102,9 +100,7 @@ def hold_parts(bed: Object) -> None:
 
 def show(bed: Object, instant: Instant) -> None:
     """Show another instant of the same bed, the poses of its fingertips included."""
-    bridge.write_cells(
-        bed.data, instant.position, instant.height, mode=instant.mode, force=instant.force
-    )
+    bridge.write_cells(bed.data, instant.position, instant.height, **instant.looks)
     bridge.place_fingertips(bed, instant.fingertip, instant.finger)
 
 

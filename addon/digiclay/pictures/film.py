@@ -20,14 +20,13 @@ from ..bridge import SCALE
 from ..compat import Object, Scene, bpy, quiet, strips, to_video
 from ..core.base.arrays import Array, Cells, Floats
 from ..core.base.errors import OutputError
-from ..core.base.modes import Mode
 from ..core.files.run_folder import name_unfinished
 from ..core.files.tables import Table
 from ..core.session.render_settings import Film, Moving, Turntable, name_frame
 from ..device.instant import Instant
 from ..roles import fingertips_of
 from . import stage
-from .legend import SHARE, draw_force_plot
+from .legend import SHARE, draw_force_plot, list_entries
 from .still import failure_reason, render_picture, stage_bed
 
 
@@ -126,6 +125,7 @@ def stage_film(
     rows = looks.rows(history["time"])
     used = slice(int(rows[0]), int(rows[-1]) + 1)
     height = history["height"][used]
+    waiting = history["waiting"][used] if "waiting" in history else None
     first = Instant.of(history, int(rows[0]), **sizes)
     with stage_bed("Digital Clay Film", first, looks, float(height.min())) as (scene, bed):
         left, right, below, above = stage.choose_margins(bed)
@@ -134,7 +134,7 @@ def stage_film(
             bed,
             first,
             points=_visible_points(bed, history, rows, sizes),
-            modes=[Mode(int(code)) for code in np.unique(history["mode"][used])],
+            entries=list_entries(history["mode"][used], waiting),
             margins=(left, right, below + (SHARE if looks.strip else 0.0), above),
         )
         time, (called, force) = history["time"], plotted

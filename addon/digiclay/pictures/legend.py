@@ -6,7 +6,7 @@ import math
 import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from .. import bridge
 from ..bridge import linear
 from ..compat import Material, Object, Scene, bpy, shader_nodes
 from ..core.base.arrays import Floats
-from ..core.base.modes import MEANINGS, Mode
+from ..core.base.modes import MEANINGS, WAITING, WAITS, Mode
 from ..device import heat, palettes, primitives
 
 Color = tuple[float, float, float]
@@ -113,7 +113,24 @@ class Front:
         return self.put(part, *low, color, layer)
 
 
-def write_mode_legend(front: Front, modes: Sequence[Mode]) -> None:
+class Entry(NamedTuple):
+    """Entry of a legend: what pins of a color, sRGB, do."""
+
+    name: str
+    meaning: str
+    color: Color
+
+
+def list_entries(modes: Any, waiting: Any) -> list[Entry]:
+    """Return the entries of all codes of modes in an array, and of pins that wait if any does."""
+    entries = [
+        Entry(mode.name.lower().replace("_", " "), MEANINGS[mode], palettes.color_of(mode))
+        for mode in map(Mode, np.unique(modes).tolist())
+    ]
+    return [*entries, Entry("waiting", WAITS, WAITING)] if np.any(waiting) else entries
+
+
+def write_mode_legend(front: Front, entries: Sequence[Entry]) -> None:
     """List modes down the picture's left side, each with a dot of its color; small pictures explain none."""
     size, small = front.letter, front.note
     turns = np.linspace(0.0, 2.0 * math.pi, 49)[:-1]
@@ -121,10 +138,9 @@ def write_mode_legend(front: Front, modes: Sequence[Mode]) -> None:
         [np.column_stack([np.cos(turns), np.sin(turns), 0.0 * turns])], last=True
     )
     left, y = LEFT * front.width, 0.86 * front.height
-    for mode in modes:
-        name = mode.name.lower().replace("_", " ")
-        lines = textwrap.wrap(MEANINGS[mode], 26) if front.explains else []
-        for radius, color, layer in ((0.42, palettes.color_of(mode), 0), (0.47, FADED, 1)):
+    for name, meaning, inner in entries:
+        lines = textwrap.wrap(meaning, 26) if front.explains else []
+        for radius, color, layer in ((0.42, inner, 0), (0.47, FADED, 1)):
             dot = bpy.data.objects.new(name, bridge.mesh(name, disc))
             dot.scale = (radius * size,) * 3
             front.put(dot, left, y + 0.33 * size, color, layer)

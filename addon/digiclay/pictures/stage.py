@@ -8,10 +8,9 @@ import numpy as np
 from .. import bridge
 from ..compat import Object, Scene, bpy, shader_nodes
 from ..core.base.arrays import Floats
-from ..core.base.modes import Mode
 from ..device import parts, view
 from ..device.instant import Instant
-from .legend import Front, write_force_legend, write_mode_legend
+from .legend import Entry, Front, list_entries, write_force_legend, write_mode_legend
 
 #: Where the camera stands, seen from the bed: angle from x and above the floor, rad.
 AZIMUTH, ELEVATION = math.radians(-62.0), math.radians(43.0)
@@ -32,12 +31,12 @@ def set_up(
     instant: Instant,
     *,
     points: Floats | None = None,
-    modes: Sequence[Mode] | None = None,
+    entries: Sequence[Entry] | None = None,
     margins: Margins | None = None,
 ) -> Front:
     """Put camera, lights, floor and legend about a bed at the origin; return the plane before the camera.
 
-    Margins are those of `choose_margins` unless given.
+    Margins are those of `choose_margins` unless given, entries of the legend those of the instant.
     """
     points = outline(bed) if points is None else points
     floor = float(points[:, 2].min())
@@ -50,7 +49,8 @@ def set_up(
     if view.shows_force(bed):
         write_force_legend(front)
     elif view.read_coloring(bed) == "mode":
-        write_mode_legend(front, instant.modes if modes is None else modes)
+        shown = list_entries(instant.mode, instant.waiting) if entries is None else entries
+        write_mode_legend(front, shown)
     return front
 
 

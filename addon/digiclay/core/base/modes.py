@@ -50,5 +50,6 @@ COLORS: dict[Mode, tuple[float, float, float]] = {
     Mode.FROZEN: (0.00, 0.62, 0.45),
     Mode.LOCKED: (0.16, 0.14, 0.20),
 }
-#: sRGB of a cell that waits for its drive, in any mode.
+#: sRGB of a cell that waits for its drive, in any mode, and what that means.
 WAITING = (0.28, 0.14, 0.00)
+WAITS = "its drive serves others"

@@ -160,7 +160,7 @@ class RunRecording(Recording):
         self._history.begin(state.row(0), state.mode())
         super().__init__(recorder, rows, self._history.write, bodies)
         self._fingers = [_read_fingers(state)]
-        self._served: list[Flags] = []
+        self._addressed: list[dict[str, Flags]] = []
         self._last = state
 
     def observe(self, state: State) -> None:
@@ -171,7 +171,8 @@ class RunRecording(Recording):
             self._history.age(state.row(0))
         self._last = state
         if state.addressing and (state.period - 1) % self.every == 0:
-            self._served.append(state.addressing.served)
+            served, waiting = state.addressing.served, state.waiting()
+            self._addressed.append({"served": served, "waiting": waiting})
         if state.period % self.every == 0:
             self._fingers.append(_read_fingers(state))
 
@@ -181,9 +182,10 @@ class RunRecording(Recording):
         rows = self._history.finish(period, self.every)
         last = _read_fingers(self._last)
         each = [*self._fingers, last][: len(rows["period"])]
-        if self._served:
+        for name, flags in self._addressed[0].items() if self._addressed else ():
             # No period follows the last row.
-            rows["served"] = np.array([*self._served, np.zeros_like(self._served[0])])
+            each_period = [addressed[name] for addressed in self._addressed]
+            rows[name] = np.array([*each_period, np.zeros_like(flags)])
         return rows | {name: np.array([values[name] for values in each]) for name in last}
 
 

@@ -76,6 +76,13 @@ HISTORY_ARRAYS: dict[str, HistoryArray] = {
         "b",
         optional=True,
     ),
+    "waiting": HistoryArray(
+        "t, n",
+        "1",
+        "whether each pin waits for the drive, which withholds its command in that control period",
+        "b",
+        optional=True,
+    ),
     "position": HistoryArray("n, 2", "m", "x and y of each pin's axis from the middle of the bed"),
 }
 
