@@ -350,6 +350,7 @@ ALTERING = "must not need an extension that changes its vertices (got one.gltf: 
         ("nodes.0.matrix", [1, 2], "cannot reshape"),
         ("nodes.0.skin", 0, "must not be bent by a skin or by weights"),
         ("nodes.0.weights", [0.0, 0.5], "must not be bent by a skin"),
+        ("meshes.0.weights", [0.0, 0.5], "must not be bent by a skin"),
         ("extensionsUsed", ["EXT_mesh_gpu_instancing"], "EXT_mesh_gpu_instancing)"),
         ("extensionsUsed", ["KHR_node_visibility"], "KHR_node_visibility)"),
         *(

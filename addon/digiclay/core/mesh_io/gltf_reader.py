@@ -133,12 +133,14 @@ class _File:
             if index in seen:
                 raise ValueError(f"node {index} stands in two places")
             seen.add(index)
-            if "mesh" in node and ("skin" in node or any(node.get("weights", []))):
+            mesh = self._entry("meshes", node["mesh"]) if "mesh" in node else {"primitives": []}
+            weights = node.get("weights", mesh.get("weights", []))
+            if mesh["primitives"] and ("skin" in node or any(weights)):
                 rule = "must not be bent by a skin or by weights: apply them first"
                 raise make_refusal(rule, self._path.name, f"node {index}")
             placement = nest_placement(_placement(node), outer)
             waiting += [(child, placement) for child in reversed(node.get("children", []))]
-            for part in self._entry("meshes", node["mesh"])["primitives"] if "mesh" in node else ():
+            for part in mesh["primitives"]:
                 if part.get("mode", TRIANGLES) in (TRIANGLES, STRIP, FAN):
                     yield part, placement
 
