@@ -130,8 +130,32 @@ def test_a_color_that_is_clear_by_itself_is_black_and_nothing_is_warned_of(tmp_p
     levels = Image.fromarray(np.array([[255, 0], [0, 255]], np.uint8))
     clear = {"P": bytes([255] * 255 + [0]), "L": 255, "RGB": (255, 255, 255), "1": 1}[mode]
     levels.convert(mode).save(tmp_path / "a.png", transparency=clear)
-    assert np.ptp(read_pixels(tmp_path / "a.png")) == 0.0
+    assert not read_pixels(tmp_path / "a.png").any()
     assert not recwarn.list
+
+
+@pytest.mark.parametrize("bits, kind", [(1, 0), (2, 0), (4, 0), (8, 0), (16, 0), (8, 2), (16, 2)])
+def test_a_color_of_any_bits_that_is_clear_is_black(tmp_path, bits, kind):
+    # Two rows of the color that is clear, white, and half of it, as the standard has them.
+    half, white, channels = 2 ** (bits - 1), 2**bits - 1, kind + 1
+    row = "0" * 8 + 2 * "".join(f"{level:0{bits}b}" * channels for level in (white, half))
+    row = row.ljust(8 * -(-len(row) // 8), "0")
+    data = bytes(int((2 * row)[at : at + 8], 2) for at in range(0, 2 * len(row), 8))
+    chunks = {
+        b"IHDR": struct.pack(">IIBBBBB", 4, 2, bits, kind, 0, 0, 0),
+        b"tRNS": struct.pack(f">{channels}H", *[white] * channels),
+        b"IDAT": zlib.compress(data),
+        b"IEND": b"",
+    }
+    (tmp_path / "a.png").write_bytes(
+        b"\x89PNG\r\n\x1a\n"
+        + b"".join(
+            struct.pack(">I", len(part)) + name + part + struct.pack(">I", zlib.crc32(name + part))
+            for name, part in chunks.items()
+        )
+    )
+    shown = read_pixels(tmp_path / "a.png") / (1 if bits == 1 else 65535 if bits == 16 else 255)
+    assert_near(shown, [[0, half / white * (bits > 1)] * 2] * 2, 1e-7)
 
 
 @pytest.mark.parametrize(

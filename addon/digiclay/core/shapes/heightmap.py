@@ -150,6 +150,9 @@ FORMATS = ("PNG", "TIFF", "JPEG", "BMP", "DIB", "PPM")
 BLENDER_ONLY = (".exr", ".hdr")
 #: Pillow's modes of one channel, and those with colors or alpha that need no conversion.
 GRAY, COLORED = ("1", "L", "I", "I;16", "I;16B", "I;16L", "F"), ("LA", "RGB", "RGBA")
+#: Modes in which a single color can be clear; what a gray of a few bits, in which the file tells it, is
+#: multiplied by.
+KEYED, KEYED_BITS = ("1", "L", "I;16", "RGB"), {"L;2": 85, "L;4": 17}
 #: Brightness of red, green and blue by the television standard BT.601.
 BRIGHTNESS = np.array([0.299, 0.587, 0.114], np.float32)
 #: Most pixels of a picture: 16 000 x 8 000. docs/shapes.md has the memory that each needs.
@@ -262,23 +265,28 @@ def _read_levels(open_picture: Callable[[], Any], path: Path) -> Pixels:
         if raw == "LA;16B":  # four bytes per pixel
             _set_raw(opened, lambda raw: "RGBA")
             return np.asarray(opened).view(">u2")
-        keyed = "transparency" in opened.info and opened.mode in ("1", "L", "RGB")
-        if keyed or opened.mode in ("P", "PA"):
+        key = opened.info.get("transparency") if opened.mode in KEYED else None
+        if opened.mode in ("P", "PA"):
             opened = opened.convert("RGBA")
         elif opened.mode not in (*GRAY, *COLORED):
             if ";16" in raw:
                 raise ValueError(f"{opened.mode} of 16 bits")
             opened = opened.convert("LA" if opened.mode == "La" else "RGB")
-        high: Pixels = np.asarray(opened)
-    if high.ndim == 2 or ";16" not in raw:
-        return high
-    # Pillow keeps the higher byte of a color; read in the other byte order, that is the lower one.
-    with open_picture() as opened:
-        _set_raw(
-            opened, lambda raw: raw.replace("a;", "A;")[:-1] + ("L" if raw[-1] == "B" else "B")
-        )
-        levels: Pixels = high.astype(np.uint16) << 8 | np.asarray(opened)
-    return levels[..., :3] if "a;" in raw else levels  # colors multiplied by alpha need no alpha
+        levels: Pixels = np.asarray(opened)
+    if levels.ndim > 2 and ";16" in raw:
+        # Pillow keeps the higher byte of a color; read in the other byte order, that is the lower one.
+        with open_picture() as opened:
+            _set_raw(
+                opened, lambda raw: raw.replace("a;", "A;")[:-1] + ("L" if raw[-1] == "B" else "B")
+            )
+            levels = levels.astype(np.uint16) << 8 | np.asarray(opened)
+        levels = (
+            levels[..., :3] if "a;" in raw else levels
+        )  # multiplied by alpha, which is not needed
+    if key is None:
+        return levels
+    other = levels != np.multiply(key, KEYED_BITS.get(raw, 1)).astype(levels.dtype)
+    return levels * (other if levels.ndim == 2 else other.any(axis=2, keepdims=True))
 
 
 def _set_raw(opened: Any, change: Callable[[str], str]) -> str:
