@@ -93,6 +93,7 @@ def test_a_broken_rule_is_one_line_with_owner_field_rule_and_value(given, line):
         ("20 \N{GREEK SMALL LETTER MU}m", "m", 20e-6),
         ("20\N{NO-BREAK SPACE}\N{SQUARE MU M}", "m", 20e-6),
         ("9.81 m/s\N{SUPERSCRIPT TWO}", "m/s2", 9.81),
+        ("\N{MINUS SIGN}3 mm", "m", -3e-3),
     ],
 )
 def test_a_quantity_with_a_unit_is_read_into_si(text, unit, value):
@@ -102,7 +103,8 @@ def test_a_quantity_with_a_unit_is_read_into_si(text, unit, value):
 @pytest.mark.parametrize(
     "text, rule",
     [
-        ("three mm", "must be a number, or a text such as '3 m'"),
+        ("three mm", "must be a number, or a text such as '1.5 m'"),
+        ("3,5 mm", "must be a number, or a text such as '1.5 m'"),
         ("3 parsec", "must have a unit known here"),
         ("3", "must have a unit known here"),
         ("3 bar", "must be in m or a multiple of it"),

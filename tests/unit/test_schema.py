@@ -109,7 +109,7 @@ WRONG = [
     ({"fluid": {"xyz": 1}}, "fluid.xyz must be a known key (got 1). Known here: density, viscosity."),
     ({"valv": {"a": 1}}, "valv must be a known key (got a section). Did you mean valve?"),
     ({"valve": {"a\nb": 1}}, "valve.'a\\nb' must be a known key (got 1). Known here: "),
-    ({"fluid": {"density": "thick"}}, "fluid.density must be a number, or a text such as '3 kg/m3' (got 'th"),
+    ({"fluid": {"density": "thick"}}, "fluid.density must be a number, or a text such as '1.5 kg/m3' ("),
     ({"valve": {"stroke": "3 s"}}, "valve.stroke must be in m or a multiple of it (got '3 s')."),
     ({"preset": "quick"}, "preset must be one of paper, fast, viscous, design (got 'quick')."),
     ({"control": {"method": "hand"}}, "control.method must be one of virtual_master, cell_states, elastic"),

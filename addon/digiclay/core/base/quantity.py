@@ -46,8 +46,12 @@ BOUNDS = {
     "below": operator.lt,
     "at_most": operator.le,
 }
+#: Plain signs in place of others.
+PLAIN = str.maketrans("\N{GREEK SMALL LETTER MU}\N{MINUS SIGN}", "\N{MICRO SIGN}-")
 #: A number, and the text after it.
-WRITTEN = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|[+-]?(?:nan|inf)(?= |$))\s*(.*)")
+WRITTEN = re.compile(
+    r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|[+-]?(?:nan|inf)(?= |$))\s*((?!,).*)"
+)
 
 
 class Quantity(NamedTuple):
@@ -219,10 +223,8 @@ def _finite(value: float) -> bool:
 
 
 def normalize(text: str) -> str:
-    """Return a quantity with plain signs in place of similar ones: the Greek mu, ``²``, no-break spaces."""
-    return unicodedata.normalize("NFKC", text).replace(
-        "\N{GREEK SMALL LETTER MU}", "\N{MICRO SIGN}"
-    )
+    """Return a quantity with plain signs for similar ones: Greek mu, ``²``, minus, special spaces."""
+    return unicodedata.normalize("NFKC", text).translate(PLAIN)
 
 
 def parse(text: str, unit: str) -> float:
@@ -233,7 +235,7 @@ def parse(text: str, unit: str) -> float:
     """
     match = WRITTEN.fullmatch(normalize(text).strip())
     if not match:
-        raise ValueError(f"must be a number, or a text such as '3 {unit}'")
+        raise ValueError(f"must be a number, or a text such as '1.5 {unit}'")
     value, name = float(match[1]), match[2]
     factor, si = UNITS.get(name, (0.0, ""))
     if not si:
