@@ -203,6 +203,7 @@ KNOWN = np.ma.masked_equal([[9, 10, 11, 12], [5, -9999, 7, 8], [1, 2, 3, 4]], -9
         ("a.asc", ESRI + NORTH_UP, KNOWN),
         ("a.asc", "\ufeff" + (ESRI + NORTH_UP).replace("\n", "\r\n").replace(" ", "\t"), KNOWN),
         ("a.asc", ESRI.upper().replace("NODATA_VALUE -9999\n", "") + NORTH_UP, KNOWN),
+        ("a.asc", (ESRI + NORTH_UP).replace("cellsize 20", "dx 20\ndy 20"), KNOWN),
         ("a.ASC", ESRI + "1 2\n3 4\n5 -9999\n7 8\n9 10\n11 12", KNOWN),
         ("a.txt", "# in m\n1 2.5 3e0\n4 5 6", [[1, 2.5, 3], [4, 5, 6]]),
         # As Octave saves a matrix; as numpy does, with a header.
@@ -230,6 +231,11 @@ def test_a_grid_of_numbers_is_read_as_its_program_writes_it(tmp_path, name, text
             "a.asc",
             ESRI + NORTH_UP[8:],
             "(got a.asc: cannot reshape array of size 8 into shape (3,4))",
+        ),
+        (
+            "a.asc",
+            (ESRI + NORTH_UP).replace("cellsize 20", "dx 20\ndy 30"),
+            "(got a.asc: its cells are 20 x 30, not square)",
         ),
         ("a.txt", "", "(got a.txt: loadtxt: input contained no data"),
         ("a.txt", "1 2\n3", "(got a.txt: the number of columns changed from 2 to 1 at row 2)"),

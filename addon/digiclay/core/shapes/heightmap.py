@@ -428,6 +428,8 @@ def read_grid(path: Path) -> HeightMap:
             values: Pixels = np.loadtxt(text.splitlines(), delimiter=separator, ndmin=2)
         if path.suffix.lower() == ".asc":
             rows, columns = int(head["nrows"]), int(head["ncols"])
+            if head.get("dx") != head.get("dy"):
+                raise ValueError(f"its cells are {head['dx']:g} x {head['dy']:g}, not square")
             values = _mask(values.reshape(rows, columns)[::-1], head.get("nodata_value", -9999.0))
     except KeyError as error:
         reason = f"no {error} in its head, as an Esri ASCII grid has it"
@@ -437,7 +439,7 @@ def read_grid(path: Path) -> HeightMap:
         if not head and values.shape[1] == 3 and len(values) > 99:
             rule = "must be a grid of heights, not a list of points"
             raise make_refusal(rule, path.name, f"{len(values)} rows of 3 numbers")
-        return make_height_map(path.name, values, 1.0, head.get("cellsize"))
+        return make_height_map(path.name, values, 1.0, head.get("cellsize", head.get("dx")))
     raise make_refusal("must be a grid of numbers that can be read", path.name, reason)
 
 
