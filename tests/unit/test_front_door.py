@@ -252,7 +252,7 @@ def test_the_surface_is_exported_by_the_ending_and_compared_with_a_former_one(he
     run.surface().export("a.obj", kind="features")
     with refused_in_a_line(DigiclayError, "^There is no feature"):
         run.surface(former=run.scene.simulation.duration).export("a.obj", kind="features")
-    assert run.surface(time=0.0).formed.height.max() == pytest.approx(0.04)
+    assert run.surface(time=np.float32(0.0)).formed.height.max() == pytest.approx(0.04)
 
 
 def test_forces_contact_and_losses_are_of_each_finger(done):

@@ -4,6 +4,7 @@ import math
 import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass
+from numbers import Real
 from pathlib import Path
 from typing import NamedTuple
 
@@ -207,8 +208,8 @@ def is_whole(folder: Path, scene: Scene) -> bool:
 def find_row(history: Mapping[str, Array], time: float, called: str) -> int:
     """Return the row nearest to a time within the session, s; `called`: its name in messages."""
     first, last = history["time"][[0, -1]]
-    if not (isinstance(time, (int, float)) and first <= time <= last):
-        shown = f"{time:g} s" if isinstance(time, (int, float)) else repr(time)
+    if not (isinstance(time, Real) and first <= time <= last):  # also numpy's
+        shown = f"{time:g} s" if isinstance(time, Real) else repr(time)
         raise OutputError(f"{called} must be between {first:g} s and {last:g} s (got {shown}).")
     return int(np.argmin(np.abs(history["time"] - time)))
 
