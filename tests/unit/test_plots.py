@@ -110,11 +110,13 @@ def test_the_session_shows_force_set_point_and_the_chosen_cells_over_one_time(se
     touched = case["fingertip"][case["total_force"] > 0.0, 0]
     assert np.abs(x[[0, -1]] - touched[[0, -1]]).max() <= 1.5e-3
     assert_near(np.diff(x), np.ptp(touched) / 5, 3e-3)
-    # Without contact those that moved most are shown.
+    # Without contact those that moved are shown, from the one that moved most to the one that did least.
     case["total_force"] = np.zeros(201)
     case["height"] = np.full_like(case["height"], 0.04)
-    case["height"][100:, 30] = 0.05
-    assert 30 in plots.session_cells(case)
+    case["height"][100:, 30:41] += np.linspace(1e-3, 11e-3, 11)
+    assert plots.session_cells(case) == [40, 38, 36, 34, 32, 30]
+    case["height"][:, 31:] = 0.04
+    assert plots.session_cells(case) == [30]
 
 
 def test_a_set_point_is_drawn_of_each_cell_and_without_one_neither_it_nor_a_deviation():

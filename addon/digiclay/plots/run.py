@@ -36,7 +36,8 @@ def session_cells(history: History) -> list[int]:
     """Choose up to six cells along the fingertip path in contact, evenly spaced.
 
     They are different, in the order in which the fingertip passes them, the first and the last
-    contact among them. Without any contact they are those that moved most. Of several fingertips
+    contact among them. Without any contact they are of those that moved, from most to least, evenly
+    spaced: those that moved most may be neighbors, and alike. Of several fingertips
     each of the first six has the cell under it in the middle of its contact.
     """
     count = len(LETTERS)
@@ -45,7 +46,9 @@ def session_cells(history: History) -> list[int]:
     position, height = array(history, "position"), array(history, "height")
     touching = np.flatnonzero(find_contact_rows(array(history, "total_force")))
     if not len(touching):
-        return sorted(np.argsort(-np.ptp(height, axis=0), kind="stable")[:count].tolist())
+        travel = np.ptp(height, axis=0)
+        rank = np.linspace(0.0, max(1, np.count_nonzero(travel)) - 1, count).round().astype(int)
+        return list(dict.fromkeys(np.argsort(-travel, kind="stable")[rank].tolist()))
     finger = array(history, "fingertip")[touching, :2]
     stretch, pressed = np.hypot(*np.diff(finger, axis=0).T), np.diff(touching) == 1
     # The way through the air to the next place is one step at most: its ends are worth a cell, no
