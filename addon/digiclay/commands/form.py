@@ -126,8 +126,8 @@ def _evaluate(result: Result, row: int, laid: Fitted) -> tuple[Result, list[str]
     units = dict(zip(figures, ("m", "m3", "m3"), strict=True))
     metrics = {**result.metrics, **figures, **counts, "units": {**result.metrics["units"], **units}}
     lines = [
-        f"displayed to within {error * 1e6:.2g} µm in {result.history['time'][stands]:.1f} s",
-        f"formed: {raised * 1e6:.2g} cm³ raised by up to {max(change.max(), 0.0) * 1e3:.2g} mm, "
-        f"{lowered * 1e6:.2g} cm³ lowered by up to {max(-change.min(), 0.0) * 1e3:.2g} mm",
+        f"displayed to within {error * 1e6:.1f} µm in {result.history['time'][stands]:.1f} s",
+        f"formed: {raised * 1e6:.2g} cm³ raised by up to {max(0.0, change.max()) * 1e3:.2g} mm, "
+        f"{lowered * 1e6:.2g} cm³ lowered by up to {max(0.0, -change.min()) * 1e3:.2g} mm",
     ]
     return replace(result, metrics=metrics), lines
