@@ -93,6 +93,8 @@ def test_the_same_scene_gives_the_same_history_bit_for_bit_or_less_of_it(result)
     assert told == [(done, 40) for done in range(1, 41)]
     thinned = run(scene(recorder={"every": 4})).history
     assert np.array_equal(thinned["height"], result.history["height"][::4])
+    # Pressed in between.
+    assert ", no contact in the rows kept, " in run(scene(recorder={"every": 40})).summary()
     assert run(scene(recorder="absent")).history == {}
     assert (
         run(scene(fingertip="absent"))

@@ -155,7 +155,8 @@ class Result(Described):
     def _describe_force(self) -> str:
         """Return the deviation of the force, and the losses, or ``""``."""
         rfd, share = self.metrics.get("rfd"), self.metrics.get("contact_share")
-        felt = "no contact" if share == 0.0 else ""
+        thinned = self.scene.recorder is not None and self.scene.recorder.every > 1
+        felt = ("no contact" + " in the rows kept" * thinned) * (share == 0.0)
         if rfd is not None:
             felt = f"RFD {rfd:.2g} N{self._name_worst()}"
         if self.metrics.get("rfd_jnd_least") is not None:
