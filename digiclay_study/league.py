@@ -87,11 +87,6 @@ def find_interval(values: Sequence[float | None]) -> Interval | None:
     return Interval(fmean(finite), width * stdev(finite), len(finite))
 
 
-def show_digits(value: float, digits: int = 3) -> str:
-    """Write a number with so many digits that count, and without an exponent below a million."""
-    return f"{float(f'{value:.{digits}g}'):g}"
-
-
 def find_trajectories(table: Table) -> list[str]:
     """Return the trajectories of all trials."""
     return list(dict.fromkeys(name for _, name, _ in table))

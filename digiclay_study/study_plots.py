@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from digiclay.core.base.arrays import Cells, Flags, Floats
+from digiclay.core.base.quantity import show_digits
 from digiclay.core.metrics.metric_table import Metric
 from digiclay.core.metrics.summary import find_weber_fractions
 from digiclay.core.studies.evaluation import FIGURES
@@ -15,7 +16,7 @@ from digiclay.plots.figure import DASHES, INK, LINES, SHADE, STYLE, empty
 from digiclay.plots.sweep import read_unit
 
 from .indices import CONFIDENCE, Indices
-from .league import MEASURES, find_interval, find_trajectories, list_values, show_digits
+from .league import MEASURES, find_interval, find_trajectories, list_values
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -251,7 +252,7 @@ def draw_measures(league: Sequence[Row], methods: Sequence[str]) -> Figure:
                     "va": "center",
                     "fontsize": 11,
                 }
-                panel.annotate(show_digits(mean.mean * factor), right, **beside)
+                panel.annotate(show_digits(mean.mean * factor, 3), right, **beside)
             name_rows(panel, [row.method for row in league])
             panel.set(title=MEASURES[name].title, xlim=(0.0, 1.3 * max(panel.get_xlim()[1], 1e-9)))
     return figure

@@ -13,6 +13,7 @@ import numpy as np
 from digiclay import __version__
 from digiclay.commands.gallery import make_links, make_table, wrap
 from digiclay.commands.progress import table as aligned
+from digiclay.core.base.quantity import show_digits
 from digiclay.core.files.tables import Record
 from digiclay.core.studies.axes import Point
 from digiclay.core.studies.speed_limits import describe_end
@@ -27,7 +28,6 @@ from .league import (
     find_interval,
     find_trajectories,
     list_values,
-    show_digits,
 )
 from .method_trials import HIGH, LIMITS, LOW, OUTCOMES
 
@@ -235,8 +235,8 @@ def _format(interval: Interval | None, factor: float) -> str:
     """Write a mean and its interval in the unit shown."""
     if interval is None:
         return "–"
-    half = "" if interval.half is None else f" ± {show_digits(interval.half * factor, 2)}"
-    return f"{show_digits(interval.mean * factor)}{half}"
+    half = "" if interval.half is None else f" ± {show_digits(interval.half * factor)}"
+    return f"{show_digits(interval.mean * factor, 3)}{half}"
 
 
 def _format_csv(source: Provenance, head: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:

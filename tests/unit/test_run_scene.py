@@ -129,6 +129,9 @@ def test_the_summary_is_one_line_with_times_and_rfd(result):
         "26.0 s simulated in 1.2 s (21.6 x real time), RFD 0.061 N (0.57 to 1 JND), "
         "height error about 1.2 µm, force error about 0.7 mN"
     )
+    made.metrics.update(run_time=1234.0, force_error=0.151, real_time_factor=12345.6)
+    assert "in 1200 s (12300 x real time)" in made.summary()
+    assert made.summary().endswith("force error about 150 mN")
 
 
 @pytest.mark.parametrize(

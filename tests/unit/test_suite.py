@@ -11,13 +11,14 @@ import pytest
 from digiclay import __version__
 from digiclay.cli import main
 from digiclay.core.base.modes import Mode
+from digiclay.core.base.quantity import show_digits
 from digiclay.core.scene.assembly import assemble
 from digiclay.core.scene.toml_table import resolve
 from digiclay.core.session.run_scene import run
 from digiclay.core.studies.nominal_relief import find_nominal, measure_relief
 from scipy.stats import t as student
 
-from digiclay_study.league import find_interval, find_league, show_digits
+from digiclay_study.league import find_interval, find_league
 from digiclay_study.method_trials import (
     GROUPS,
     OUTCOMES,
@@ -154,7 +155,7 @@ def test_an_interval_is_student_s_and_one_value_has_none():
     "value, shown", [(1652.4, "1650"), (390.1, "390"), (0.0186, "0.0186"), (32.0, "32")]
 )
 def test_a_cost_above_a_millisecond_has_no_exponent(value, shown):
-    assert show_digits(value) == shown
+    assert show_digits(value, 3) == shown
 
 
 def test_the_league_counts_worse_trajectories_and_random_drags_as_one():

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from ..core.base.errors import OutputError
+from ..core.base.quantity import show_digits
 from ..core.files.run_folder import check_folder, claim_folder, find_name
 from ..core.model.layout import make_grid
 from ..core.scene.assembly import assemble
@@ -125,9 +126,10 @@ def _evaluate(result: Result, row: int, laid: Fitted) -> tuple[Result, list[str]
     }
     units = dict(zip(figures, ("m", "m3", "m3"), strict=True))
     metrics = {**result.metrics, **figures, **counts, "units": {**result.metrics["units"], **units}}
+    highest, lowest = (show_digits(1e3 * max(0.0, way.max())) for way in (change, -change))
     lines = [
-        f"displayed to within {error * 1e6:.1f} µm in {result.history['time'][stands]:.1f} s",
-        f"formed: {raised * 1e6:.2g} cm³ raised by up to {max(0.0, change.max()) * 1e3:.2g} mm, "
-        f"{lowered * 1e6:.2g} cm³ lowered by up to {max(0.0, -change.min()) * 1e3:.2g} mm",
+        f"displayed to within {show_digits(error * 1e6)} µm in {result.history['time'][stands]:.1f} s",
+        f"formed: {show_digits(raised * 1e6)} cm³ raised by up to {highest} mm, "
+        f"{show_digits(lowered * 1e6)} cm³ lowered by up to {lowest} mm",
     ]
     return replace(result, metrics=metrics), lines

@@ -246,6 +246,11 @@ def parse(text: str, unit: str) -> float:
     return value * factor
 
 
+def show_digits(value: float, digits: int = 2) -> str:
+    """Write a number with so many digits that count, and without an exponent below a million."""
+    return f"{float(f'{value:.{digits}g}'):g}"
+
+
 def find_nearest_name(name: str, names: list[str], alike: float = 0.5) -> str:
     """Return the name most similar to a misspelt one, or ``""``; `alike`, 0 to 1: least similarity."""
     import difflib  # only needed after a mistake

@@ -3,6 +3,8 @@
 from collections.abc import Mapping
 from typing import Any, Literal, NamedTuple
 
+from ..base.quantity import show_digits
+
 #: Factor from the SI unit to the unit that people read.
 FACTORS = {"mm": 1e3, "mm/s": 1e3, "mN": 1e3, "µm": 1e6, "µs": 1e6, "ml": 1e6, "%": 1e2}
 
@@ -239,7 +241,7 @@ def describe_losses(metrics: Mapping[str, Any]) -> str:
         if finger["losses"]:
             name = f"finger {number} " if len(fingers) > 1 else ""
             often = "once" if finger["losses"] == 1 else f"{finger['losses']} times"
-            lines.append(f"{name}lost {often}, {finger['time']:.2g} s without contact")
+            lines.append(f"{name}lost {often}, {show_digits(finger['time'])} s without contact")
     return "; ".join(lines)
 
 
@@ -253,7 +255,7 @@ def describe_time(metrics: Mapping[str, Any]) -> str:
     simulated, spent, factor = (
         metrics[name] for name in ("simulated", "run_time", "real_time_factor")
     )
-    return f"{simulated:.1f} s simulated in {spent:.2g} s ({factor:.3g} x real time)"
+    return f"{simulated:.1f} s simulated in {show_digits(spent)} s ({show_digits(factor, 3)} x real time)"
 
 
 def describe_errors(metrics: Mapping[str, Any]) -> str:
@@ -261,7 +263,7 @@ def describe_errors(metrics: Mapping[str, Any]) -> str:
     if metrics.get("height_error") is None:
         return f"errors not estimated ({metrics.get('errors_absent') or 'not asked for'})"
     height, force = (
-        ERRORS[name].factor * metrics[name] for name in ("height_error", "force_error")
+        show_digits(ERRORS[name].factor * metrics[name]) for name in ("height_error", "force_error")
     )
     doubt = f" (or more: {metrics['errors_in_doubt']})" if metrics.get("errors_in_doubt") else ""
-    return f"height error about {height:.2g} µm, force error about {force:.2g} mN{doubt}"
+    return f"height error about {height} µm, force error about {force} mN{doubt}"

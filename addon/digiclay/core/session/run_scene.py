@@ -15,6 +15,7 @@ import numpy as np
 
 from ..base.arrays import Array, Floats
 from ..base.errors import OutputError, explain_os_error
+from ..base.quantity import show_digits
 from ..engine.simulation import Progress, Stopped, begin, periods
 from ..engine.system import System
 from ..files.tables import Described, Record, Table
@@ -131,7 +132,7 @@ class Result(Described):
     def describe(self) -> dict[str, str]:
         """Return what matters most of it, by name."""
         largest = self.metrics.get("max_total_force")
-        reached = "not recorded" if largest is None else f"at most {largest:.2g} N"
+        reached = "not recorded" if largest is None else f"at most {show_digits(largest)} N"
         cautions = "; ".join((*list_beyond(self.metrics), *list_cautions(self.scene)))
         rows, pins = len(self.history.get("time", ())), self.scene.cells
         return {
@@ -158,18 +159,17 @@ class Result(Described):
         thinned = self.scene.recorder is not None and self.scene.recorder.every > 1
         felt = ("no contact" + " in the rows kept" * thinned) * (share == 0.0)
         if rfd is not None:
-            felt = f"RFD {rfd:.2g} N{self._name_worst()}"
+            felt = f"RFD {show_digits(rfd)} N{self._name_worst()}"
         if self.metrics.get("rfd_jnd_least") is not None:
-            felt += (
-                f" ({self.metrics['rfd_jnd_least']:.2g} to {self.metrics['rfd_jnd_most']:.2g} JND)"
-            )
+            ends = (show_digits(self.metrics[f"rfd_jnd_{end}"]) for end in ("least", "most"))
+            felt += f" ({' to '.join(ends)} JND)"
         return ", ".join(filter(None, (felt, describe_losses(self.metrics))))
 
     def _describe_bodies(self) -> str:
         """Return the largest force on each body, and the most pins that it pressed, or ``""``."""
         bodies = enumerate(self.metrics.get("bodies", ()), 1)
         return ", ".join(
-            f"body {number} at most {felt['max_total_force']:.2g} N on {felt['pressed_pins']} pins"
+            f"body {number} at most {show_digits(felt['max_total_force'])} N on {felt['pressed_pins']} pins"
             for number, felt in bodies
         )
 

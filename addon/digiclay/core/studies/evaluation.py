@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 from ..base.errors import DigiclayError, OutputError, ParameterError, one_line
-from ..base.quantity import find_nearest_name
+from ..base.quantity import find_nearest_name, show_digits
 from ..batch.run_together import measure_together
 from ..batch.structure import describe_structure
 from ..control.methods import find_method
@@ -122,7 +122,7 @@ def describe_effort(records: Mapping[int, Record]) -> str:
         worst = {name: max(row[name] for row in judged.values()) for name in ERRORS}
         named = "" if len(judged) == len(figures) else f": {', '.join(map(str, judged))}"
         where = f" at most, estimated at {len(judged)} of {len(figures)} points{named}"
-    return f"{len(figures)} runs took {spent:.2g} s; {describe_errors(worst)}{where}"
+    return f"{len(figures)} runs took {show_digits(spent)} s; {describe_errors(worst)}{where}"
 
 
 def make_bundles(points: Sequence[Point]) -> Bundles:
