@@ -44,3 +44,11 @@ def test_run_and_describe_warn_of_a_bed_that_cannot_be_sculpted(here, capsys):
     assert "cannot be sculpted" in " ".join(capsys.readouterr().out.split())
     assert call("run shapeshift --no-errors --out again") == 0
     assert "cannot be sculpted" in " ".join(capsys.readouterr().out.split())
+
+
+def test_a_display_that_its_drive_hinders_tells_by_how_much_in_plain_numbers(here, capsys):
+    assert call("form heart --scene shapeshift --finger press --out formed") == 0
+    shown, formed = capsys.readouterr().out.splitlines()[1:3]
+    # The dead zone of its servos is 1 mm.
+    assert 900.0 < float(shown.split()[3]) <= 1000.0
+    assert formed.endswith(", 0 cm³ lowered by up to 0 mm")

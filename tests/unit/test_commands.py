@@ -453,14 +453,6 @@ def test_the_finger_comes_when_the_shape_stands_and_the_folder_alone_repeats_the
     assert np.array_equal(again["height"], read(out)["height"])
 
 
-def test_a_display_that_its_drive_hinders_tells_by_how_much_in_plain_numbers(tmp_path, capsys):
-    form(tmp_path, "heart", "--scene", "shapeshift", "--finger", "press")
-    shown, formed = capsys.readouterr().out.splitlines()[1:3]
-    # The dead zone of its servos is 1 mm.
-    assert 900.0 < float(shown.split()[3]) <= 1000.0
-    assert formed.endswith(", 0 cm³ lowered by up to 0 mm")
-
-
 @pytest.mark.parametrize(
     "refresh, preset",
     [("one_time", "viscous"), ("gradual", "paper"), ("approximate_gradual", "fast")],
