@@ -104,6 +104,8 @@ def replayed():
     blender.call(bpy.ops.digiclay.take_replay, "INVOKE_DEFAULT")
     yield from blender.until(lambda: fingertip() != before)
     note("replaying")
+    polls = (bpy.ops.digiclay.session.poll, bpy.ops.digiclay.shape_sample.poll)
+    blender.SEEN["formed in a replay"] = [blender.call(poll) for poll in polls]
     blender.shot("takes_replaying")
     blender.key("ESC")
     yield 2.0
@@ -157,6 +159,12 @@ def baked():
     bed = blender.bed()
     blender.window().view_layer.objects.active = bed
     blender.SEEN["session on a bake"] = blender.call(bpy.ops.digiclay.session.poll)
+    blender.hover(blender.on_the_bed(0.0, 0.0))
+    yield None
+    try:
+        blender.call(bpy.ops.digiclay.press, "INVOKE_DEFAULT")
+    except RuntimeError as error:
+        blender.SEEN["pressed on a bake"] = str(error)
     scene.frame_set(1)
     scene.sync_mode = "FRAME_DROP"  # software GL draws two frames a second
     places = [fingertip()]

@@ -43,6 +43,9 @@ def test_esc_in_a_replay_leaves_bed_and_finger_as_they_were_and_a_replay_ends_wh
 ):
     stopped, during, after = (seen[name] for name in ("stopped", "replaying", "replay stopped"))
     assert during["pose"] != stopped["pose"]
+    # What is formed meanwhile would be lost at its end.
+    assert seen["formed in a replay"] == [False, False]
+    assert not during["replay can be pressed"]
     assert (after["bed"], after["kept"]) == (stopped["bed"], stopped["kept"])
     assert_near(after["pose"], stopped["pose"], 1e-7)  # float32
     assert_near(bed(seen, "replayed"), bed(seen, "kept"), SETTLING)
@@ -67,6 +70,7 @@ def test_a_baked_take_plays_without_a_session_and_esc_and_free_give_bed_and_fram
         seen["replayed"]["bed"]
     ] * 2
     assert not seen["session on a bake"]
+    assert seen["pressed on a bake"].startswith("Error: The bed plays a baked session")
     # The fingertip goes down by a centimeter of the device: 0.1.
     assert np.ptp(seen["played"]) > 10e-3
 

@@ -107,6 +107,8 @@ def find_obstacle(context: Context, bed: Object, use: Use) -> str:
         return localize(
             "The bed is linked from another file: make it local first (Object > Relations)"
         )
+    if use is not Use.MEASURE and _is_replayed(context):
+        return localize("A take is being replayed: Esc stops it")
     if use is Use.CHANGE or bed.mode != "OBJECT":
         return ""
     layout = bed.digiclay.layout
@@ -114,6 +116,13 @@ def find_obstacle(context: Context, bed: Object, use: Use) -> str:
     if fault:
         return localize("{}, or press Rebuild in Laboratory > Device", fault)
     return bridge.find_scale_fault(bed)
+
+
+def _is_replayed(context: Context) -> bool:
+    """Return whether a take is being replayed, which writes its end into its bed."""
+    windows = context.window_manager.windows
+    every = (operator for window in windows for operator in window.modal_operators)
+    return any(operator.bl_idname == "DIGICLAY_OT_take_replay" for operator in every)
 
 
 def active_session(context: Context) -> tuple[Object, Running] | None:
