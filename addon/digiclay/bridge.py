@@ -59,7 +59,8 @@ def points(name: str, count: int) -> Mesh:
 
 def find_fault(bed: Mesh, pins: int | None = None) -> str:
     """Return why a bed's mesh can be neither read nor written as that of its pins now, or an empty text."""
-    pins_alone = isinstance(bed, bpy.types.Mesh) and not bed.polygons
+    # Blender draws shape keys in place of what is written.
+    pins_alone = isinstance(bed, bpy.types.Mesh) and not (bed.polygons or bed.shape_keys)
     if not pins_alone or not ATTRIBUTES.keys() <= set(bed.attributes.keys()):
         return localize("the bed's mesh is no longer that of its pins: undo that to go on")
     if bed.is_editmode:  # its attributes have length 0

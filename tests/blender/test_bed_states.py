@@ -456,6 +456,7 @@ VERBS = {
     "instances made real, with parents": (
         lambda _: bpy.ops.object.duplicates_make_real(use_base_parent=True, use_hierarchy=True), "", "",
     ),
+    "given a shape key": (lambda _: bpy.ops.object.shape_key_add(), NOT_PINS, NOT_PINS),
     "joined into a cube": (join(lambda _: bpy.data.objects["Cube"]), "no bed", "no bed"),
 }  # fmt: skip
 

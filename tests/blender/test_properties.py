@@ -193,8 +193,11 @@ def test_a_rebuilt_bed_is_the_same_with_its_new_pins_at_rest_where_its_layout_sa
     housing, pins = (bridge.read_points(mesh)[:, 0].max() for mesh in (evaluate(bed), bed.data))
     assert housing > pins
     bpy.data.objects.remove(fingertip_of(bed))
+    bed.modifiers.clear()
     bpy.ops.digiclay.rebuild()
     assert fingertip_of(bed) is not None
+    bpy.context.view_layer.update()
+    assert len([*instances(bed)]) == 180
 
 
 def test_settings_that_do_not_go_together_leave_the_bed_as_it_is(bed):

@@ -86,7 +86,11 @@ def _make_tree(instant: Instant, lowest: float | None = None) -> NodeTree:
 
 def add_modifier(bed: Object, instant: Instant) -> None:
     """Draw a bed by new geometry nodes, which know its housing; what it is asked to show stays."""
-    require_modifier(bed).node_group = _make_tree(instant, 0.0)
+    modifier = find_modifier(bed)
+    if modifier is None:  # the user has removed it, or its nodes
+        modifier = bed.modifiers.new(MODIFIER, "NODES")
+        bed.modifiers.move(len(bed.modifiers) - 1, 0)
+    modifier.node_group = _make_tree(instant, 0.0)
 
 
 def hold_parts(bed: Object) -> None:
@@ -127,7 +131,7 @@ def require_modifier(bed: Object) -> Modifier:
     modifier = find_modifier(bed)
     if modifier is None:
         rule = "must have the geometry nodes modifier that draws its pins (got none)"
-        raise DigiclayError(f"{bed.name} {rule}. Undo its removal.")
+        raise DigiclayError(f"{bed.name} {rule}. Undo its removal, or press Rebuild.")
     return modifier
 
 
@@ -152,7 +156,7 @@ def write_setting(bed: Object, name: str, value: Any) -> None:
     modifier = require_modifier(bed)
     if not has_setting(bed, name):
         raise DigiclayError(
-            f"{bed.name} is from an older file and has no skin. Rebuild it in Laboratory > Device."
+            f"{bed.name} has no skin. Rebuild it in Laboratory > Device."
         )
     set_node_setting(modifier, name, value)
 

@@ -256,10 +256,10 @@ def rebuild(bed: Object) -> Scene:
     instant = make_rest(scene)
     mesh, drawing = bed.data, view.find_modifier(bed)
     bed.data = view.make_cells(instant)
-    if drawing is not None:
-        # The modifier stays, and with it the bed's colors; only its node tree is another.
-        tree = drawing.node_group
-        view.add_modifier(bed, instant)
+    # The modifier stays, and with it the bed's colors; only its node tree is another.
+    tree = drawing and drawing.node_group
+    view.add_modifier(bed, instant)
+    if tree is not None:
         _discard(tree)
     repair.give_fingertip(bed, scene)
     for tip, finger in zip(fingertips_of(bed).values(), instant.finger, strict=False):

@@ -80,7 +80,7 @@ from_rest = Need(
 )
 no_skin = Need(
     lambda context: not view.can_show_skin(bed_of(context)),
-    "The bed is from an older file and has no skin: rebuild it in Laboratory > Device",
+    "The bed has no skin: rebuild it in Laboratory > Device",
 )
 no_shape = Need(lambda context: not bed_of(context).digiclay.use_shape, "The bed has no shape")
 no_own_preset = Need(

@@ -40,6 +40,7 @@ from ..ui_text import localize
 from .action import Drawing, Modal, Polled, Result, clear_status, inform, show_status
 from .poll_messages import no_place, no_tool
 from .press_settings import PressSettings
+from .session_loop import Session
 
 #: How far a turn of the wheel takes the surface up, m.
 WHEEL = 0.25e-3
@@ -246,6 +247,8 @@ def open_session(
     try:
         if running.find(bed) is None:
             context.view_layer.objects.active = bed
+            if reason := Session.poll_message(context):
+                raise DigiclayError(localize(reason))
             bpy.ops.digiclay.session("INVOKE_DEFAULT")
         session = running.find(bed)
         if session is not None and session.stale:  # the stroke is drawn on what undo has put there
