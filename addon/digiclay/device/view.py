@@ -155,9 +155,7 @@ def write_setting(bed: Object, name: str, value: Any) -> None:
     """Change a setting of a bed's geometry nodes, of its own type. Raises DigiclayError without it."""
     modifier = require_modifier(bed)
     if not has_setting(bed, name):
-        raise DigiclayError(
-            f"{bed.name} has no skin. Rebuild it in Laboratory > Device."
-        )
+        raise DigiclayError(f"{bed.name} has no skin. Rebuild it in Laboratory > Device.")
     set_node_setting(modifier, name, value)
 
 
