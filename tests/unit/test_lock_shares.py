@@ -251,6 +251,7 @@ def test_a_change_of_locks_is_an_undo_step_in_takes_and_stored_with_the_bed(brus
     assert len(done.gestures) == len(held.gestures) + 1
     assert np.abs(shares(done) - SHARES).max() > 0.01
     assert replayed(read_recording(done))
+    assert replayed(read_recording(form(done, lay(Brush.INVERT_LOCKS))))
     assert_array_equal(shares(sculpting.rewind(done)), SHARES)
     assert_array_equal(load(done.system, done.snapshot).shares(), shares(done))
     # A finger may be added.

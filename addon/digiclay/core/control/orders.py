@@ -341,9 +341,11 @@ def order_periods(
             yield DrivingControl(held, free, exact, actuator, circle, goal) if circle else held
         elif radius == 0.0:
             yield held
+        elif verb is Verb.SHARE:  # its x is no place
+            shares = orders.surfaces[int(x)]
+            yield LockingControl(method, cell, verb, (0.0, 0.0, radius), shares)
         elif verb in LOCKING:
-            shares = orders.surfaces[int(x)] if verb is Verb.SHARE else None
-            yield LockingControl(method, cell, verb, disc, shares)
+            yield LockingControl(method, cell, verb, disc)
         elif verb is Verb.ERASE:
             change = partial(
                 erase, strength * period / ERASING, actuator.rest_height, exact.dead_band
