@@ -2,9 +2,11 @@
 
 import numpy as np
 
-from ..base.arrays import TIE, Floats, Indices
+from ..base.arrays import Floats, Indices
 from .mesh_limits import CORNERS, SMALLER, make_refusal, refuse_many_triangles
 
+#: A dent of a smaller share of a polygon's area is rounding: files have six digits.
+FLAT = 1e-6
 #: Polygons that are cut at a time.
 CHUNK = 1_000_000
 #: Most corners of a concave polygon: cutting it takes time with their square.
@@ -35,7 +37,7 @@ def _cut_alike(points: Floats, polygons: Indices, name: str) -> Indices:
         normal = areas.sum(axis=1)
         # Each triangle has to have the polygon's sense: of a fan that overlaps, one has not.
         along = np.einsum("pki,pi->pk", areas, normal)
-        dented = np.any(along < -TIE * np.einsum("pi,pi->p", normal, normal)[:, None], axis=1)
+        dented = np.any(along < -FLAT * np.einsum("pi,pi->p", normal, normal)[:, None], axis=1)
     size = polygons.shape[1]
     fan = np.stack([np.zeros(size - 2, np.int64), np.arange(1, size - 1), np.arange(2, size)], 1)
     fans = polygons[~dented][:, fan].reshape(-1, 3)
