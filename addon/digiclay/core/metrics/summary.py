@@ -1,7 +1,7 @@
 """Metrics of a session: pure functions on the arrays of a history, or on sums over its cells.
 
-Averages are those of `signals`. *In contact* are the rows with a total force above zero; the
-fingertip cannot pull, and a force it no longer exerts is exactly zero.
+Averages are those of `signals`. *In contact* are the rows with a total force above zero, which the
+fingertip exerts that cannot pull, and above the rounding of one that just touches.
 """
 
 import math
@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..base.arrays import Array, Cells, Flags, Floats
+from ..base.arrays import TIE, Array, Cells, Flags, Floats
 from ..base.errors import ParameterError
 from ..base.modes import Mode
 from ..model.control_interface import SetPoint, find_set_point
@@ -38,7 +38,7 @@ AT_ONCE = 2**17
 
 def find_contact_rows(total_force: Floats) -> Flags:
     """Return which rows have contact, shape (t,), from the total force in N."""
-    return np.asarray(total_force > 0.0)
+    return np.asarray(total_force > TIE)
 
 
 class CellSums(NamedTuple):
