@@ -205,15 +205,24 @@ def test_a_folder_appears_with_all_that_was_written_and_not_before_nor_after_a_f
 
 def test_an_older_run_is_replaced_when_asked_and_stays_when_the_new_one_fails(tmp_path):
     def words():
-        return [(path.name, path.read_text(encoding="utf-8")) for path in tmp_path.glob("*/*")]
+        paths = (path for path in tmp_path.glob("*/*") if path.is_file())
+        return [(path.name, path.read_text(encoding="utf-8")) for path in paths]
 
     fill(tmp_path / "run", "old")
     with pytest.raises(ZeroDivisionError), write_folder(tmp_path / "run", overwrite=True):
         raise ZeroDivisionError
     assert words() == [(MARK, "old")]
+    # What is the user's stays: notes, a folder, a link that leads nowhere.
+    (tmp_path / "run" / "mine").mkdir()
+    for name in ("notes.txt", "film.mp4", "mine/a.png", ".film.mp4.1@a.part"):
+        (tmp_path / "run" / name).write_text("mine")
+    (tmp_path / "run" / "link").symlink_to("nowhere")
     with write_folder(tmp_path / "run", overwrite=True) as staged:
         fill(staged, "new")
-    assert words() == [(MARK, "new")]
+    assert sorted(words()) == [(MARK, "new"), ("notes.txt", "mine")]
+    names = {path.name for path in (tmp_path / "run").iterdir()}
+    assert names == {MARK, "notes.txt", "mine", "link"}
+    assert (tmp_path / "run" / "mine" / "a.png").read_text() == "mine"
 
 
 @pytest.mark.parametrize(

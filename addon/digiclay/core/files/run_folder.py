@@ -156,6 +156,19 @@ class Content(NamedTuple):
 RUN = Content("run", (MARK,))
 
 
+#: Patterns of what commands write into a run's folder.
+WRITTEN = (
+    "*.toml", "*.npz", "*.json", "*.py", "*.csv", "*.md", "*.html", "*.png", "*.jpg", "*.svg", "*.mp4", "*.stl",
+    "*.obj", "*.ply", "*.glb", "*.3mf", "*.usd", "*.usda", "*.abc", "displayed", "frames-*",
+    ".*.lock", ".*.part", ".*.old", ".*.frames",
+)  # fmt: skip
+
+
+def find_others(folder: Path) -> list[Path]:
+    """Return the files and folders in a run's folder that no command has written: notes, a .blend."""
+    return [path for path in folder.iterdir() if not any(map(path.match, WRITTEN))]
+
+
 def check_folder(out: Path, *, overwrite: bool, content: Content = RUN) -> None:
     """Refuse an output folder that is neither empty nor, with `overwrite`, of the given content."""
     with explain_os_error(f"{out} cannot be read"):
@@ -208,6 +221,14 @@ def describe_claim(path: Path, how: str) -> str:
     return f"{path} is {how} by another digiclay: choose another place with --out, or wait."
 
 
+def _copy(path: Path, to: Path) -> None:
+    """Copy a file, a folder or a link."""
+    if path.is_dir() and not path.is_symlink():
+        shutil.copytree(path, to, symlinks=True)
+    else:
+        shutil.copy2(path, to, follow_symlinks=False)
+
+
 class Claim(NamedTuple):
     """Lock of a folder for writing, for the block of `claim_folder`."""
 
@@ -216,7 +237,10 @@ class Claim(NamedTuple):
 
     @contextmanager
     def write(self) -> Iterator[Path]:
-        """Yield a folder to write into; it becomes `out` at the end, unless there was an error."""
+        """Yield a folder to write into; it becomes `out` at the end, unless there was an error.
+
+        What no command has written into `out` stays there.
+        """
         target = self.out.resolve()
         staged, former = name_unfinished(target), name_unfinished(target, "old")
         try:
@@ -224,6 +248,9 @@ class Claim(NamedTuple):
             yield staged
             check_folder(self.out, overwrite=self.overwrite)
             if target.exists():
+                for other in find_others(target):
+                    if not (staged / other.name).exists():
+                        _copy(other, staged / other.name)
                 target.rename(former)
             staged.rename(target)
         except OSError as error:
