@@ -329,7 +329,7 @@ def stl(folder, triangles):
         (change(unit="km"), "body #1.unit must be one of auto, mm, cm, m, inch (got 'km')"),
         (change(mesh=""), "body #1.file or mesh must be given"),
         (change(mesh="abc"), "body #1.mesh must be a mesh packed as text"),
-        (change(mesh="", file="none.stl"), "body #1.file must be the file of a mesh"),
+        (change(mesh="", file="none.stl"), "body #1.file must be a file that exists"),
         (change(mesh="", file="note.txt"), "body #1.file must be the file of a mesh"),
         (change(mesh="", file="empty.stl"), "cut off (got empty.stl: 0 of at least 84 bytes)"),
         (change(mesh="", file="lines.obj"), "body #1.file must be triangles"),

@@ -133,7 +133,7 @@ def test_a_scene_is_formed_in_its_take_live_and_by_the_take_as_a_scene(file, clo
 @pytest.mark.parametrize(
     "old, new, words",
     [
-        ("egg.stl", "none.stl", "body #1.file must be the file of a mesh"),
+        ("egg.stl", "none.stl", "body #1.file must be a file that exists"),
         ("0, 0.049]", "0, 0.003]", "body #1.trajectory must begin above the floor"),
         ("plastic", "hybrid", "body must be left out: the method hybrid"),
         ("", "", "Time Stretching must have two equal numbers"),
