@@ -92,6 +92,7 @@ MISTAKES = {
     "compare my.toml --methods cell_stats": "did you mean cell_states",
     "compare my.toml --methods ,": "must name at least one method",
     "compare my.toml --method cell_stats": "Did you mean cell_states",
+    "compare my.toml --method a.py:A --method b.py:B": "--method: may be given once",
     "compare my.toml --out my.toml": "my.toml is a file",
     "compare my.toml --set control.spring_trigger=1": "spring_trigger must be a parameter of virtual_master",
     "job .": ". is not the folder of a job: it has no job.toml.",

@@ -214,14 +214,14 @@ def test_an_older_run_is_replaced_when_asked_and_stays_when_the_new_one_fails(tm
     assert words() == [(MARK, "old")]
     # What is the user's stays: notes, a folder, a link that leads nowhere.
     (tmp_path / "run" / "mine").mkdir()
-    for name in ("notes.txt", "film.mp4", "mine/a.png", ".film.mp4.1@a.part"):
+    for name in ("notes.md", "film.mp4", "mine/a.png", ".film.mp4.1@a.part"):
         (tmp_path / "run" / name).write_text("mine")
     (tmp_path / "run" / "link").symlink_to("nowhere")
     with write_folder(tmp_path / "run", overwrite=True) as staged:
         fill(staged, "new")
-    assert sorted(words()) == [(MARK, "new"), ("notes.txt", "mine")]
+    assert sorted(words()) == [(MARK, "new"), ("notes.md", "mine")]
     names = {path.name for path in (tmp_path / "run").iterdir()}
-    assert names == {MARK, "notes.txt", "mine", "link"}
+    assert names == {MARK, "notes.md", "mine", "link"}
     assert (tmp_path / "run" / "mine" / "a.png").read_text() == "mine"
 
 

@@ -56,9 +56,23 @@ def _setting(text: str) -> Setting:
     return Setting(key.strip(), value.strip())
 
 
+class _Once(argparse.Action):
+    """Option that is refused the second time."""
+
+    def __call__(
+        self, parser: argparse.ArgumentParser, known: argparse.Namespace, value: Any, *_: Any
+    ) -> None:
+        if getattr(known, self.dest) is not None:
+            raise argparse.ArgumentError(self, "may be given once (compare has --methods)")
+        setattr(known, self.dest, value)
+
+
 #: Options that change a scene.
 SCENE_OPTIONS: Options = {
-    "--method M": "control method, also one of your own, mine.py:Mine: the same as --set control.method=M",
+    "--method M": {
+        "action": _Once,
+        "help": "control method, also one of your own, mine.py:Mine: the same as --set control.method=M",
+    },
     "--stepper S": "stepper: the same as --set simulation.stepper=S",
     "--tolerance T": 'largest error of the heights, such as "1 um": chooses the adaptive stepper',
     "--with FILE": {

@@ -158,7 +158,7 @@ RUN = Content("run", (MARK,))
 
 #: Patterns of what commands write into a run's folder.
 WRITTEN = (
-    "*.toml", "*.npz", "*.json", "*.py", "*.csv", "*.md", "*.html", "*.png", "*.jpg", "*.svg", "*.mp4",
+    "*.toml", "*.npz", "*.json", "*.py", "*.csv", "study.md", "*.html", "*.png", "*.jpg", "*.svg", "*.mp4",
     "*.stl", "*.obj", "*.ply", "*.glb", "*.3mf", "*.usd", "*.usda", "*.abc", "displayed", "frames-*",
     ".*.lock", ".*.part", ".*.old", ".*.frames",
 )  # fmt: skip

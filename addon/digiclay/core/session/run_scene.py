@@ -156,8 +156,10 @@ class Result(Described):
     def _describe_force(self) -> str:
         """Return the deviation of the force, and the losses, or ``""``."""
         rfd, share = self.metrics.get("rfd"), self.metrics.get("contact_share")
-        thinned = self.scene.recorder is not None and self.scene.recorder.every > 1
-        felt = ("no contact" + " in the rows kept" * thinned) * (share == 0.0)
+        felt = ""
+        if share == 0.0:
+            thinned = self.scene.recorder is not None and self.scene.recorder.every > 1
+            felt = "no contact in the rows kept" if thinned else "no contact"
         if rfd is not None:
             felt = f"RFD {show_digits(rfd)} N{self._name_worst()}"
         if self.metrics.get("rfd_jnd_least") is not None:
