@@ -69,7 +69,8 @@ def show_file(bed: Object, shape: Shape) -> tuple[Fitted, float]:
 
 def _show(bed: Object, scene: Scene, shape: Shape, laid: Fitted) -> tuple[Fitted, float]:
     """Drive the pins of a bed to a shape, and keep shape and state in the bed."""
-    scene = replace(scene, shape=replace(shape, heights=pack(laid.heights)))
+    # Pressers wait as well, wherever they are.
+    scene = replace(scene, bodies=(), shape=replace(shape, heights=pack(laid.heights)))
     system = assemble(scene)
     display = find_display(system)
     assert display is not None

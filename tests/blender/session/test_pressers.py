@@ -330,6 +330,20 @@ def test_recorded_strokes_are_played_on_a_bed_that_a_mesh_presses(bed, ball, tmp
     assert exact(bed).min() < 38.5e-3
 
 
+def test_a_shape_comes_up_beside_a_mesh_which_then_presses_it(bed, ball, clock):
+    select(bed)
+    place(ball, 56e-3)
+    assert bpy.ops.digiclay.shape_sample(sample="dome") == {"FINISHED"}
+    raised = shown(bed)
+    assert raised.max() > 54e-3
+    started(bed)
+    clock.tick(3)
+    assert_near(exact(bed), raised, 1e-5)  # within the dead band
+    place(ball, 53e-3)
+    clock.tick(6)
+    assert (raised - exact(bed)).max() > 1e-3
+
+
 @pytest.mark.parametrize("back", [sculpting.rewind, None], ids=["a gesture", "undo"])
 def test_what_is_taken_back_while_a_mesh_presses_leaves_no_dent(bed, ball, clock, back):
     started(bed)
