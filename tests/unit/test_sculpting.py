@@ -90,6 +90,20 @@ def test_changed_parts_keep_the_heights_and_say_so_and_a_changed_gain_takes_effe
     assert hand.move(later, [(0.0, 38.0)] * 30).trace.set_point[-1] == 0.8
 
 
+def test_a_fingertip_that_is_left_out_while_it_presses_leaves_heights():
+    plain = {"layout": SIZES, "control": {"method": "plastic"}, "relaxation": "absent"}
+    poses = np.array([pose(-6.0, z=38.0), pose(6.0, z=38.0)])
+    session, _ = begin_session(7, "Bed", resolve(plain).with_fingers(2), poses)
+    for now in (0.0, 0.1, 0.2):
+        session = advance(session, poses, now, 100)
+    before = heights(session)
+    without = resolve(plain | {"fingertip": "absent"}).with_fingers(2)
+    later, said = change_scene(session, without)
+    assert "heights and locks were kept" in said
+    later = advance(later, poses, 0.3, 100)
+    assert_near(heights(advance(later, poses, 0.4, 100)), before, 1e-12)
+
+
 def test_a_session_takes_no_more_memory_the_longer_it_lasts():
     hand, session = Hand(), started()
     circle = [(5.0 * np.cos(turn), 38.0) for turn in np.linspace(0.0, 6.0, 30)]

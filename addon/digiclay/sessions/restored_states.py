@@ -33,14 +33,14 @@ def restore_state(
     the surface replaces it where that has other pins, or nothing of the state could be taken up.
     """
     stored = change_fingers(scene, system, stored, was, numbers)
-    state, lost, refused = _load_state(system, stored)
+    state, lost, refused = _load_state(scene, system, stored)
     surface = state.row(0)
     if base is None or refused or base.size != surface.size:
         base = surface
     return state, snapshot.dump(system, state), base, lost
 
 
-def _load_state(system: System, stored: bytes | None) -> tuple[State, str, bool]:
+def _load_state(scene: Scene, system: System, stored: bytes | None) -> tuple[State, str, bool]:
     """Return the state of a snapshot, what of it could not be taken up, and whether nothing could."""
     if stored is None:
         return begin(system), "", False
@@ -48,10 +48,17 @@ def _load_state(system: System, stored: bytes | None) -> tuple[State, str, bool]
     refused = ""
     for read, words in ((snapshot.load, ""), (snapshot.transfer_heights, CHANGED)):
         try:
+            if not words and _lacks_fingertip(scene, stored):
+                continue
             return read(system, stored), words and localize(words), False
         except StateError as error:
             refused = localize("The bed begins at rest. {}", error)
     return begin(system), refused, True
+
+
+def _lacks_fingertip(scene: Scene, stored: bytes) -> bool:
+    """Return whether pins of a snapshot are touched by a fingertip that a scene leaves out."""
+    return scene.fingers[0].fingertip is None and snapshot.is_reached(stored)
 
 
 def change_fingers(
@@ -63,7 +70,7 @@ def change_fingers(
     bodies = len(scene.bodies)
     try:
         had = snapshot.count_fingers(stored) - len(was)
-        if was == numbers and had == bodies:
+        if (was == numbers and had == bodies) or _lacks_fingertip(scene, stored):
             return stored
         form = (scene.bodies or (Presser(Body(), scene.fingers[0].trajectory),))[:1]
         former = assemble(

@@ -300,6 +300,18 @@ def test_a_mesh_must_begin_above_the_floor_and_may_go_below_it(bed, ball, clock)
     goes_on(clock)
 
 
+def test_a_mesh_presses_on_when_the_fingertip_is_left_out(bed, ball, clock):
+    bed.digiclay.use_relaxation = False
+    started(bed)
+    clock.tick(2)
+    bed.digiclay.use_fingertip = False
+    (note,) = clock.tick()
+    assert "heights and locks were kept" in note.message
+    assert press(ball, clock) == []
+    # A pulp that does not relax is deeper in the pins: 0.15 mm.
+    assert np.abs(exact(bed) - sphere(bed)).max() < 0.2e-3
+
+
 @pytest.mark.usefixtures("machine")
 def test_strokes_and_their_images_are_formed_beside_a_mesh_and_kept_in_a_take(bed, ball, clock):
     started(bed)

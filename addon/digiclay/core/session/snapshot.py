@@ -220,6 +220,12 @@ def count_fingers(data: bytes) -> int:
     return len(_read(data).header["gathered"]["fingers"])
 
 
+def is_reached(data: bytes) -> bool:
+    """Return whether fingertips reach pins in a stored state; StateError if it is damaged."""
+    reaches, _ = _read_discs(_read(data).header["gathered"])
+    return any(disc is not None for disc in reaches)
+
+
 def read_shares(data: bytes) -> Floats:
     """Return the shares by which pins of a stored state are locked, (n,); StateError if it is damaged."""
     arrays = _read(data).arrays
