@@ -420,7 +420,8 @@ def test_memory_counts_the_forces_of_bodies():
         check_memory(replace(scene, simulation=long), rows)
 
 
-def test_describe_names_the_bodies_and_their_paths(tmp_path, capsys):
-    (tmp_path / "my.toml").write_text(format_scene(resolve(table(body(BALL)))), encoding="utf-8")
+def test_describe_names_the_bodies_their_sizes_and_paths(tmp_path, capsys):
+    egg = BALL.copy().apply_scale((1.0, 2.0, 0.5))
+    (tmp_path / "my.toml").write_text(format_scene(resolve(table(body(egg)))), encoding="utf-8")
     assert main(["describe", str(tmp_path / "my.toml")]) == 0
-    assert "body 1: a packed mesh, its path until 0.9 s" in capsys.readouterr().out
+    assert "body 1: a packed mesh, 24 x 48 x 12 mm, its path until 0.9 s" in capsys.readouterr().out

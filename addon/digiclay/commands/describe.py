@@ -6,6 +6,8 @@ import textwrap
 from collections.abc import Iterator
 from typing import Any
 
+import numpy as np
+
 from ..core.base.quantity import Parameters, Quantity, list_quantities
 from ..core.control.virtual_master import make_master_cell
 from ..core.engine.system import System
@@ -18,6 +20,7 @@ from ..core.session.memory_limit import (
     measure_available_memory,
 )
 from ..core.session.plate import list_cautions
+from ..core.shapes.body import read_bodies
 from ..core.shapes.fitting import fit_shape
 from .arguments import add_scene, command, scene_of
 
@@ -157,9 +160,11 @@ def description(scene: Scene, system: System) -> Iterator[str]:
     for finger in scene.fingers:
         path, points = finger.trajectory, finger.trajectory.waypoints
         yield f"  {len(points)} waypoints, {path.interpolation}, the last at {points[-1].time:g} s"
-    for number, each in enumerate(scene.bodies, 1):
-        last = each.trajectory.waypoints[-1].time
-        yield f"  body {number}: {each.body.file or 'a packed mesh'}, its path until {last:g} s"
+    meshes = read_bodies(each.body for each in scene.bodies)
+    for number, (each, mesh) in enumerate(zip(scene.bodies, meshes, strict=True), 1):
+        name, last = each.body.file or "a packed mesh", each.trajectory.waypoints[-1].time
+        sides = " x ".join(f"{1e3 * side:.3g}" for side in np.ptp(mesh.vertices, axis=0))
+        yield f"  body {number}: {name}, {sides} mm, its path until {last:g} s"
     sizes = scene.cells, scene.periods, count_busy_cells(scene)
     needed = count_bytes_needed(scene.recorder, system.rows, *sizes)
     free = measure_available_memory()
