@@ -70,7 +70,7 @@ def test_both_methods_are_printed_side_by_side_and_kept_with_a_picture_of_the_sa
     assert 0.03 <= known["cell_states"]["set_point"] < 121 * 0.03
 
 
-#: A body that falls by 4 mm in a control period, and a path behind lines in turn.
+#: A body that falls by more than its cap in a control period, and a path behind lines in turn.
 FALL = """\
 layout.rows = 5
 [[body]]
