@@ -30,7 +30,7 @@ from digiclay.core.shapes.request import Shape
 from digiclay.plots.sweep import PANELS, comparison
 
 from tests.assemble import table
-from tests.scene_files import SMALL_BLISTER, call, left, read_json, scene_text
+from tests.scene_files import SMALL_BLISTER, TOUCH, call, left, read_json, scene_text
 
 pytestmark = pytest.mark.usefixtures("here")
 
@@ -79,23 +79,19 @@ unit = "m"
 trajectory.waypoints = [{time = 0, position = [0, 0, 90e-3]}, {time = 0.1, position = [0, 0, 30e-3]}]
 """
 TURNS = f'{PRESS}[drive]\nsections = 2\npolicy = "round_robin"\n'
+#: A fingertip that turns back within a step.
+STEPS = "simulation.control_period = 0.02\nsimulation.physics_step = 0.02\n"
+BENT = STEPS + scene_text(11, 11, *TOUCH)
 
 
 @table(
     "scene, methods, said",
     {
-        "a body that falls fast, by any method": (
-            FALL,
-            "elastic,plastic",
-            "elastic, plastic: body 1 ",
-        ),
-        "lines in turn, by one method alone": (
-            TURNS,
-            "elastic,push_pull",
-            "push_pull: drive.policy ",
-        ),
+        "a body that falls fast, by any method": (FALL, "elastic,plastic", "elastic, plastic: body 1 "),
+        "lines in turn, by one method alone": (TURNS, "elastic,push_pull", "push_pull: drive.policy "),
+        "a bent path, by any method": (BENT, ",".join(BOTH), f"{', '.join(BOTH)}: larger errors: within"),
     },
-)
+)  # fmt: skip
 def test_a_comparison_tells_what_is_not_to_be_trusted_of_which_method(
     scene, methods, said, here, capsys
 ):

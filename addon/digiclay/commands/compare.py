@@ -61,6 +61,8 @@ READ = {"m": (1e3, "mm"), "m3": (1e6, "ml"), "m/s": (1e3, "mm/s"), "1": (1.0, ""
 Metrics = dict[str, float | None]
 #: Rows of the table.
 FIGURES = {**RUN_METRICS, **ERRORS, **SPEEDS}
+#: Messages of a run on what is not to be trusted of it.
+DOUBTS = (*BEYOND, "errors_in_doubt")
 #: Methods where none are named.
 DEFAULT = ("virtual_master", "cell_states")
 #: Options that need --suite.
@@ -205,7 +207,7 @@ def _measure(point: Point, arguments: Namespace) -> Record:
             *([describe_errors(done.metrics)] if "height_error" not in done.metrics else []),
         ],
         "forces": [worst["time"].tolist(), worst["total_force"].tolist(), asked.tolist()],
-        **{name: done.metrics.get(name, "") for name in BEYOND},
+        **{name: done.metrics.get(name, "") for name in DOUBTS},
         "fingers": done.metrics.get("fingers"),
     }
 
@@ -223,7 +225,7 @@ def _write(
     units = {name: metric.unit for name, metric in FIGURES.items()}
     content = {"scene": scene.name, "methods": measured, "units": units}
     content |= {
-        key: {name: record.get(key, "") for name, record in every.items()} for key in BEYOND
+        key: {name: record.get(key, "") for name, record in every.items()} for key in DOUBTS
     }
     if several:
         content["fingers"] = {name: each["fingers"] for name, each in every.items()}
@@ -247,7 +249,9 @@ def _list_notes(scenes: Sequence[Scene], every: Mapping[str, Record]) -> list[st
     """Return what is to be known of a scene or its results, after the methods that it is true of."""
     said: dict[str, list[str]] = {}
     for scene, (name, record) in zip(scenes, every.items(), strict=True):
-        for note in (*list_cautions(scene), *list_beyond(record)):
+        doubt = record.get("errors_in_doubt")
+        larger = [f"larger errors: {doubt}"] if doubt else []
+        for note in (*list_cautions(scene), *list_beyond(record), *larger):
             said.setdefault(note, []).append(name)
     return [f"{', '.join(names)}: {note}" for note, names in said.items()]
 
