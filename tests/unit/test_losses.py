@@ -57,7 +57,8 @@ def test_a_finger_is_lost_where_contact_ends_though_it_rises_no_faster_than_a_pi
         TIME >= 0.0
     )
     height = 20e-3 * TIME + 10e-3 * np.maximum(TIME - quick, 0.0)
-    found = find_losses(TIME, 0.4 * felt, height, 24e-3)
+    # A finger that touches as deep as its place is rounded is not felt.
+    found = find_losses(TIME, np.where(felt, 0.4, 1e-16), height, 24e-3)
     # A row is 5 ms.
     assert [tuple(one) for one in found] == [pytest.approx(one, abs=11e-3) for one in wanted]
 
