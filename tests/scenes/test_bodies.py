@@ -102,6 +102,14 @@ def test_the_force_is_that_of_the_body_and_its_metrics_are_recorded(press):
     assert press.metrics["duration"] == pytest.approx(0.9)
 
 
+@pytest.mark.parametrize("deep, pressed", [(0.0, 0), (1e-17, 0), (0.1e-3, 25)])
+def test_a_body_that_goes_down_to_the_pins_but_for_rounding_presses_none(deep, pressed):
+    low = REST + 10e-3 - deep
+    way = path((0, 0, 0, low + 5e-3), (0.1, 0, 0, low), (0.2, 0, 0, low))
+    (felt,) = press_bodies(body(BOX, way)).metrics["bodies"]
+    assert felt["pressed_pins"] == pressed
+
+
 def test_the_force_is_stiffness_times_indentation_up_to_the_cap():
     # A pin behind a shut valve does not move.
     done = press_bodies(body(BALL, stiffness=300.0, cap=1e-3), held=True)

@@ -231,7 +231,7 @@ def find_losses(time: Floats, total_force: Floats, height: Floats, free_speed: f
     rise = np.gradient(height, time) if ends.size else height
     for end in ends.tolist():
         if rise[(time > end - 0.2) & (time <= end + 0.1)].max() <= free_speed:
-            over = time[(time > end) & ((total_force > 0.0) | (rise > free_speed))]
+            over = time[(time > end) & (find_contact_rows(total_force) | (rise > free_speed))]
             losses.append(Loss(end, float(over[0] if over.size else time[-1]) - end))
     return losses
 
@@ -308,7 +308,7 @@ def measure_bodies(history: Mapping[str, Any]) -> list[dict[str, float]]:
         {
             "max_total_force": float(force.sum(axis=1).max()),
             "max_cell_force": float(force.max()),
-            "pressed_pins": int(np.count_nonzero(force, axis=1).max()),
+            "pressed_pins": int(np.count_nonzero(force > TIE, axis=1).max()),
         }
         for force in history["body_force"].swapaxes(0, 1)
     ]
