@@ -113,6 +113,12 @@ def test_a_small_finger_and_a_coarse_bed_are_judged_together():
     )
 
 
+def test_what_is_true_of_each_finger_is_said_once():
+    bed, widths = {"layout": {"arrangement": "hexagonal"}}, (16e-3, 20e-3)
+    fingers = [{"contact": {"share": 0.29}, "fingertip": {"width": width / 2}} for width in widths]
+    assert len(list_cautions(digiclay.scene({**bed, "finger": fingers}))) == 1
+
+
 PUSH_PULL = {"method": "push_pull"}
 CREEP, ALIAS = "corrects only those near it", "they run away"
 

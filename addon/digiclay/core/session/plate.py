@@ -107,7 +107,7 @@ def list_cautions(scene: Scene) -> list[str]:
                 f"{JUDGED * tip.height * 1e3:g} mm deep"
                 + (": the bed can show shapes, but cannot be sculpted" if spread > LOST else "")
             )
-    return lines
+    return list(dict.fromkeys(lines))
 
 
 #: Methods whose cycle of control periods meets the turns of lines that wait.
