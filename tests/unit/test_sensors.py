@@ -6,6 +6,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from digiclay.core.control.virtual_master import VirtualMaster
 from digiclay.core.engine.simulation import begin, periods
 from digiclay.core.model.control_interface import Measurement
 from digiclay.core.model.null_parts import PerfectSensors
@@ -361,3 +362,12 @@ def test_a_cell_that_took_no_part_while_its_valve_was_shut_is_observed_as_if_it_
                 after.append(own.copy())
         results.append(np.array(after))
     assert_array_equal(results[1], results[0])
+
+
+def test_an_error_of_a_step_as_large_as_the_dead_band_gets_no_command():
+    """Multiples of a step differ by it but for rounding, which must not decide."""
+    step = 10e-6
+    read = np.arange(5000) * step
+    for error in (step, -step):
+        assert not VirtualMaster(dead_band=step).command(read, read - error).any()
+    assert VirtualMaster(dead_band=step).command(read, read - 1.01 * step).all()

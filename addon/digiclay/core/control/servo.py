@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from ..base.arrays import Array, Cells, Constants, Flags, Floats, Modes, any_true
+from ..base.arrays import TIE, Array, Cells, Constants, Flags, Floats, Modes, any_true
 from ..base.errors import ParameterError
 from ..base.quantity import BOUNDS, Parameters, list_quantities, quantity
 from .methods import ControlParameters
@@ -58,7 +58,8 @@ class Tracking(ControlParameters):
     @cached_property
     def _constants(self) -> Constants:
         """Constants of `command`: gain, 1/m; dead band, m; bounds of the command; no command."""
-        return Constants((self.position_gain, self.dead_band, 1.0, -1.0, 0.0))
+        # An error of whole steps of the sensors may be as large as the dead band, but for rounding.
+        return Constants((self.position_gain, self.dead_band * (1.0 + TIE), 1.0, -1.0, 0.0))
 
 
 def declare_again(owner: type[Parameters], name: str, default: float | None = None) -> Any:
