@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from digiclay.core.metrics.metric_table import describe_losses
 from digiclay.core.metrics.summary import find_losses
+from digiclay.core.session.finished_run import find_last_touch
 
 from tests.assemble import table
 from tests.scene_files import call, rows, scene_text
@@ -85,4 +86,11 @@ def test_a_history_of_a_row_or_two_has_no_losses_unless_contact_ends(rows):
 def test_losses_are_told_by_finger_where_there_are_any(lost, said):
     assert (
         describe_losses({"lost": [{"losses": count, "time": time} for count, time in lost]}) == said
+    )
+
+
+@pytest.mark.parametrize("after", [0.0, 1e-16])
+def test_the_last_touch_is_of_more_than_rounding(after):
+    assert (
+        find_last_touch({"time": TIME[:4], "total_force": np.array([0.0, 0.4, after, after])}) == 1
     )

@@ -15,6 +15,7 @@ from ..base.errors import OutputError
 from ..base.modes import Mode
 from ..files.formats import BROKEN_ZIP, Head, read_array, read_heads
 from ..files.run_folder import MARK, read_json
+from ..metrics.summary import find_contact_rows
 from ..scene.recorder import Recorder
 from ..scene.scene_source import load_recorded
 from ..scene.schema import Scene
@@ -216,5 +217,5 @@ def find_row(history: Mapping[str, Array], time: float, called: str) -> int:
 
 def find_last_touch(history: Mapping[str, Array]) -> int:
     """Return the last row with contact, or else the last one: it shows most."""
-    touching = np.flatnonzero(history["total_force"] > 0.0)
+    touching = np.flatnonzero(find_contact_rows(history["total_force"]))
     return int(touching[-1]) if touching.size else len(history["time"]) - 1
