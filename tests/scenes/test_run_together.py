@@ -164,6 +164,8 @@ def test_behaviors_and_steppers_do_what_they_do_alone(name, keys, settings, *, e
     [
         ("tap", "control.force_gain", (3, 5), ("layout.arrangement=hexagonal",)),
         ("slow_press", "control.force_gain", (3, 5), ("recorder.every=7", "simulation.duration=0.503")),
+        # Forces that are read add up to the set point, but for rounding.
+        ("slow_press", "actuator.bore", (1.7e-3, 1.8e-3), ("sensors.force_step=0.01", "layout.rows=12")),
         # The cells are chosen anew every 32 periods or sooner: most of their sets have no row of
         # their own.
         ("plastic_press", "contact.exponent", (2e3, 1990), ("recorder.every=99", "simulation.duration=0.9")),

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from ..base.arrays import Flags, Floats
+from ..base.arrays import TIE, Flags, Floats
 from ..base.modes import FORCE_FOLLOW, SPRING
 from ..model.control_interface import Memory
 from .travel import PARTS, Heading
@@ -165,7 +165,7 @@ class VirtualMasterColumns(VirtualMasterControl):
         ]
         felt = force + noise
         error = gains.force_setpoint - felt
-        springs = (phase == SPRUNG) & (error > 0.0)
+        springs = (phase == SPRUNG) & (error > TIE)
         sprung = gains.position_gain * (numbers[REFERENCE] - felt / gains.spring_stiffness - height)
         effort = np.where(springs, sprung, gains.force_gain * error)
         command = np.minimum(np.maximum(effort, -1.0), 1.0)

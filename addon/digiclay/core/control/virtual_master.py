@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..base.arrays import Constants, Floats, Modes, count_true
+from ..base.arrays import TIE, Constants, Floats, Modes, count_true
 from ..base.modes import FORCE_FOLLOW, SPRING
 from ..base.quantity import quantity
 from ..model.actuator import Actuator, Supply
@@ -309,7 +309,7 @@ class VirtualMasterControl(BatchControl):
             height = felt
         else:
             error = gains.force_setpoint - (force + noise)
-            if phase is SPRINGING and error > 0.0:
+            if phase is SPRINGING and error > TIE:
                 compressed = (force + noise) / gains.spring_stiffness
                 effort = gains.position_gain * (reference - compressed - height)
             else:
