@@ -230,11 +230,10 @@ def _read_head(head: str) -> tuple[bool, list[_Element]]:
 
 def _cut(points: Floats, polygons: list[Array], name: str) -> Indices:
     """Return the triangles (f, 3) of polygons, arrays (count, corners)."""
-    corners = [np.empty(0, np.int64), *(group.ravel().astype(np.int64) for group in polygons)]
-    sizes = np.repeat(
-        *np.array([(group.shape[1], len(group)) for group in polygons]).reshape(-1, 2).T
-    )
-    return cut(points, np.concatenate(corners), sizes, name)
+    none = np.empty(0, np.int64)
+    corners = [group.ravel().astype(np.int64) for group in polygons]
+    sizes = [np.full(len(group), group.shape[1]) for group in polygons]
+    return cut(points, np.concatenate([none, *corners]), np.concatenate([none, *sizes]), name)
 
 
 def _read_off(data: bytes, name: str) -> tuple[Floats, Indices]:

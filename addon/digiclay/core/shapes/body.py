@@ -127,9 +127,10 @@ def _unpack(text: str, owner: str) -> Mesh:
 def _read_file(body: Body, owner: str) -> Mesh:
     """Return the mesh of a body's file."""
     path = Path(body.file)
-    if (absent := not path.is_file()) or path.suffix.lower() not in READERS:
+    if not path.is_file():
+        raise ParameterError(owner, "file", "must be a file that exists", body.file)
+    if path.suffix.lower() not in READERS:
         rule = f"must be the file of a mesh ({', '.join(READERS)})"
-        rule = "must be a file that exists" if absent else rule
         raise ParameterError(owner, "file", rule, body.file)
     try:
         read = mesh_reader.read(path)

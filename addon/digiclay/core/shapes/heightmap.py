@@ -280,9 +280,8 @@ def _read_levels(open_picture: Callable[[], Any], path: Path) -> Pixels:
                 opened, lambda raw: raw.replace("a;", "A;")[:-1] + ("L" if raw[-1] == "B" else "B")
             )
             levels = levels.astype(np.uint16) << 8 | np.asarray(opened)
-        levels = (
-            levels[..., :3] if "a;" in raw else levels
-        )  # multiplied by alpha, which is not needed
+        if "a;" in raw:  # colors multiplied by alpha, which is not needed then
+            levels = levels[..., :3]
     if key is None:
         return levels
     other = levels != np.multiply(key, KEYED_BITS.get(raw, 1)).astype(levels.dtype)
